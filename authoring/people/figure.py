@@ -65,7 +65,7 @@ def _lowest(skeleton: Skeleton, side: str) -> float:
 
 
 def stand_on_both_feet(build: Build, pose: Pose) -> Pose:
-    """Bend the knee of the longer-reaching leg until both soles touch one ground."""
+    """LensWarp the knee of the longer-reaching leg until both soles touch one ground."""
     if not pose.grounded:
         return pose
     heights = {side: _lowest(pose_skeleton(build, pose), side) for side in SIDES}

@@ -14,8 +14,8 @@ SPECS = (specs.Spec, specs.TaskSpec, specs.ModelSpec, specs.AttackSpec, specs.De
 PROTOCOLS = (
     tasks.Task, tasks.Evaluator, models.Model, attacks.Attack, attacks.Compositor, attacks.Objective,
     attacks.HarmObjective, attacks.WithObjective, attacks.WithTaskOptions, attacks.WithInputFiles, models.Trainable,
-    models.BatchPredictor, defenses.Defense, defenses.Taught,
-    defenses.Detecting, defenses.Reporting,
+    models.BatchPredictor, defenses.Defense, defenses.FittedDefense,
+    defenses.DifferentiableDetector, defenses.ReportsFit,
 )  # fmt: skip
 VALUES = (
     tasks.Sample, tasks.SplitInfo, tasks.Encoded, tasks.Sidecar, attacks.Patch, attacks.Budget, defenses.DefenseResult,

@@ -1,1 +1,1 @@
-"""Contracts: the protocols and specs that plugins and rooms agree on. Imports values only."""
+"""Contracts: the protocols and specs of plugins, and those between gear's packages. Imports `gear.values` only."""

@@ -1,4 +1,4 @@
-"""The attack protocol, and what an attack may offer beyond it. torch is imported for type checkers alone."""
+"""The protocol of attacks, and optional protocols for more. torch is imported for type checkers only."""
 
 from __future__ import annotations
 
@@ -50,15 +50,14 @@ class Budget:
 
 
 class Compositor(Protocol):
-    """Puts patches into the pictures of samples, differentiably with respect to the patches."""
+    """Composes patches into the pictures of samples, differentiably with respect to the patches."""
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """Pictures of some samples with the patches on their surfaces.
+        """Composes pictures of some samples with the patches on their surfaces.
 
         Args:
-            patches: one for each surface, values in 0..1: (3, h, w), or (B, 3, h, w) with another appearance for each
-                sample.
-            samples: B numbers of samples in the dataset.
+            patches: one per surface, values in 0..1: (3, h, w) for all samples, or (B, 3, h, w) with one per sample.
+            samples: indices of B samples in the dataset.
             view: name of the camera.
 
         Returns:
@@ -68,14 +67,14 @@ class Compositor(Protocol):
 
 
 State = Mapping[str, npt.NDArray[Any]]
-"""Arrays by name from which an interrupted attack resumes."""
+"""Arrays by name, from which an interrupted attack can be resumed."""
 
 
-class Watch(Protocol):
-    """Observes an attack while it works, for progress, curves, checkpoints and early stopping."""
+class Monitor(Protocol):
+    """Observes an attack while it runs, for progress, curves, checkpoints and early stopping."""
 
     def resume(self) -> State | None:
-        """The last state that an interrupted run of the same attack reported; None for a fresh start."""
+        """The last state that an interrupted run of the same attack reported; None for a new run."""
         ...
 
     def step(
@@ -88,13 +87,13 @@ class Watch(Protocol):
         """Called after every step.
 
         Args:
-            done: steps so far.
-            values: scalars for curves, by name: terms, losses, norms.
-            patches: returns the current patches; called when they are needed.
-            state: returns the state to resume from; an empty mapping where the attack cannot be resumed.
+            done: number of steps done.
+            values: scalars by name, such as terms, losses and norms.
+            patches: function that returns the current patches; called only if they are needed.
+            state: function that returns the state to resume from; an empty mapping where the attack cannot be resumed.
 
         Returns:
-            Whether the attack should stop now.
+            Whether the attack should stop.
         """
         ...
 
@@ -110,7 +109,7 @@ class Attack(Protocol):
         *,
         budget: Budget,
         rng: np.random.Generator,
-        watch: Watch | None = None,
+        monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
         """Optimises one patch for each surface of the samples.
 
@@ -119,8 +118,8 @@ class Attack(Protocol):
             dataset: samples of one task, whose pictures show no patch of this attack.
             compositor: puts patches into the samples' pictures.
             budget: steps and queries that may be spent.
-            rng: of all random choices.
-            watch: called after every step; an attack that ignores it works, but shows no progress and cannot be
+            rng: generator of all random choices.
+            monitor: called after every step; an attack that ignores it works, but shows no progress and cannot be
                 resumed.
         """
         ...
@@ -140,7 +139,7 @@ class Term:
 
 
 class Objective(Protocol):
-    """What an attack maximises: terms of a batch."""
+    """What an attack maximises, as one or several terms."""
 
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
@@ -150,54 +149,56 @@ class Objective(Protocol):
         Args:
             model: attacked network.
             views: (B, 3, H, W) pictures in 0..1 with the patch in them, by camera name.
-            samples: the batch's samples, whose own pictures are without the patch.
-            indexes: numbers of the samples in the dataset, by which an objective may remember things.
+            samples: the batch's samples; their own pictures are without the patch.
+            indexes: indices of the samples in the dataset, for objectives that cache values per sample.
         """
         ...
 
 
 @runtime_checkable
 class HarmObjective(Protocol):
-    """An objective whose weighted terms do not add up to a number by which patches can be compared."""
+    """An objective that compares patches by `harm`, because the sum of its weighted terms is not comparable between
+    patches.
+    """
 
     @property
-    def asks_for_clean(self) -> bool:
-        """Whether `harm` needs the model's answer to the picture without the patch, once for each sample.
+    def needs_clean_output(self) -> bool:
+        """Whether `harm` needs the model's output on the picture without the patch, once for each sample.
 
-        Attacks whose queries are counted pay for that answer.
+        This output counts among the queries of black-box attacks.
         """
         ...
 
     def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
-        """Scalar tensor that grows with the harm of a batch; arguments as of `Objective.terms`."""
+        """Scalar tensor that grows with the harm to a batch; the arguments are those of `Objective.terms`."""
         ...
 
 
 @runtime_checkable
 class WithObjective(Protocol):
-    """An attack that says by which objective its patches are judged on validation samples.
+    """An attack that chooses the objective by which its patches are compared on validation samples.
 
-    Patches of other attacks are judged by untargeted harm to the task.
+    Patches of other attacks are compared by untargeted harm to the task.
     """
 
     def objective(self, sample: Any) -> Objective:
-        """A fresh objective for the task that the sample is of."""
+        """A new objective for the task of the sample."""
         ...
 
 
 @runtime_checkable
 class WithTaskOptions(Protocol):
-    """An attack whose options depend on the task, such as a learning rate that is chosen for it."""
+    """An attack whose options depend on the task, such as its learning rate."""
 
     def settings(self, sample: Any) -> Any:
-        """Dataclass of the options that are used for the task that the sample is of; noted in `attack.json`."""
+        """Dataclass of the options that are used for the task of the sample; written to `attack.json`."""
         ...
 
 
 @runtime_checkable
 class WithInputFiles(Protocol):
-    """An attack whose options name files: patches that were made from other files are other patches."""
+    """An attack whose options name files. Their content is part of what identifies its patches."""
 
     def read_sha256(self) -> str | None:
-        """Hash of the content of these files; None where the options name none."""
+        """Hash of the content of these files; None if the options name no file."""
         ...

@@ -33,7 +33,7 @@ class DefenseResult:
 
 
 class Defense(Protocol):
-    """Guards a model. A defense holds no state between calls; what it learns is what `fit` returns."""
+    """Guards a model. A defense object holds no state between calls: what it learns is returned by `fit`."""
 
     def fit(
         self,
@@ -46,7 +46,7 @@ class Defense(Protocol):
 
         Args:
             clean: samples without a patch, (H, W, 3) uint8 pictures by camera name.
-            patched: the same scenes with a patch; empty where the user gave none.
+            patched: the same scenes with a patch; empty if the user gave none.
             model: the guarded model; None where the spec needs none.
             rng: of all random choices.
 
@@ -69,30 +69,30 @@ class Defense(Protocol):
         ...
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The cleaning in torch, for attacks that take the defense into account.
+        """The cleaning as torch operations, for attacks that take the defense into account.
 
         Takes and returns (B, 3, H, W) float pictures in 0..1 by camera name. Values are those of `apply` up to
-        rounding. The gradient is exact where the spec declares `differentiable`, a declared substitute where it
+        rounding. The gradient is exact if the spec declares `differentiable`, and that of a substitute function if it
         declares `surrogate`.
 
         Raises:
-            ValueError: the spec declares `none`, or the defense is `Taught`.
+            ValueError: the spec declares `none`, or the defense is a `FittedDefense`.
         """
         ...
 
     def wrap(self, model: Model) -> Model:
-        """A model that runs the given one inside, for defenses of several passes; other defenses return the model
+        """A model that contains the given one, for defenses that need several passes; other defenses return the model
         itself.
         """
         ...
 
 
 @runtime_checkable
-class Taught(Protocol):
-    """A defense whose cleaning in torch depends on the model, or on what `fit` learnt."""
+class FittedDefense(Protocol):
+    """A defense whose cleaning in torch depends on the model, or on the state that `fit` returned."""
 
-    def forward_taught(self, views: Mapping[str, Tensor], model: Model, state: Any) -> Mapping[str, Tensor]:
-        """As `Defense.forward`; attacks call this method of a `Taught` defense in its place.
+    def forward_fitted(self, views: Mapping[str, Tensor], model: Model, state: Any) -> Mapping[str, Tensor]:
+        """The counterpart of `Defense.forward`; attacks call this method instead.
 
         Args:
             views: (B, 3, H, W) float pictures in 0..1 by camera name.
@@ -104,12 +104,13 @@ class Taught(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class DefendedBatch:
-    """What a defense makes of a batch, with gradients to the pictures.
+    """The result of a defense for a batch, with gradients with respect to the pictures.
 
     Attributes:
         views: (B, 3, H, W) cleaned pictures in 0..1 by camera name.
-        masks: (B, H, W) where the patch is believed to be, in 0..1 by camera name, before any rounding; None for none.
-        scores: (B,) how sure the defense is of an attack, in 0..1; None for none.
+        masks: (B, H, W) probabilities in 0..1 that a pixel belongs to a patch, not rounded, by camera name; None
+            without a mask.
+        scores: (B,) confidences in 0..1 that a sample is attacked; None without a score.
     """
 
     views: Mapping[str, Tensor]
@@ -118,18 +119,18 @@ class DefendedBatch:
 
 
 @runtime_checkable
-class Detecting(Protocol):
-    """A defense whose score or mask an adaptive attack can lower.
+class DifferentiableDetector(Protocol):
+    """A defense whose score or mask has a gradient, so that an adaptive attack can lower it.
 
-    A defense that only scores must have this: nothing else of it has a gradient for an attack.
+    A defense that returns only a score must implement this, because otherwise it has no gradient for an attack.
     """
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Any) -> DefendedBatch:
-        """Pictures, masks and scores of a batch; attacks call neither `forward` nor `forward_taught` beside it.
+        """Cleaned pictures, masks and scores of a batch. Attacks call it instead of `forward` and `forward_fitted`.
 
         Args:
             views: (B, 3, H, W) float pictures in 0..1 by camera name.
-            model: that is guarded; its parameters may need no gradient.
+            model: the guarded model; its parameters may need no gradient.
             state: what `fit` returned for this model.
         """
         ...
@@ -137,11 +138,11 @@ class Detecting(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitReport:
-    """What a defense learnt, measured on its own calibration data.
+    """A summary of what a defense learnt, measured on its own calibration data.
 
     Attributes:
-        values: numbers by name, such as the loss of what was learnt and that of the constant answer.
-        problems: one line for each reason not to trust what was learnt; shown as loudly as an error.
+        values: numbers by name, such as the loss of the fitted function and that of the best constant.
+        problems: one line for each reason not to trust the fit; shown as prominently as an error.
     """
 
     values: Mapping[str, float]
@@ -149,9 +150,9 @@ class FitReport:
 
 
 @runtime_checkable
-class Reporting(Protocol):
-    """What `fit` returns, if it says what was learnt."""
+class ReportsFit(Protocol):
+    """A state, returned by `fit`, that can summarise what was learnt."""
 
     def fit_report(self) -> FitReport:
-        """How well the defense knows its own calibration data."""
+        """The summary, measured on the calibration data."""
         ...

@@ -1,6 +1,6 @@
-"""Optional protocols of tasks and evaluators: kept predictions, masked ground truth, reports, quick intervals.
+"""Optional protocols of tasks and evaluators: stored predictions, masked ground truth, further reports, fast intervals.
 
-`isinstance` with these runtime-checkable protocols decides what a task or an evaluator can do.
+What a task or an evaluator offers is decided by `isinstance` with these runtime-checkable protocols.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Spread = Mapping[str, npt.NDArray[np.float64]]
 class KeepsPredictions(Protocol):
     """A task whose predictions are stored as files, in the result layout of its format.
 
-    An evaluation of another task stores metrics alone, and one that was interrupted predicts every sample again.
+    For a task without this protocol only metrics are stored, and an interrupted evaluation predicts every sample again.
     """
 
     def encode_prediction(self, sample: Any, prediction: Any, info: SplitInfo) -> Encoded:
@@ -66,10 +66,10 @@ class Maskable(Protocol):
 
 @runtime_checkable
 class Reports(Protocol):
-    """A task that has further metrics in addition to its evaluator."""
+    """A task with further evaluators, in addition to its main one."""
 
     def reports(self) -> Mapping[str, Evaluator[Any, Any]]:
-        """Fresh, empty evaluators by name. `reference` holds the metrics that the cards of shipped weights state."""
+        """New, empty evaluators by name. `reference` holds the metrics that the cards of shipped weights state."""
         ...
 
 
@@ -80,9 +80,10 @@ class Resampled(Protocol):
     """
 
     def resampled(self, draws: Draws) -> Spread:
-        """Metrics as if the chosen samples had been gathered; samples are numbered from 0 in the order of `update`.
+        """Metrics by name as if the chosen samples alone had been gathered. Samples are numbered from 0 in the order of
+        the calls of `update`.
 
-        NaN where nothing counts. Metrics that are left out get no interval.
+        NaN where a metric is undefined. Metrics that are missing from the result get no interval.
         """
         ...
 
@@ -102,7 +103,7 @@ class Additive(Protocol):
             totals: sums by name, as `totals` gives them, with an additional first axis of length R.
 
         Returns:
-            (R,) values by metric, equal to those of `result`; NaN where nothing counts.
+            (R,) values by metric, equal to those of `result`; NaN where a metric is undefined.
         """
         ...
 
@@ -121,5 +122,5 @@ class Ranged(Protocol):
     """An evaluator that states the ranges of its metrics; intervals are cut at their ends."""
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """Least and largest possible value of a metric; infinite where there is none."""
+        """Smallest and largest possible value of a metric; infinite where it has no bound."""
         ...

@@ -43,5 +43,5 @@ def gear_defenses() -> Iterable[DefenseSpec[Any]]:
 
 @hookspec
 def gear_metrics() -> Iterable[MetricSpec[Any]]:
-    """Metrics: further ones of tasks that exist, built in or of another package."""
+    """Metrics: further metrics for tasks of gear or of another package."""
     return ()

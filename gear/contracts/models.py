@@ -1,9 +1,9 @@
-"""The model protocol. torch is imported for type checkers alone.
+"""The protocol of models. torch is imported for type checkers only.
 
-Outputs of `forward` without targets have the same names for every network of a task, so that losses and attacks need
-not know networks. Semantic segmentation: `logits` (B, C, H, W) at the picture's size, C = 19 Cityscapes train ids or 34
-label ids. Depth: `depth_m` (B, H, W) in metres at the picture's size. Detectors and stereo networks give the raw
-outputs of their heads by name, batch first; attacks maximise their losses.
+Without targets, `forward` returns outputs whose names are the same for every network of a task, so that losses and
+attacks work with any network. Semantic segmentation: `logits` (B, C, H, W) at the picture's size, C = 19 Cityscapes
+train ids or 34 label ids. Depth: `depth_m` (B, H, W) in metres at the picture's size. Detectors and stereo networks
+return the raw outputs of their heads by name, batch first; attacks maximise their losses.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Model(Protocol):
         ...
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """Modules whose outputs are feature maps, by the names that the spec declares."""
+        """Modules whose outputs are feature maps, by the tap names of the spec."""
         ...
 
 
@@ -54,7 +54,7 @@ class Trainable(Protocol):
     """
 
     def module(self) -> nn.Module:
-        """The network, under the key names that its weights are saved with."""
+        """The network; its state dict has the keys under which the weights are saved."""
         ...
 
 

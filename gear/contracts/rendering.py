@@ -27,13 +27,13 @@ NO_OWN_RGBA = (0.5, 0.5, 0.5, 1.0)
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Stage:
-    """A compiled world with everything in its place.
+    """A compiled world with all objects placed for one sample.
 
     Attributes:
-        model: the render model; never changed by a sample.
-        data: posed; kinematics, lights and cameras are up to date.
+        model: the render model; the same for all samples.
+        data: poses of the sample; kinematics, lights and cameras are up to date.
         paint_rgb: linear albedo (0..1) by geom id, for geoms whose colour this sample chose.
-        faces: sRGB albedo, (H, W, 3) uint8, by geom id of the surface's face; all of the world's one face size.
+        faces: sRGB albedo, (H, W, 3) uint8, by geom id of the surface's face; all of the same size.
     """
 
     model: mujoco.MjModel
@@ -44,7 +44,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RendererInfo:
-    """Renderer, graphics driver and device, as every manifest notes them.
+    """Renderer, graphics driver and device, as written to every manifest.
 
     Attributes:
         name: `raster`, `filament` or `classic`.
@@ -84,7 +84,7 @@ def has_own_colour(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
 
 
 class Renderer(Protocol):
-    """One renderer of one compiled model. A frame depends on stage and camera alone, never on earlier frames."""
+    """A renderer of one compiled model. A frame depends only on stage and camera, never on earlier frames."""
 
     @property
     def info(self) -> RendererInfo:
@@ -99,12 +99,12 @@ class Renderer(Protocol):
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """One raw view for each camera, in order, all of the same moment.
+        """Renders one raw view for each camera, in order.
 
         Args:
             stage: the posed model.
             cameras: resolved cameras of the scene.
-            colour: whether `linear_rgb` is rendered.
+            colour: whether `linear_rgb` is rendered as well.
             shapes: views of these cameras of a stage that differs in paint and faces alone; their depth and ids are
                 reused, which saves two passes.
         """

@@ -18,7 +18,7 @@ PROTOCOL_VERSION = 1
 """Increased when a protocol changes so that older plugins no longer fit."""
 
 Gradient = Literal["differentiable", "surrogate", "none"]
-"""How gradients pass a defense: exactly, through a declared substitute, or not at all."""
+"""How gradients pass a defense: exactly, through a substitute function, or not at all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,7 @@ class Spec(Generic[ConfigT, ProductT]):
 
 
 def no_notes(_options: Any) -> tuple[str, ...]:
-    """Of a task that has nothing to point out."""
+    """The notes of a task whose options never need one: none."""
     return ()
 
 
@@ -53,8 +53,8 @@ class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
         views: camera names of the default rig, the reference camera first.
         layout: one line on the files that it writes.
         original_name: name in CARLA-GeAR's configuration files and JSON; "" where CARLA-GeAR does not have the task.
-        metric: the evaluator's metric by which training chooses among checkpoints, or one of a report's as
-            `<report>.<metric>`; "" chooses by the loss.
+        metric: the metric by which training chooses among checkpoints, of the evaluator or of a report
+            (`<report>.<metric>`); "" chooses by the loss.
         less_is_better: whether that metric is an error.
     """
 
@@ -129,7 +129,7 @@ class DefenseSpec(Spec[ConfigT, Defense]):
 
     Attributes:
         tasks: names of the tasks that it can guard; empty for any.
-        outputs: what it returns: cleaned `images`, a `mask` of the patch, a `score` of being attacked.
+        outputs: what it returns: cleaned `images`, a `mask` of the patch, a `score` that the sample is attacked.
         gradient: how gradients pass it.
         taps: names of the model's feature maps that it needs.
         needs_calibration: whether `fit` must be called before `apply`.
@@ -146,13 +146,13 @@ class DefenseSpec(Spec[ConfigT, Defense]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetricSpec(Spec[ConfigT, Evaluator[Any, Any]]):
-    """A further metric of tasks that exist, for `gear evaluate --report NAME`.
+    """A further metric for existing tasks, shown by `gear evaluate --report NAME`.
 
-    `build` returns a fresh, empty evaluator at every call. Its `update` is given the task's samples and predictions.
+    `build` returns a new, empty evaluator at every call. Its `update` is given the task's samples and predictions.
 
     Attributes:
         tasks: names of the tasks whose samples and predictions it understands; at least one.
-        metric: the one of the evaluator's metrics that tells better from worse.
+        metric: name of the evaluator's main metric, by which predictions are compared.
         unit: of its metrics, such as `m` or `px`; "" for shares and counts.
         less_is_better: whether the main metric is an error.
     """

@@ -1,4 +1,4 @@
-"""The task protocol: a task places cameras, measures ground truth, writes and reads files, and brings a metric."""
+"""The protocol of tasks: a task places cameras, measures ground truth, writes and reads files, and has a metric."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sample:
-    """What the samples of every task have; a task adds fields of its own in a subclass.
+    """The fields that samples of every task have; a task adds its own fields in a subclass.
 
     Attributes:
         record: the complete scene.
@@ -47,8 +47,8 @@ class SplitInfo:
         town, scene, split: names.
         seed: of the split.
         patch_label: `none`, `random`, or name and hash of the patch.
-        created: ISO date that the dataset's format text states; the configuration fixes it, so that the same
-            configuration gives the same bytes.
+        created: ISO date for formats that state one; it is part of the configuration, so that the same configuration
+            gives the same bytes.
     """
 
     town: str
@@ -65,7 +65,7 @@ class Encoded:
 
     Attributes:
         files: bytes by path relative to the dataset's root, with `/` between folders.
-        facts: JSON that `decode` and `finalise` need later, so that nothing is computed twice; stored in the sidecar.
+        facts: JSON data that `decode` and `finalise` need; stored in the sidecar.
     """
 
     files: Mapping[str, bytes]
@@ -74,7 +74,7 @@ class Encoded:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Auxiliary:
-    """A file that a sample owns in addition to those of its task, such as a probe.
+    """A file of a sample in addition to those of its task, such as a probe.
 
     Attributes:
         path: relative to the dataset's root; the file's hash is among `files` of the sidecar.
@@ -105,22 +105,22 @@ class Sidecar:
 
 
 class Evaluator(Protocol[SampleT_contra, PredictionT_contra]):
-    """A metric over a dataset that gathers samples one by one."""
+    """A metric over a dataset; samples are added one by one."""
 
     def update(self, sample: SampleT_contra, prediction: PredictionT_contra) -> Mapping[str, float]:
-        """Takes one sample in.
+        """Adds one sample.
 
         Returns:
-            Metrics of this sample alone, by name; empty where a single sample has none.
+            Metrics of this sample alone, by name; empty if the metric is not defined for a single sample.
         """
         ...
 
     def merge(self, other: Any) -> None:
-        """Takes in what another evaluator of the same class has gathered."""
+        """Adds the samples that another evaluator of the same class has gathered."""
         ...
 
     def result(self) -> Mapping[str, float]:
-        """The metrics over all gathered samples, by name; NaN where nothing counts."""
+        """The metrics over all gathered samples, by name; NaN where a metric is undefined."""
         ...
 
 
@@ -171,7 +171,7 @@ class Task(Protocol[SampleT, PredictionT]):
         ...
 
     def evaluator(self) -> Evaluator[SampleT, PredictionT]:
-        """A fresh, empty evaluator of the task's metric."""
+        """A new, empty evaluator of the task's metric."""
         ...
 
     def preview(self, sample: SampleT) -> Mapping[str, UInt8Image]:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.formats.cityscapes import INSTANCE_FACTOR, LABELS
-from gear.formats.runs import Runs
+from gear.formats.pixel_runs import Runs
 from gear.values.serial import Json
 
 MIN_PIECE_PX = 4

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from gear.formats.byte_runs import compress
+from gear.formats.deflate_runs import compress
+from gear.formats.pixel_runs import STRIP_ROWS, Ints
 from gear.formats.png import encode_labels
 from gear.formats.png_rows import whole
-from gear.formats.runs import STRIP_ROWS, Ints
 from gear.values.frames import UInt8Image
 
 Labels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gear.groundtruth.raster import NEAR_M
+from gear.groundtruth.silhouettes import NEAR_M
 from gear.values.frames import SceneObject
 from gear.values.geometry import Array, Intrinsics, frozen, wrap_angle_rad
 from gear.values.scene import CameraRecord, Vec3

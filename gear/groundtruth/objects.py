@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from gear.groundtruth.bent import Bend
-from gear.groundtruth.raster import Window, bounds, count, fill, project_mesh
-from gear.groundtruth.visible import PartKey, VisiblePart, visible_parts
+from gear.groundtruth.lens_warp import LensWarp
+from gear.groundtruth.silhouettes import Window, bounds, count, fill, project_mesh
+from gear.groundtruth.visible_parts import PartKey, VisiblePart, visible_parts
 from gear.values.frames import GeomTable, SceneObject, View
 from gear.values.geometry import Array
 from gear.values.ground_truth import BoxPx, ObjectTruth
@@ -55,14 +55,14 @@ def observe_objects(
                 for code in codes:
                     wanted.setdefault((thing.id, int(code)), EMPTY)
     vertices: dict[int, Array] = {}
-    bend = Bend.of(view.camera)
+    warp = LensWarp.of(view.camera)
     truths = []
     for (object_id, code), part in sorted(wanted.items(), key=lambda item: item[0]):
         thing = objects[object_id]
         if object_id not in vertices:
             vertices[object_id] = in_camera(thing, view.camera)
         faces = thing.shape.faces[thing.shape.face_label_code == code] if by_label else thing.shape.faces
-        truth = _measure(object_id, code, part, vertices[object_id], faces, view.camera, bend)
+        truth = _measure(object_id, code, part, vertices[object_id], faces, view.camera, warp)
         if part.count_px or truth.amodal_in_image_px:
             truths.append(truth)
     return tuple(truths)
@@ -81,7 +81,7 @@ def _measure(
     vertices_camera_m: Array,
     faces: npt.NDArray[np.int32],
     camera: CameraRecord,
-    bend: Bend | None,
+    warp: LensWarp | None,
 ) -> ObjectTruth:
     triangles_px = project_mesh(vertices_camera_m, faces, camera.intrinsics)
     whole = bounds(triangles_px)
@@ -91,14 +91,14 @@ def _measure(
     if part.count_px:
         left, top = part.left_px, part.top_px
         visible_box = (float(left), float(top), float(left + columns), float(top + rows))
-    if bend is None:
+    if warp is None:
         inside = _common(_cover(whole, visible_box), picture)
         mask = fill(triangles_px, inside)
     else:
         seen = _common(whole, picture)
-        inside = _cover(bend.window(seen), visible_box)
-        mask = bend.mask(fill(triangles_px, seen), seen, inside)
-        triangles_px = bend.points(triangles_px)
+        inside = _cover(warp.window(seen), visible_box)
+        mask = warp.mask(fill(triangles_px, seen), seen, inside)
+        triangles_px = warp.points(triangles_px)
         whole = bounds(triangles_px)
         if mask.any():
             # A curved edge may bulge beyond its ends.

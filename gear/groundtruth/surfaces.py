@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from gear.formats import rle
-from gear.groundtruth.bent import Bend
-from gear.groundtruth.raster import NEAR_M
+from gear.groundtruth.lens_warp import LensWarp
+from gear.groundtruth.silhouettes import NEAR_M
 from gear.values.frames import GeomTable, View
 from gear.values.geometry import Array
 from gear.values.ground_truth import SurfaceTruth
@@ -76,12 +76,12 @@ def _area_px2(corners_m: Array, view: View) -> float:
             polygon.append(a + (NEAR_M - a[2]) / (b[2] - a[2]) * (b - a))
     if len(polygon) < 3:
         return 0.0
-    bend = Bend.of(view.camera)
-    if bend is None:
+    warp = LensWarp.of(view.camera)
+    if warp is None:
         x, y = view.camera.intrinsics.project(np.array(polygon)).T
     else:
         # Behind a lens edges are curves.
         steps = np.linspace(0, 1, CURVE_STEPS, endpoint=False)[:, None]
         curve = [a + steps * (b - a) for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True)]
-        x, y = bend.points(view.camera.intrinsics.project(np.concatenate(curve))).T
+        x, y = warp.points(view.camera.intrinsics.project(np.concatenate(curve))).T
     return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2

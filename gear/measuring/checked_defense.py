@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gear.contracts.defenses import Defense, DefenseResult, FitReport, Reporting
+from gear.contracts.defenses import Defense, DefenseResult, FitReport, ReportsFit
 from gear.contracts.models import Model
 from gear.plugins.build import blamed
 from gear.plugins.catalogue import PluginEntry
@@ -46,7 +46,7 @@ class CheckedDefense:
     def fit_report(self) -> FitReport | None:
         """What the defense learnt, if it has learnt and says so; None otherwise. Starts no calibration."""
         state = self.__dict__.get("state")
-        return state.fit_report() if isinstance(state, Reporting) else None
+        return state.fit_report() if isinstance(state, ReportsFit) else None
 
     def apply(self, views: Mapping[str, UInt8Image], rng: np.random.Generator, index: int) -> DefenseResult:
         """Cleans one sample.

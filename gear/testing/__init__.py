@@ -1,1 +1,1 @@
-"""Testing: contracts and fixtures for plugin authors. Public API; needs pytest for the contracts alone."""
+"""Tests for authors of plugins: contract classes to subclass, and fixtures. Public API; the contracts need pytest."""

@@ -1,4 +1,4 @@
-"""What every attack promises. Subclass in your plugin's tests and set `spec`:
+"""The contract of attacks, as tests. Subclass it in your plugin's tests and set `spec`:
 
 class TestMyAttack(AttackContract):
     spec = my_attack
@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gear.contracts.attacks import Attack, Budget, Patch, State, Watch
+from gear.contracts.attacks import Attack, Budget, Monitor, Patch, State
 from gear.contracts.specs import AttackSpec, ModelSpec, TaskSpec
 from gear.plugins.manager import catalogue
 from gear.testing.compare import difference, freeze
@@ -54,16 +54,16 @@ class Counted:
         return taps
 
 
-class Watching:
-    """A `Watch` that records the values of every step, and can start from a saved state."""
+class RecordingMonitor:
+    """A `Monitor` that records the values of every step, and can start from a saved state."""
 
     def __init__(self, start: State | None = None) -> None:
         self.start = start
-        self.told: list[int] = []
+        self.steps_done: list[int] = []
         self.states: list[State] = []
 
     def resume(self) -> State | None:
-        """The state that it was made with."""
+        """The saved state that it was created with; None for a new run."""
         return self.start
 
     def step(
@@ -74,7 +74,7 @@ class Watching:
         state: Callable[[], State],
     ) -> bool:
         """Records its arguments; never asks the attack to stop."""
-        self.told.append(done)
+        self.steps_done.append(done)
         self.states.append(state())
         assert all(isinstance(value, float) for value in values.values())
         assert all(isinstance(patch, Patch) for patch in patches())
@@ -82,13 +82,15 @@ class Watching:
 
 
 class AttackContract:
-    """Attributes:
-    spec: the attack.
-    options: of its config, small enough for quick tests.
-    task: one that it can attack, of which gear has a tiny network: `semseg` or `depth`.
-    task_options: of the task's config: the pictures' size.
-    steps: enough for the attack to do some harm.
-    passes_per_step: how many forward passes a step may take.
+    """The promises of an attack, as tests. A plugin's test file subclasses it and sets `spec`.
+
+    Attributes:
+        spec: the attack.
+        options: options of the attack's config, small enough for quick tests.
+        task: a task that it can attack and for which gear has a tiny network: `semseg` or `depth`.
+        task_options: options of the task's config, such as the size of the pictures.
+        steps: number of steps after which the attack does measurable harm.
+        passes_per_step: largest number of forward passes per step.
     """
 
     spec: ClassVar[AttackSpec[Any]]
@@ -99,7 +101,7 @@ class AttackContract:
     passes_per_step: ClassVar[int] = 4
 
     def make(self) -> Attack:
-        """A fresh attack."""
+        """A new attack."""
         return self.spec.build(self.spec.config(**self.options))
 
     def model(self) -> Counted:
@@ -107,7 +109,7 @@ class AttackContract:
         return Counted(TINY[self.task].build(TinyConfig()))
 
     def dataset(self, boards: int = 1) -> list[Any]:
-        """Two samples with a number of boards."""
+        """Two samples with the given number of boards."""
         found = catalogue().get("task", self.task).spec
         assert isinstance(found, TaskSpec)
         task = found.build(found.config(**self.task_options))
@@ -118,7 +120,7 @@ class AttackContract:
         return [freeze(task.ground_truth(*frame)) for frame in frames]
 
     def budget(self, steps: int) -> Budget:
-        """A number of steps; for attacks without gradients, with as many queries as they may use."""
+        """A budget with a number of steps; attacks without gradients get a number of queries as well."""
         return Budget(steps=steps, queries=None if self.spec.needs_gradients else steps * self.passes_per_step)
 
     def attack(
@@ -128,12 +130,12 @@ class AttackContract:
         *,
         steps: int = 2,
         seed: int = SEED,
-        watch: Watch | None = None,
+        monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """A fresh attack, run once."""
+        """Runs a new attack once."""
         compositor = TinyCompositor(dataset)
         rng = derive_rng(seed, "attack")
-        return self.make().optimise(model, dataset, compositor, budget=self.budget(steps), rng=rng, watch=watch)
+        return self.make().optimise(model, dataset, compositor, budget=self.budget(steps), rng=rng, monitor=monitor)
 
     def harm(self, model: Counted, dataset: Sequence[Any], patches: Sequence[Patch]) -> float:
         """What the attack maximises; override for attacks with another objective than the loss."""
@@ -150,7 +152,7 @@ class AttackContract:
         assert self.spec.max_surfaces >= 1
 
     def test_patches_are_pictures(self) -> None:
-        """One a surface, `patch_0`, `patch_1`…; (H, W, 3) float32 in 0..1."""
+        """There is one patch per surface, named `patch_0`, `patch_1`, …; each is (H, W, 3) float32 in 0..1."""
         for boards in range(1, min(2, self.spec.max_surfaces) + 1):
             patches = self.attack(self.model(), self.dataset(boards))
             assert isinstance(patches, tuple)
@@ -161,31 +163,35 @@ class AttackContract:
                 assert 0 <= float(patch.rgb.min()) <= float(patch.rgb.max()) <= 1
 
     def test_the_model_is_left_as_it_was(self) -> None:
-        """Parameters, buffers, gradients, what wants a gradient, and every module's mode."""
+        """Parameters, buffers, gradients, `requires_grad` and the mode of every module are the same after
+        the attack.
+        """
         model = self.model()
         before = state_of(model.network)
         self.attack(model, self.dataset())
         assert changes(before, state_of(model.network)) == []
 
     def test_the_dataset_is_left_as_it_was(self) -> None:
-        """Frozen samples are enough, and stay as they are."""
+        """The attack works on read-only samples and does not change them."""
         dataset = self.dataset()
         self.attack(self.model(), dataset)
         assert not difference(dataset, self.dataset(), "dataset")
 
     def test_it_can_be_watched(self) -> None:
-        """A watch changes nothing; what it is told is in order, and a state that it was given can be resumed from."""
+        """A monitor does not change the patches, receives steps in order, and an attack can be resumed from a reported
+        state.
+        """
         dataset, plain = self.dataset(), self.attack(self.model(), self.dataset(), steps=4)
-        watch = Watching()
-        found = self.attack(self.model(), dataset, steps=4, watch=watch)
+        monitor = RecordingMonitor()
+        found = self.attack(self.model(), dataset, steps=4, monitor=monitor)
         assert not difference(found, plain, "patches")
-        assert watch.told == sorted(set(watch.told))
-        if len(watch.states) > 1 and watch.states[0]:
-            resumed = self.attack(self.model(), dataset, steps=4, watch=Watching(watch.states[0]))
+        assert monitor.steps_done == sorted(set(monitor.steps_done))
+        if len(monitor.states) > 1 and monitor.states[0]:
+            resumed = self.attack(self.model(), dataset, steps=4, monitor=RecordingMonitor(monitor.states[0]))
             assert not difference(resumed, plain, "patches after a resumed run")
 
     def test_the_same_generator_gives_the_same_patch(self) -> None:
-        """All chance comes from `rng`, and running before leaves no trace."""
+        """All random choices come from `rng`, and earlier runs have no effect."""
         first = self.attack(self.model(), self.dataset())
         torch.rand(3)
         second = self.attack(self.model(), self.dataset())
@@ -200,7 +206,7 @@ class AttackContract:
             assert least <= model.passes <= steps * self.passes_per_step * (not self.spec.is_control)
 
     def test_it_does_harm(self) -> None:
-        """More than a grey board of the same size does; nothing is asked of a control."""
+        """The patch does more harm than a grey board of the same size; controls are exempt."""
         if self.spec.is_control:
             return
         model, dataset = self.model(), self.dataset()

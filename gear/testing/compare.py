@@ -10,8 +10,8 @@ import numpy as np
 
 
 def difference(a: Any, b: Any, where: str = "value") -> str:
-    """The first difference of two values, "" if they are equal: arrays in shape, dtype and all elements, NaN equal to
-    NaN.
+    """Describes the first difference of two values; "" if they are equal. Arrays are equal in shape, dtype and all
+    elements, where NaN equals NaN.
     """
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return _array_difference(np.asarray(a), np.asarray(b), where)
@@ -32,10 +32,10 @@ def difference(a: Any, b: Any, where: str = "value") -> str:
 
 
 def share_apart(a: Any, b: Any, tolerance: float) -> float:
-    """Share, 0..1, of the numbers that differ by more than `tolerance` times the largest of their array, NaN equal to
+    """Share, 0..1, of the numbers that differ by more than `tolerance` times the largest of their array; NaN equals
     NaN.
 
-    Of containers, the largest share of their items; 1 where shapes, types, names or counts differ.
+    For containers this is the largest share among their items; it is 1 if shapes, types, names or counts differ.
     """
     if dataclasses.is_dataclass(a) and type(a) is type(b):
         names = [field.name for field in dataclasses.fields(a)]

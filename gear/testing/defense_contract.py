@@ -1,4 +1,4 @@
-"""What every defense promises. Subclass in your plugin's tests and set `spec`:
+"""The contract of defenses, as tests. Subclass it in your plugin's tests and set `spec`:
 
 class TestMedian(DefenseContract):
     spec = median
@@ -16,7 +16,7 @@ import pytest
 from gear.config.dump import to_yaml
 from gear.config.nodes import parse_text
 from gear.config.reader import read_node
-from gear.contracts.defenses import Defense, DefenseResult, Taught
+from gear.contracts.defenses import Defense, DefenseResult, FittedDefense
 from gear.contracts.models import Model
 from gear.contracts.specs import DefenseSpec
 from gear.plugins.spec_validation import spec_problem
@@ -41,7 +41,7 @@ def street_picture(width_px: int, height_px: int, seed: int) -> UInt8Image:
 
 
 def noisy_patch(picture: UInt8Image, seed: int) -> tuple[UInt8Image, np.ndarray]:
-    """The picture with a rectangle of loud noise, and where it is: (H, W) bool."""
+    """The picture with a rectangle of strong noise, and (H, W) bool of that rectangle."""
     height, width = picture.shape[:2]
     area = np.zeros((height, width), np.bool_)
     area[height // 4 : height // 2, width // 3 : width * 3 // 4] = True
@@ -50,11 +50,13 @@ def noisy_patch(picture: UInt8Image, seed: int) -> tuple[UInt8Image, np.ndarray]
 
 
 class DefenseContract:
-    """Attributes:
-    spec: the defense.
-    options: of its config.
-    views: cameras that it is shown.
-    size_px: width and height of the pictures.
+    """The promises of a defense, as tests. A plugin's test file subclasses it and sets `spec`.
+
+    Attributes:
+        spec: the defense.
+        options: options of the defense's config.
+        views: names of the cameras whose pictures it is given.
+        size_px: width and height of the pictures.
     """
 
     spec: ClassVar[DefenseSpec[Any]]
@@ -67,7 +69,7 @@ class DefenseContract:
         return None
 
     def make(self) -> Defense:
-        """A fresh defense."""
+        """A new defense."""
         return self.spec.build(self.spec.config(**self.options))
 
     def pictures(self, seed: int = 0, *, is_patched: bool = True) -> dict[str, UInt8Image]:
@@ -82,7 +84,7 @@ class DefenseContract:
         return defense.fit(clean, patched, self.model(), derive_rng(SEED, "fit"))
 
     def result(self, pictures: Mapping[str, UInt8Image], seed: int = SEED) -> DefenseResult:
-        """A fresh defense, fitted and applied."""
+        """The result of a new defense, fitted and applied."""
         defense = self.make()
         return defense.apply(pictures, self.model(), self.state(defense), derive_rng(seed, "apply"))
 
@@ -107,7 +109,7 @@ class DefenseContract:
             assert picture.dtype == np.uint8
 
     def test_it_leaves_its_input_alone(self) -> None:
-        """Read-only input is enough, and what comes back is no view of it."""
+        """The defense works on read-only pictures, and its result shares no memory with them."""
         pictures = self.pictures()
         for picture in pictures.values():
             picture.setflags(write=False)
@@ -116,7 +118,7 @@ class DefenseContract:
             assert picture is pictures[name] or not np.shares_memory(picture, pictures[name])
 
     def test_the_same_generator_gives_the_same_result(self) -> None:
-        """All chance comes from `rng`."""
+        """All random choices come from `rng`."""
         first, second = self.result(self.pictures()), self.result(self.pictures())
         for name in self.views:
             assert np.array_equal(first.views[name], second.views[name])
@@ -125,7 +127,9 @@ class DefenseContract:
         assert first.score == second.score
 
     def test_outputs_are_what_the_spec_declares(self) -> None:
-        """Masks and scores are there if declared, and only then; both lie in 0..1, and every view has a mask."""
+        """Masks and scores are returned if and only if they are declared; both are in 0..1, and every view
+        has a mask.
+        """
         result = self.result(self.pictures())
         assert (result.mask is not None) == ("mask" in self.spec.outputs)
         assert (result.score is not None) == ("score" in self.spec.outputs)
@@ -137,7 +141,7 @@ class DefenseContract:
         assert result.score is None or (isinstance(result.score, (int, float)) and 0 <= result.score <= 1)
 
     def test_samples_do_not_touch_each_other(self) -> None:
-        """Nothing is kept between calls but the state."""
+        """The result for a sample does not depend on samples that were processed earlier."""
         defense = self.make()
         state = self.state(defense)
         alone = defense.apply(self.pictures(1), self.model(), state, derive_rng(SEED, "apply"))
@@ -150,7 +154,7 @@ class DefenseContract:
         assert alone.score == again.score
 
     def test_a_wrapped_model_is_a_model(self) -> None:
-        """`wrap` gives back the model or one around it."""
+        """`wrap` returns the model itself or a model that contains it."""
         pytest.importorskip("torch", reason="models need torch")
         from gear.testing.tiny_networks import TinyConfig, TinySegmenter
 
@@ -158,7 +162,9 @@ class DefenseContract:
         assert all(callable(getattr(wrapped, name, None)) for name in ("predict", "forward", "taps"))
 
     def test_gradients_pass_as_declared(self) -> None:
-        """`forward` has the values of `apply`, works alike for one and for many, and lets a gradient through."""
+        """`forward` agrees with `apply`, gives the same for single pictures and batches, and passes a gradient if
+        declared.
+        """
         torch = pytest.importorskip("torch", reason="gradients need torch")
         defense = self.make()
         pictures = [self.pictures(i) for i in range(2)]
@@ -177,8 +183,8 @@ class DefenseContract:
 
         def forward(views: dict[str, Any]) -> Any:
             model = self.model()
-            if isinstance(defense, Taught) and model is not None:
-                return defense.forward_taught(views, model, state)
+            if isinstance(defense, FittedDefense) and model is not None:
+                return defense.forward_fitted(views, model, state)
             return defense.forward(views)
 
         both, one = batch(pictures), forward(batch(pictures[:1]))

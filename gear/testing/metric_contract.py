@@ -4,8 +4,8 @@
         spec = my_metric
         task_options = {"width_px": 256, "height_px": 128}
 
-Frames come from `gear.testing.synthetic`, so no renderer is needed. For tasks other than gear's own, say with `spoil`
-how a prediction gets worse.
+Frames come from `gear.testing.synthetic`, so no renderer is needed. For tasks other than gear's own, override `spoil`,
+which makes a prediction worse.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class MetricContract:
         raise NotImplementedError(f"override spoil: say how a prediction of task {task!r} gets worse")
 
     def make(self) -> Evaluator[Any, Any]:
-        """A fresh, empty evaluator of the metric."""
+        """A new, empty evaluator of the metric."""
         return self.spec.build(self.spec.config(**self.options))
 
     def task(self, name: str) -> Task[Any, Any]:
@@ -66,7 +66,7 @@ class MetricContract:
         return found.build(found.config(**self.task_options))
 
     def pairs(self, task: str, *, spoilt: bool = False) -> list[tuple[Any, Any]]:
-        """Samples of synthetic streets with their perfect predictions, or with spoilt ones; read-only arrays."""
+        """Samples of synthetic streets with perfect or with spoilt predictions; all arrays are read-only."""
         builder, found = self.task(task), []
         for index in range(SAMPLES):
             sample = builder.ground_truth(*synthetic_frame(builder.rig(), index=index, seed=5))
@@ -81,7 +81,7 @@ class MetricContract:
         assert all(task in known for task in self.spec.tasks), f"its tasks must be among {', '.join(known)}"
 
     def test_every_evaluator_is_a_fresh_one(self) -> None:
-        """`build` returns a new evaluator each time; what one gathers leaves no trace in another."""
+        """`build` returns a new evaluator each time; evaluators do not share gathered samples."""
         for task in self.spec.tasks:
             empty = dict(self.make().result())
             self.gathered(self.pairs(task))
@@ -99,18 +99,18 @@ class MetricContract:
             assert not any(math.isinf(value) for value in result.values())
 
     def test_an_empty_evaluator_gives_nan(self) -> None:
-        """Where nothing was gathered there is no value, and no error."""
+        """Without samples every metric is NaN, and no error is raised."""
         assert all(math.isnan(value) for value in check_metrics(self.make().result(), "result").values())
 
     def test_a_spoilt_prediction_is_worse(self) -> None:
-        """The main metric tells better from worse, in the direction that the spec declares."""
+        """The main metric is worse for a spoilt prediction, in the direction that the spec declares."""
         for task in self.spec.tasks:
             good, bad = (self.gathered(self.pairs(task, spoilt=spoilt)).result() for spoilt in (False, True))
             better, worse = good[self.spec.metric], bad[self.spec.metric]
             assert worse > better if self.spec.less_is_better else worse < better, (task, better, worse)
 
     def test_merged_evaluators_equal_the_whole(self) -> None:
-        """Evaluators of one sample each, merged, give what one evaluator of all samples gives."""
+        """Merged evaluators of one sample each give the same metrics as one evaluator of all samples."""
         for task in self.spec.tasks:
             pairs = self.pairs(task, spoilt=True)
             whole, merged = self.gathered(pairs), self.make()
@@ -152,7 +152,7 @@ class MetricContract:
                 _assert_close({name: float(values[number]) for name, values in found.items()}, expected)
 
     def test_masked_ground_truth_is_taken(self) -> None:
-        """A sample whose ground truth is silent everywhere, as `outside_patch` makes them, raises nothing."""
+        """A sample whose whole ground truth is masked, as the report `outside_patch` may produce, raises no error."""
         for task in self.spec.tasks:
             builder = self.task(task)
             if not isinstance(builder, Maskable):
@@ -162,7 +162,7 @@ class MetricContract:
             check_metrics(self.gathered([(builder.without(sample, masks), prediction)]).result(), "result")
 
     def gathered(self, pairs: Sequence[tuple[Any, Any]]) -> Any:
-        """An evaluator that has seen these samples with these predictions."""
+        """An evaluator to which these pairs of sample and prediction were added."""
         evaluator = self.make()
         for sample, prediction in pairs:
             evaluator.update(sample, prediction)

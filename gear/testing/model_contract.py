@@ -1,4 +1,4 @@
-"""What every model promises. Subclass in your plugin's tests and set `spec`:
+"""The contract of models, as tests. Subclass it in your plugin's tests and set `spec`:
 
 class TestMyNet(ModelContract):
     spec = my_net
@@ -43,11 +43,11 @@ class ModelContract:
     tolerance: ClassVar[float] = 1e-4
 
     def make(self) -> Model:
-        """A fresh model; override where the options depend on the test."""
+        """A new model; override if the options depend on the test."""
         return self.spec.build(self.spec.config(**self.options))
 
     def samples(self, task: str) -> list[Any]:
-        """Two samples of a synthetic street, as the task sees it."""
+        """Two samples of a synthetic street with the task's ground truth."""
         found = catalogue().get("task", task).spec
         assert isinstance(found, TaskSpec)
         builder = found.build(found.config(**self.task_options))
@@ -63,22 +63,22 @@ class ModelContract:
         return {name: tensor.requires_grad_(self.spec.has_gradients) for name, tensor in tensors.items()}
 
     def test_the_spec_can_be_used(self) -> None:
-        """Name, protocol, config and build are sound; it says what it can do and what it looks at."""
+        """Name, protocol, config and build are sound; the spec names tasks and views."""
         check_spec("model", self.spec, self.options)
         assert self.spec.tasks and self.spec.views
 
     def test_the_tasks_show_what_it_looks_at(self) -> None:
-        """Its tasks are installed and have its cameras."""
+        """Its tasks are installed, and their rigs have the model's cameras."""
         for task in self.spec.tasks:
             assert set(self.spec.views) <= set(self.samples(task)[0].images)
 
     def test_predict_sees_pictures_alone(self) -> None:
-        """`predict` takes the views and nothing else: no way for ground truth to get in."""
+        """`predict` takes the views and nothing else, so that ground truth cannot reach it."""
         parameters = inspect.signature(self.make().predict).parameters
         assert list(parameters) == ["views"]
 
     def test_predictions_suit_the_evaluators(self) -> None:
-        """Every task's evaluator takes its prediction and gives numbers that are no infinities."""
+        """The evaluator of every task accepts its prediction and gives no infinite metric."""
         model = self.make()
         for name in self.spec.tasks:
             found = catalogue().get("task", name).spec
@@ -88,7 +88,9 @@ class ModelContract:
             assert not any(np.isinf(value) for value in evaluator.result().values())
 
     def test_predict_repeats_and_leaves_everything_alone(self) -> None:
-        """Same pictures, same prediction; neither pictures nor weights change; other samples leave no trace."""
+        """The same pictures give the same prediction, whatever was predicted earlier; pictures and weights do not
+        change.
+        """
         model = self.make()
         one, two = (self.views(sample) for sample in self.samples(self.spec.tasks[0]))
         before = state_of(model)
@@ -114,12 +116,14 @@ class ModelContract:
             assert apart <= swapped, "predictions are not in the samples' order"
 
     def test_two_of_the_same_options_are_alike(self) -> None:
-        """Weights follow from the options, not from chance."""
+        """Two models with the same options have the same weights."""
         pictures = self.views(self.samples(self.spec.tasks[0])[0])
         assert not difference(self.make().predict(pictures), self.make().predict(pictures), "prediction")
 
     def test_forward_takes_batches(self) -> None:
-        """A tensor a name with the batch in front; a picture's outputs do not depend on its neighbours."""
+        """Every output is a tensor whose first axis is the batch; the outputs of a picture do not depend on
+        the others.
+        """
         model, samples = self.make(), self.samples(self.spec.tasks[0])
         with torch.no_grad():
             both, one = model.forward(self.batch(samples)), model.forward(self.batch(samples[:1]))
@@ -131,12 +135,12 @@ class ModelContract:
             assert float((tensor[:1] - one[name]).abs().max()) <= self.tolerance * scale, f"{name} depends on the batch"
 
     def test_forward_looks_at_the_picture(self) -> None:
-        """Different pictures, different outputs."""
+        """Different pictures give different outputs."""
         outputs = self.make().forward(self.batch(self.samples(self.spec.tasks[0])))
         assert any(not torch.equal(tensor[0], tensor[1]) for tensor in outputs.values())
 
     def test_forward_leaves_everything_alone(self) -> None:
-        """Neither weights, buffers and modes nor the samples change, with targets or without."""
+        """With or without targets, `forward` changes neither weights, buffers, modes nor samples."""
         model = self.make()
         before = state_of(model)
         for task in self.spec.tasks:
@@ -147,7 +151,7 @@ class ModelContract:
             assert not difference(samples, self.samples(task), "samples")
 
     def test_losses_are_numbers(self) -> None:
-        """With the batch's samples as targets it gives finite losses without dimensions."""
+        """With the batch's samples as targets `forward` gives finite scalar losses."""
         for task in self.spec.tasks:
             samples = self.samples(task)
             for name, loss in self.make().forward(self.batch(samples), samples).items():
@@ -169,7 +173,7 @@ class ModelContract:
                 assert float(gradient.abs().sum()) > 0, f"no gradient reaches the view {name!r}"
 
     def test_taps_are_there(self) -> None:
-        """The declared feature maps and no others; each runs in `forward` and gives a tensor."""
+        """`taps` has exactly the declared names; each module runs in `forward` and returns a tensor."""
         model = self.make()
         taps = model.taps()
         assert set(taps) == set(self.spec.taps)

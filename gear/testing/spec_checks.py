@@ -16,7 +16,7 @@ def check_spec(kind: Kind, spec: AnySpec, options: Mapping[str, Any]) -> None:
     """Asserts that a spec can be used and that its config, with default and given options, survives YAML.
 
     Raises:
-        AssertionError: it does not.
+        AssertionError: the spec or its config fails a check.
     """
     assert spec_problem(kind, spec) is None, spec_problem(kind, spec)
     assert spec.summary and "\n" not in spec.summary, "the summary is one line"

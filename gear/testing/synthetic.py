@@ -69,7 +69,7 @@ def synthetic_frame(
 
 
 def behind_lens(frame: Frame, lens: Lens) -> Frame:
-    """A frame of pinholes as cameras with a lens show it. The cameras of the result hold the lens.
+    """Distorts a frame of pinhole cameras by a lens. The cameras of the result hold the lens.
 
     Raises:
         ValueError: the distortion folds a picture over.

@@ -1,5 +1,5 @@
-"""What every task promises. Subclass in your plugin's tests, set `spec`, `options` and `headline`, and say how to
-spoil a prediction:
+"""The contract of tasks, as tests. Subclass it in your plugin's tests, set `spec`, `options` and `headline`, and
+override `spoil`:
 
     class TestMyTask(TaskContract):
         spec = my_task
@@ -39,12 +39,14 @@ WORLD_FROM_EGO = RigidTransform.from_yaw("world", "ego", (12.0, -34.0, 0.0), 0.7
 
 
 class TaskContract:
-    """Attributes:
-    spec: the task.
-    options: of its config, small enough for quick tests.
-    headline: name of the metric that tells better from worse.
-    perfect: what the metric is for a perfect prediction.
-    repeats: how often samples are shown to the evaluator before it is read.
+    """The promises of a task, as tests. A plugin's test file subclasses it and sets `spec`.
+
+    Attributes:
+        spec: the task.
+        options: options of the task's config, small enough for quick tests.
+        headline: name of the metric by which predictions are compared.
+        perfect: value of that metric for a perfect prediction.
+        repeats: number of times that samples are added to the evaluator before the metric is read.
     """
 
     spec: ClassVar[TaskSpec[Any]]
@@ -58,7 +60,7 @@ class TaskContract:
         raise NotImplementedError("say how to spoil a prediction of this task")
 
     def task(self) -> Task[Any, Any]:
-        """A fresh task."""
+        """A new task."""
         return self.spec.build(self.spec.config(**self.options))
 
     def frame(self, index: int = 0) -> tuple[Frame, SceneRecord]:
@@ -70,14 +72,14 @@ class TaskContract:
         return self.task().ground_truth(*self.frame(index))
 
     def sidecar(self, sample: Sample, encoded: Encoded) -> Sidecar:
-        """As it comes back from disk: everything has been JSON."""
+        """The sidecar of a sample after a round trip through JSON."""
         text = json.dumps([to_json(sample.record), to_json(sample.surfaces), encoded.facts], allow_nan=False)
         record, surfaces, facts = json.loads(text)
         truths = tuple(from_json(type(old), new) for old, new in zip(sample.surfaces, surfaces, strict=True))
         return Sidecar(record=from_json(SceneRecord, record), surfaces=truths, facts=facts, files={})
 
     def write(self, root: Path, indexes: Sequence[int] = (0, 1)) -> list[Sidecar]:
-        """Writes a small split as the collector would."""
+        """Writes a small split to disk as the collector does."""
         task, sidecars = self.task(), []
         for index in indexes:
             sample = self.sample(index)
@@ -88,7 +90,7 @@ class TaskContract:
         return sidecars
 
     def test_spec_says_what_it_is(self) -> None:
-        """Name, summary, layout and a config with defaults."""
+        """The spec has a name, a summary, a layout and a config with defaults."""
         spec = self.spec
         check_spec("task", spec, self.options)
         assert spec.layout
@@ -101,7 +103,7 @@ class TaskContract:
         assert rig == self.task().rig()
 
     def test_sample_has_images_and_surfaces(self) -> None:
-        """Pictures of every view, as rendered; every surface in every view."""
+        """A sample has the rendered pictures of every view, and every surface in every view."""
         frame, record = self.frame()
         sample = self.task().ground_truth(frame, record)
         assert sample.record == record
@@ -115,7 +117,7 @@ class TaskContract:
         assert [(truth.camera, truth.name) for truth in sample.surfaces] == expected
 
     def test_ground_truth_leaves_the_frame_alone_and_repeats(self) -> None:
-        """Same frame, same sample; frozen input will do."""
+        """The same frame gives the same sample; the frame may be read-only and does not change."""
         frame, record = freeze(self.frame())
         untouched, _ = self.frame()
         first = self.task().ground_truth(frame, record)
@@ -124,7 +126,7 @@ class TaskContract:
         assert not difference(frame.views, untouched.views)
 
     def test_encode_is_pure(self) -> None:
-        """Same sample, same bytes, and the sample is untouched."""
+        """The same sample gives the same bytes; the sample does not change."""
         sample = freeze(self.sample())
         first, second = self.task().encode(sample, INFO), self.task().encode(sample, INFO)
         assert first.files == second.files
@@ -132,12 +134,12 @@ class TaskContract:
         assert not difference(sample, self.sample())
 
     def test_facts_are_json(self) -> None:
-        """Facts survive JSON as they are."""
+        """Facts are unchanged by a round trip through JSON."""
         facts = self.task().encode(self.sample(), INFO).facts
         assert json.loads(json.dumps(facts, allow_nan=False)) == facts
 
     def test_paths_stay_inside_and_apart(self, tmp_path: Path) -> None:
-        """No path leaves the root, none is written twice."""
+        """No path leaves the dataset's root, and no file is written twice."""
         task, sidecars = self.task(), self.write(tmp_path)
         samples = [set(task.encode(self.sample(index), INFO).files) for index in (0, 1)]
         indexes = set(task.finalise(sidecars, INFO))
@@ -154,46 +156,48 @@ class TaskContract:
         assert not set(task.encode(sample, INFO).files) & set(task.encode(sample, other).files)
 
     def test_reading_gives_back_what_was_written(self, tmp_path: Path) -> None:
-        """`decode` is the inverse of `encode`, to the last bit."""
+        """`decode` is the exact inverse of `encode`."""
         for index, sidecar in enumerate(self.write(tmp_path)):
             read = self.task().decode(tmp_path, sidecar, INFO)
             assert not difference(read, self.sample(index))
 
     def test_finalise_repeats_and_needs_no_files(self, tmp_path: Path) -> None:
-        """Index files follow from the sidecars alone."""
+        """Index files depend only on the sidecars."""
         sidecars = freeze(self.write(tmp_path))
         first, second = self.task().finalise(sidecars, INFO), self.task().finalise(sidecars, INFO)
         assert first == second
         assert {name: (tmp_path / name).read_bytes() for name in first} == dict(first)
 
     def test_finalise_takes_an_empty_split(self) -> None:
-        """A split without samples has index files too."""
+        """`finalise` accepts a split without samples."""
         assert all(isinstance(data, bytes) for data in self.task().finalise([], INFO).values())
 
     def test_perfect_prediction_is_perfect(self) -> None:
-        """Ground truth scores perfect against itself."""
+        """Ground truth as the prediction gives the perfect value."""
         result = self.evaluate([0, 1])
         assert math.isclose(result[self.headline], self.perfect, abs_tol=1e-9), result
 
     def test_spoilt_prediction_is_worse(self) -> None:
-        """The headline can tell better from worse."""
+        """The headline metric is worse for a spoilt prediction."""
         result = self.evaluate([0, 1], spoilt=True)
         assert abs(result[self.headline] - self.perfect) > 1e-3, result
 
     def test_merged_evaluators_say_the_same(self) -> None:
-        """Two halves merged are the whole."""
+        """Evaluators of two halves, merged, give the metrics of the whole."""
         whole = self.evaluate([0, 1])
         parts = [self._gather(self.task().evaluator(), [index]) for index in (0, 1)]
         parts[0].merge(parts[1])
         assert not difference(dict(parts[0].result()), dict(whole))
 
     def test_an_empty_evaluator_says_nan(self) -> None:
-        """Nothing gathered, no metric."""
+        """Without samples every metric is NaN."""
         result = self.task().evaluator().result()
         assert all(value != value for value in result.values())
 
     def test_predictions_survive_their_files(self, tmp_path: Path) -> None:
-        """Where predictions are kept, reading gives back what was written, to the last bit, beside no other file."""
+        """If the task stores predictions, reading them gives exactly what was written, and they overwrite no other
+        file.
+        """
         task = self.task()
         if not isinstance(task, KeepsPredictions):
             return
@@ -214,7 +218,7 @@ class TaskContract:
         assert not any(PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts for name in names)
 
     def test_masked_ground_truth_says_nothing(self) -> None:
-        """Where ground truth can be masked, all of it masked leaves nothing to measure, none of it leaves all."""
+        """If ground truth can be masked, a full mask leaves no metric defined, and an empty mask changes nothing."""
         task, sample = self.task(), freeze(self.sample())
         if not isinstance(task, Maskable):
             return
@@ -228,14 +232,14 @@ class TaskContract:
             assert math.isnan(metric) if value else math.isclose(metric, self.perfect, abs_tol=1e-9)
 
     def test_reports_are_evaluators(self) -> None:
-        """Where there are further reports, each takes the same samples and says NaN before."""
+        """Each further report accepts the same samples, and is NaN without samples."""
         task = self.task()
         for name, evaluator in task.reports().items() if isinstance(task, Reports) else ():
             assert all(value != value for value in evaluator.result().values()), name
             assert not any(math.isinf(v) for v in self._gather(evaluator, [0, 1]).result().values()), name
 
     def test_preview_shows_pictures(self) -> None:
-        """At least one picture, in RGB."""
+        """There is at least one preview, in RGB."""
         sample = freeze(self.sample())
         pictures = self.task().preview(sample)
         assert pictures
@@ -243,7 +247,7 @@ class TaskContract:
             assert picture.dtype == np.uint8 and picture.ndim == 3 and picture.shape[2] == 3
 
     def evaluate(self, indexes: Sequence[int], *, spoilt: bool = False) -> Mapping[str, float]:
-        """The metrics of ground truth as a prediction, as it is or spoilt."""
+        """The metrics with ground truth as the prediction, unchanged or spoilt."""
         result: Mapping[str, float] = self._gather(self.task().evaluator(), indexes, spoilt=spoilt).result()
         return result
 

@@ -1,4 +1,4 @@
-"""Objects of synthetic frames: boxes that move together, and a street with several of them."""
+"""Objects of synthetic frames, made of boxes, and a street with several of them."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class Part:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Thing:
-    """Boxes that move together.
+    """An object: boxes that move together.
 
     Attributes:
         parts: its boxes; the first one has the object's main label.
         position_m, yaw_rad: pose of its frame in the world.
-        object_id: as in `GeomTable.object_id`; -1 for what is not an instance.
-        role: of the actor; None for a fixed part of the town.
+        object_id: as in `GeomTable.object_id`; -1 for objects that are no instances.
+        role: role of the actor; None for a fixed part of the town.
         key_points: named points in its frame, metres.
     """
 
@@ -53,7 +53,7 @@ class Thing:
 
 
 def box_part(label: str, length_m: float, width_m: float, height_m: float) -> Part:
-    """A box that stands on the ground in the middle of its frame."""
+    """A box whose bottom face is centred at the origin of the object's frame."""
     return Part(label=label, centre_m=(0.0, 0.0, height_m / 2), size_m=(length_m, width_m, height_m))
 
 

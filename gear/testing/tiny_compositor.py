@@ -1,7 +1,6 @@
-"""A small compositor for tests: pastes patches by homography where the ground truth sees their surfaces.
+"""A small compositor for tests: pastes patches by homography onto the corners of their surfaces in the ground truth.
 
-It ignores light. gear's own compositors are exact, but need probes of a renderer; this one serves tests of attacks
-without a renderer.
+It ignores light. It serves tests of attacks without a renderer, whereas gear's exact compositor needs rendered probes.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Small but real networks: a few convolutions with the `Model` protocol, fast enough to be attacked in a test.
 
-They have what complicates real networks: batch normalisation with buffers, a stride, feature taps, losses. Their
-weights follow from a seed and are not trained.
+They have the parts of real networks that are easily handled wrongly: batch normalisation with buffers, a stride,
+feature taps, losses. Their weights are drawn from a seed and are not trained.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A tiny town of boxes, in MJCF like every town: quick to compile, and every length of it is easy to say.
+"""A tiny town of boxes in MJCF, which compiles quickly and whose dimensions are round numbers.
 
 One straight road from west to east (lanes at y = -1.75 and 1.75, sidewalks at y = -5 and 7.5, 0.15 m high), one road
 across it at x = 30 that climbs 10 % north of y = 20, two houses, a lamp post, a bench, a traffic light, a stop sign and
@@ -29,7 +29,7 @@ TINY_SCENES = DATA / "scenes" / "tiny.yml"
 CLEAR = Weather(name="ClearNoon", cloudiness=5.0, sun_altitude_deg=60.0)
 
 SMALL_RIG = Rig(cameras=(CameraMount(name="rgb", width_px=320, height_px=160),))
-"""One small camera in the place of the paper's."""
+"""A rig with one small camera, mounted where CARLA-GeAR's camera is."""
 
 
 def tiny_scenes() -> SceneLibrary:

@@ -34,21 +34,23 @@ PRIMITIVES = ("mjGEOM_PLANE", "mjGEOM_SPHERE", "mjGEOM_CAPSULE", "mjGEOM_CYLINDE
 
 
 class TownContract:
-    """Attributes:
-    town: name of a town, or path of its MJCF.
-    scenes: path of its scene library; empty for gear's own of that town.
-    expected: labels that the town must have.
-    open_ends: names of lanes that may end, as where a road leaves the town.
-    planned_scenes: names of the scenes that are planned and rendered; None for all.
-    samples: number of samples that are planned of each scene.
-    join_m, max_turn_deg: largest gap and largest turn between a lane and the lane that continues it.
-    lane_width_m, speed_mps: least and largest width and speed of a lane.
-    ground_m: largest difference between the height of a lane or walk and its ground.
-    wheel_m: half the track of a car; there the ground is checked as well.
-    near_m, far_m: least and largest distance of the near clipping plane, and least distance of the far one.
-    min_visible: share of each board that must be visible in each sample.
-    albedo: largest albedo of a visible geom in any colour channel.
-    min_agreement: share of pixels, away from edges, whose id and depth must be those of rays.
+    """The promises of a town, as tests. A test class subclasses it and sets `town` and `scenes`.
+
+    Attributes:
+        town: name of a town, or path of its MJCF.
+        scenes: path of its scene library; empty for gear's own library of that town.
+        expected: labels that the town must have.
+        open_ends: names of lanes that may end, such as those where a road leaves the town.
+        planned_scenes: names of the scenes that are planned and rendered; None for all.
+        samples: number of samples that are planned of each scene.
+        join_m, max_turn_deg: largest gap and largest turn between a lane and the lane that continues it.
+        lane_width_m, speed_mps: smallest and largest width and speed of a lane.
+        ground_m: largest difference between the height of a lane or walk and its ground.
+        wheel_m: half the track of a car; the ground is also checked at this distance from the middle of a lane.
+        near_m, far_m: smallest and largest distance of the near clipping plane, and smallest distance of the far one.
+        min_visible: share of each board that must be visible in each sample.
+        albedo: largest albedo of a visible geom in any colour channel.
+        min_agreement: share of pixels, away from edges, whose id and depth must be those of rays.
     """
 
     town: ClassVar[str | Path]

@@ -31,7 +31,7 @@ CLOSED = frozenset({*GROUND_CODES, LABEL_BY_NAME["building"].code, LABEL_BY_NAME
 """Codes of labels whose surfaces have no holes."""
 
 PINHOLES_A_MILLION = 5
-"""So many are allowed: an outline that meets another one within a pixel looks like a crack, too."""
+"""Number of such pixels allowed per million, because outlines that meet within a pixel look like cracks as well."""
 
 SURFACE_RATIO = 1.1
 """Depths of neighbours on one surface differ by less than this factor."""

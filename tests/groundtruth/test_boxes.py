@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gear.groundtruth.boxes import Box3d, box_in_camera, project_box
-from gear.groundtruth.raster import clip_near
+from gear.groundtruth.silhouettes import clip_near
 from gear.testing.synthetic import UNIT_FACES, synthetic_frame
 from gear.testing.things import CAR, Thing
 from gear.values.geometry import Intrinsics

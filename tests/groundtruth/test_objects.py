@@ -7,7 +7,7 @@ import pytest
 from gear.camera.effects import Lens
 from gear.groundtruth import objects
 from gear.groundtruth.objects import in_camera, observe_objects
-from gear.groundtruth.raster import bounds, fill, project_mesh
+from gear.groundtruth.silhouettes import bounds, fill, project_mesh
 from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.things import CAR, CYCLIST, PERSON, TRUCK, Thing, board, street
 from gear.values.frames import Frame

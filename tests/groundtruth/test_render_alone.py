@@ -9,7 +9,7 @@ import pytest
 
 from gear.contracts.rendering import Renderer, Stage
 from gear.groundtruth.objects import in_camera, observe_objects
-from gear.groundtruth.raster import bounds, fill, project_mesh
+from gear.groundtruth.silhouettes import bounds, fill, project_mesh
 from gear.render.classic import ClassicRenderer
 from gear.values.errors import BackendError
 from gear.values.frames import GeomTable, SceneObject, Shape, View

@@ -6,7 +6,7 @@ import pytest
 from gear.camera.effects import Lens
 from gear.camera.effects.lens import undistorted
 from gear.formats import rle
-from gear.groundtruth.raster import clip_near
+from gear.groundtruth.silhouettes import clip_near
 from gear.groundtruth.surfaces import observe_surfaces
 from gear.testing.synthetic import behind_lens, synthetic_frame
 from gear.testing.things import CAR, Part, Thing, board

@@ -87,7 +87,7 @@ class Dimmer(Learner):
         dimmed = {name: np.rint(one * (state / 255)).astype(np.uint8) for name, one in views.items()}
         return DefenseResult(views=dimmed, score=0.0)
 
-    def forward_taught(self, views: Any, model: Any, state: float) -> Any:
+    def forward_fitted(self, views: Any, model: Any, state: float) -> Any:
         assert "stem" in model.taps()
         return {name: one * (state / 255) for name, one in views.items()}
 

@@ -27,7 +27,7 @@ class Ascent:
         self.config = config
 
     def optimise(
-        self, model: Any, dataset: Any, compositor: Any, *, budget: Any, rng: np.random.Generator, watch: Any = None
+        self, model: Any, dataset: Any, compositor: Any, *, budget: Any, rng: np.random.Generator, monitor: Any = None
     ) -> Any:
         side = self.config.side_px
         start = rng.uniform(0.4, 0.6, (len(dataset[0].record.surfaces), 3, side, 2 * side)).astype(np.float32)
@@ -49,7 +49,7 @@ class Search(Ascent):
     """Random search, without gradients."""
 
     def optimise(
-        self, model: Any, dataset: Any, compositor: Any, *, budget: Any, rng: np.random.Generator, watch: Any = None
+        self, model: Any, dataset: Any, compositor: Any, *, budget: Any, rng: np.random.Generator, monitor: Any = None
     ) -> Any:
         assert budget.queries is not None
         best, best_loss = None, -np.inf

@@ -1,1 +1,1 @@
-"""Built-in attacks, one file each; what they are made of lies in `optimisation`."""
+"""Built-in attacks, one file each; their shared building blocks are in `optimisation`."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.attacks import Budget, Compositor, Monitor, Patch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
@@ -58,18 +58,20 @@ class CarlaGear:
         *,
         budget: Budget,
         rng: np.random.Generator,
-        watch: Watch | None = None,
+        monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
         """Optimises one patch per surface.
 
         The paper's budget is 51 epochs of 100 samples: 2550 steps for segmentation, which takes two samples per step,
         and 5100 for the other tasks.
         """
-        from gear.plugins.attacks.optimisation.loop import Problem, climb, unit_gradients
+        from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
 
         objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
-        return climb(problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, watch=watch)
+        return optimise_textures(
+            problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, monitor=monitor
+        )
 
     def settings(self, sample: Any) -> Settings:
         """The paper's settings for the task of a sample."""

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from gear.contracts.attacks import Budget, Compositor, Patch, Watch, surface_of
+from gear.contracts.attacks import Budget, Compositor, Monitor, Patch, surface_of
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
@@ -74,7 +74,7 @@ class Control:
         *,
         budget: Budget,
         rng: np.random.Generator,
-        watch: Watch | None = None,
+        monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
         """Makes one patch per surface.
 

@@ -1,7 +1,7 @@
 """Targeted attacks on detectors: objects vanish, or an object appears where the patch is.
 
-Both goals are rewritten labels: the detector's own training losses against them are minimised (as Lee and Kolter, 2019,
-and DPatch; Liu et al., 2019).
+For both goals the labels are rewritten and the detector's own training losses against them are minimised, as in Lee and
+Kolter (2019) and in DPatch (Liu et al., 2019).
 """
 
 from __future__ import annotations

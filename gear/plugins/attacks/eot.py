@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.attacks import Budget, Compositor, Monitor, Patch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
@@ -66,10 +66,10 @@ class Eot:
         *,
         budget: Budget,
         rng: np.random.Generator,
-        watch: Watch | None = None,
+        monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
         """Optimises one patch per surface; all of them are pasted into every picture."""
-        from gear.plugins.attacks.optimisation.loop import Problem, climb, unit_gradients
+        from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
         from gear.plugins.attacks.optimisation.objectives import default_objective
         from gear.plugins.attacks.optimisation.upright_pasting import Upright
 
@@ -85,7 +85,7 @@ class Eot:
         )
         problem = Problem(model=model, dataset=scenes, compositor=scenes, settings=config)
         ascend = unit_gradients(problem, default_objective(dataset[0]), config)
-        return climb(problem, ascend, budget=budget, rng=rng, watch=watch, before=scenes.begin)
+        return optimise_textures(problem, ascend, budget=budget, rng=rng, monitor=monitor, before=scenes.begin)
 
 
 eot: AttackSpec[EotConfig] = AttackSpec(

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.attacks import Budget, Compositor, Monitor, Patch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
@@ -68,7 +68,7 @@ class Nes:
         *,
         budget: Budget,
         rng: np.random.Generator,
-        watch: Watch | None = None,
+        monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
         """Optimises one patch per surface."""
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
@@ -79,7 +79,7 @@ class Nes:
         config, count = self._config, len(dataset[0].record.surfaces)
         oracle = Oracle(model, dataset, compositor, default_objective(dataset[0]), budget)
         rows, columns = -(-config.height_px // config.grid_px), -(-config.width_px // config.grid_px)
-        saved = watch.resume() if watch is not None else None
+        saved = monitor.resume() if monitor is not None else None
         grid = rng.uniform(0, 1, (count, 3, rows, columns)).astype(np.float32)
         seed, done = int(rng.integers(2**62)), 0
         if saved is not None:
@@ -105,7 +105,7 @@ class Nes:
             values = {"harm": float(np.mean(seen)), "queries_left": float(oracle.left)}
             state = {"grid": grid, "seed": np.int64(seed), "done": np.int64(done), **oracle.state()}
             made = partial(as_patches, self._spread_out(grid))
-            if watch is not None and watch.step(done, values, made, partial(dict, state)):
+            if monitor is not None and monitor.step(done, values, made, partial(dict, state)):
                 break
         return as_patches(self._spread_out(grid))
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.attacks import Budget, Compositor, Monitor, Patch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
@@ -84,10 +84,10 @@ class Rp2:
         *,
         budget: Budget,
         rng: np.random.Generator,
-        watch: Watch | None = None,
+        monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
         """Optimises one patch per surface."""
-        from gear.plugins.attacks.optimisation.loop import Problem, climb, one_gradient
+        from gear.plugins.attacks.optimisation.loop import Problem, one_gradient, optimise_textures
 
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
         objective = self.objective(dataset[0])
@@ -96,7 +96,7 @@ class Rp2:
         def harm(_: Tensor, seen: Seen) -> Mapping[str, Tensor]:
             return self._harm(problem.model, objective, seen)
 
-        return climb(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, watch=watch)
+        return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
 
     def objective(self, sample: Any) -> Objective:
         """The loss of the target class, or the untargeted one."""

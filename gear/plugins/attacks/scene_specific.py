@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.attacks import Budget, Compositor, Monitor, Patch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
@@ -73,7 +73,7 @@ class SceneSpecificConfig(Settings):
 
 
 LEARNING_RATES = {"depth": 0.25}
-"""Of tasks that want another one than the usual; measured, docs/how-to/make-patches.md."""
+"""Learning rates of tasks that need another one than the default; measured in docs/results/attacks.md."""
 
 SIGNS = {"+": 1.0, "-": -1.0, "0": 0.0}
 
@@ -92,16 +92,18 @@ class SceneSpecific:
         *,
         budget: Budget,
         rng: np.random.Generator,
-        watch: Watch | None = None,
+        monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
         """Optimises one patch per surface."""
-        from gear.plugins.attacks.optimisation.loop import Problem, climb, unit_gradients
+        from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
 
         objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
         check_seen(self._config.attacked, dataset)
         self._check_losses(model, dataset[0])
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
-        return climb(problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, watch=watch)
+        return optimise_textures(
+            problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, monitor=monitor
+        )
 
     def settings(self, sample: Any) -> SceneSpecificConfig:
         """The settings, with the learning rate for the task of a sample."""

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.attacks import Budget, Compositor, Monitor, Patch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
@@ -22,7 +22,7 @@ from gear.values.errors import FieldError
 from gear.values.rng import derive_rng
 
 SCHEDULE = ((0.001, 1), (0.005, 2), (0.02, 4), (0.05, 8), (0.1, 16), (0.2, 32), (0.4, 64), (0.6, 128), (0.8, 256))
-"""Share of the queries spent, and by what the squares' area is divided until then."""
+"""Share of the queries used, and the divisor of the squares' area up to that share."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +64,7 @@ class Square:
         *,
         budget: Budget,
         rng: np.random.Generator,
-        watch: Watch | None = None,
+        monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
         """Optimises one patch per surface."""
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
@@ -74,7 +74,7 @@ class Square:
 
         config, count = self._config, len(dataset[0].record.surfaces)
         oracle = Oracle(model, dataset, compositor, default_objective(dataset[0]), budget)
-        saved = watch.resume() if watch is not None else None
+        saved = monitor.resume() if monitor is not None else None
         textures = self._first(rng, count)
         seed, done, best, whole = int(rng.integers(2**62)), 0, -math.inf, oracle.left
         if saved is not None:
@@ -104,7 +104,7 @@ class Square:
                 "best": np.float64(best),
                 **oracle.state(),
             }
-            if watch is not None and watch.step(done, values, partial(as_patches, textures), partial(dict, state)):
+            if monitor is not None and monitor.step(done, values, partial(as_patches, textures), partial(dict, state)):
                 break
         return as_patches(textures)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.attacks import Budget, Compositor, Monitor, Patch
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec
@@ -69,14 +69,14 @@ class Thys:
         *,
         budget: Budget,
         rng: np.random.Generator,
-        watch: Watch | None = None,
+        monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
         """Optimises one patch per surface.
 
         Raises:
             GearError: the model has no output of objectness.
         """
-        from gear.plugins.attacks.optimisation.loop import Problem, climb, one_gradient
+        from gear.plugins.attacks.optimisation.loop import Problem, one_gradient, optimise_textures
 
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
         objective = self.objective(dataset[0])
@@ -84,7 +84,7 @@ class Thys:
         def harm(_: Tensor, seen: Seen) -> Mapping[str, Tensor]:
             return self._harm(problem.model, objective, seen)
 
-        return climb(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, watch=watch)
+        return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
 
     def objective(self, sample: Any) -> Objective:
         """The objective of the most confident detection."""

@@ -35,7 +35,7 @@ from gear.formats.png import encode_rgb
 from gear.groundtruth.boxes import box_in_camera
 from gear.groundtruth.objects import observe_objects
 from gear.groundtruth.regions import MOSTLY, part_boxes
-from gear.groundtruth.strays import without_strays
+from gear.groundtruth.stray_pixels import without_strays
 from gear.groundtruth.visibility import Visibility
 from gear.metrics.coco_ap import CocoEvaluator
 from gear.metrics.coco_reference import TallObjects
@@ -87,7 +87,7 @@ class Object2d:
         category_id: COCO's.
         is_ignored: seen too little of to be looked for.
         box_px: tight box of the visible pixels, edge pixels. Stray pixels are left out
-            (`gear.groundtruth.strays`), here and in the area and the mask.
+            (`gear.groundtruth.stray_pixels`), here and in the area and the mask.
         amodal_box_px: tight box of the whole silhouette; may exceed the picture.
         area_px: pixels of the mask.
         rle: run lengths of the mask for the whole picture.

@@ -22,9 +22,9 @@ from gear.formats.billboard_info import billboard_info
 from gear.formats.cityscapes_polygons import polygons_json
 from gear.formats.jsontext import dump
 from gear.formats.label_png import encode_label_map, encode_painted
+from gear.formats.pixel_runs import Runs
 from gear.formats.png import encode_rgb
-from gear.formats.runs import Runs
-from gear.groundtruth.labelmaps import coarsen, instance_map, label_map
+from gear.groundtruth.label_maps import coarsen, instance_map, label_map
 from gear.metrics.semantic import PresentClasses, SemanticEvaluator
 from gear.plugins.tasks.common import (
     CameraOptions,

@@ -36,8 +36,8 @@ from gear.formats.kitti_object import (
 from gear.formats.png import encode_rgb
 from gear.groundtruth.boxes import Box3d, box_in_camera, project_box
 from gear.groundtruth.objects import observe_objects
-from gear.groundtruth.raster import NEAR_M
 from gear.groundtruth.regions import MOSTLY, least_share_inside, part_boxes
+from gear.groundtruth.silhouettes import NEAR_M
 from gear.groundtruth.visibility import Visibility, VisibilityLimits
 from gear.metrics.kitti_ap import KittiEvaluator
 from gear.metrics.kitti_reference import NearCars

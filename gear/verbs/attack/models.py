@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
-from gear.contracts.defenses import Defense, Detecting, Taught
+from gear.contracts.defenses import Defense, DifferentiableDetector, FittedDefense
 from gear.contracts.models import Model
 from gear.contracts.specs import AttackSpec, DefenseSpec, ModelSpec
 from gear.dataset.reading import Dataset
@@ -130,10 +130,10 @@ def _behind(opened: OpenedGuard, model: Model, cameras: Sequence[str], seed: int
         wrapped = product.wrap(model)
     learn = partial(calibration.fit, defense, product, model, cameras, seed)
     guard = CheckedDefense(defense.found, product, model if spec.needs_model or spec.taps else None, learn)
-    if wrapped is model and "images" not in spec.outputs and not isinstance(product, Detecting):
+    if wrapped is model and "images" not in spec.outputs and not isinstance(product, DifferentiableDetector):
         raise GearError(
             f"defense {spec.name!r} leaves pictures as they are and has no `defend_batch`, so an attack through it "
-            "would be an attack without it (gear.contracts.defenses.Detecting)"
+            "would be an attack without it (gear.contracts.defenses.DifferentiableDetector)"
         )
     if spec.gradient == "none":
         # What it draws, it draws alike each time it is asked.
@@ -144,7 +144,7 @@ def _behind(opened: OpenedGuard, model: Model, cameras: Sequence[str], seed: int
             lambda views: guard.apply(views, derive_rng(0, "attack", spec.name), 0).views,
             calibrate=lambda: guard.state,
         )
-    if isinstance(product, Detecting):
+    if isinstance(product, DifferentiableDetector):
         detecting = product
         return Defended(
             wrapped,
@@ -154,13 +154,13 @@ def _behind(opened: OpenedGuard, model: Model, cameras: Sequence[str], seed: int
             weights=weights,
             calibrate=lambda: guard.state,
         )
-    if isinstance(product, Taught):
-        taught = product
+    if isinstance(product, FittedDefense):
+        fitted = product
         return Defended(
             wrapped,
             product,
             model,
-            lambda views: taught.forward_taught(views, model, guard.state),
+            lambda views: fitted.forward_fitted(views, model, guard.state),
             calibrate=lambda: guard.state,
         )
     return Defended(wrapped, product, model)

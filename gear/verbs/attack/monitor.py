@@ -37,7 +37,7 @@ Judge = Callable[[tuple[Patch, ...]], float]
 
 @dataclass(eq=False, kw_only=True)
 class Recorder:
-    """A `gear.contracts.attacks.Watch` that writes into the folder of the attack.
+    """A `gear.contracts.attacks.Monitor` that writes into the folder of the attack.
 
     Attributes:
         root: the folder.

@@ -16,7 +16,7 @@ from gear.compositor.base import CACHE_BYTES, Prepared
 from gear.compositor.cache import Cache
 from gear.config.dump import to_plain
 from gear.contracts.attacks import Budget, Objective, Patch, WithObjective, WithTaskOptions
-from gear.contracts.defenses import Reporting
+from gear.contracts.defenses import ReportsFit
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
 from gear.dataset.json_text import dump_json
@@ -248,7 +248,7 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
             seen.compositor,
             budget=Budget(steps=job.steps, queries=job.queries),
             rng=derive_rng(job.seed, "attack", job.spec.name),
-            watch=recorder,
+            monitor=recorder,
         )
     for patches in (last, recorder.best or last):
         check_patches(patches, job.surfaces, job.found)
@@ -280,7 +280,7 @@ def _calibrated(network: Model, on_warning: Warn) -> tuple[float, Json]:
     begun, fits = time.monotonic(), {}
     for name, member in members_of(network).items():
         state = member.calibrate() if isinstance(member, Defended) else None
-        if isinstance(state, Reporting):
+        if isinstance(state, ReportsFit):
             report = state.fit_report()
             fits[name.rstrip("/")] = {"values": dict(report.values), "problems": list(report.problems)}
             for problem in report.problems:

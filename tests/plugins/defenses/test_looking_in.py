@@ -144,7 +144,7 @@ def tensor(*pictures: UInt8Image) -> torch.Tensor:
 def test_what_zmask_is_not_sure_of_passes_in_a_batch_too() -> None:
     model, defense, state = fitted(only_if_sure=True, false_alarms=0.08)
     shown = tensor(street(80), noisy_patch(street(80), 1)[0])
-    cleaned = defense.forward_taught({"left": shown}, model, state)["left"]
+    cleaned = defense.forward_fitted({"left": shown}, model, state)["left"]
     assert torch.equal(cleaned[0], shown[0]) and not torch.equal(cleaned[1], shown[1])
 
 
@@ -155,7 +155,7 @@ def test_a_patch_that_knows_zmask_is_covered_less() -> None:
     shown = tensor(picture)
     for _ in range(30):
         shown.requires_grad_(True)
-        hidden = (defense.forward_taught({"left": shown}, model, state)["left"] - shown).square().sum()
+        hidden = (defense.forward_fitted({"left": shown}, model, state)["left"] - shown).square().sum()
         (gradient,) = torch.autograd.grad(hidden, shown)
         assert float(gradient[..., inside].abs().sum()) > 0
         shown = (shown.detach() - 0.02 * gradient.sign() * inside).clamp(0, 1)

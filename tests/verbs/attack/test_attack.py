@@ -243,11 +243,11 @@ def test_an_attack_that_breaks_its_promise_is_named(small: Small, install: Insta
 
 
 class BadOnTheWay:
-    """Shows its watch what it would not return."""
+    """Shows its monitor what it would not return."""
 
-    def optimise(self, model: Any, dataset: Any, compositor: Any, *, watch: Any, **rest: Any) -> Any:
+    def optimise(self, model: Any, dataset: Any, compositor: Any, *, monitor: Any, **rest: Any) -> Any:
         bright, grey = ((Patch(name="patch_0", rgb=np.full((4, 8, 3), v, np.float32)),) for v in (2.0, 0.5))
-        watch.step(1, {"a": 0.0}, lambda: bright, dict)
+        monitor.step(1, {"a": 0.0}, lambda: bright, dict)
         return grey
 
 

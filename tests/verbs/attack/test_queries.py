@@ -27,7 +27,7 @@ def test_too_few_queries_are_said(small: Small, install: Install, tmp_path: Path
 
 
 class Unwatched:
-    """Asks as often as it may, and pays `watch` no attention."""
+    """Asks as often as it may, and pays `monitor` no attention."""
 
     def __init__(self, config: Nothing) -> None:
         pass
@@ -49,11 +49,11 @@ def test_who_counts_queries_need_not_be_watched(small: Small, install: Install, 
 class Curveless(Unwatched):
     """Has nothing to draw a curve of."""
 
-    def optimise(self, *asked: Any, watch: Any, **rest: Any) -> Any:
+    def optimise(self, *asked: Any, monitor: Any, **rest: Any) -> Any:
         patches = super().optimise(*asked, **rest)
-        assert watch.resume() is None
+        assert monitor.resume() is None
         for done in (1, 2):
-            assert not watch.step(done, {}, lambda: patches, dict)
+            assert not monitor.step(done, {}, lambda: patches, dict)
         return patches
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from art.attacks.evasion import MomentumIterativeMethod, ProjectedGradientDescent
 from art.estimators import BaseEstimator, LossGradientsMixin
-from gear.contracts.attacks import Budget, Compositor, Patch, Watch
+from gear.contracts.attacks import Budget, Compositor, Monitor, Patch
 from gear.contracts.models import Model
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class ArtAttack:
         *,
         budget: Budget,
         rng: np.random.Generator,
-        watch: Watch | None = None,
+        monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
         """One patch for each surface, starting from random values; the toolbox draws nothing and reports nothing in
         between.

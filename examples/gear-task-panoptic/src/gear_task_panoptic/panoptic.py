@@ -14,7 +14,7 @@ from gear.contracts.evaluation import Masks
 from gear.contracts.tasks import Encoded, Sample, Sidecar, SplitInfo
 from gear.formats.cityscapes import INSTANCE_FACTOR, LABELS, colour_map
 from gear.formats.png import encode_rgb
-from gear.groundtruth.labelmaps import instance_map
+from gear.groundtruth.label_maps import instance_map
 from gear.plugins.tasks.common import draw_surfaces, expect, images_of, read_rgb, surfaces_of
 from gear.values.frames import Frame, UInt8Image
 from gear.values.rig import Rig

@@ -1,1 +1,1 @@
-"""What attack plugins are made of: objectives, transforms, regularisers and optimisation loops, in torch."""
+"""Building blocks of attack plugins: objectives, transforms, regularisers and optimisation loops, in torch."""

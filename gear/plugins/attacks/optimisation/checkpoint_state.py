@@ -8,7 +8,7 @@ from gear.contracts.attacks import State
 from gear.values.errors import GearError
 
 TEXTURE_AXES = 4
-"""Of what is as large as the patches: surfaces, channels, rows, columns."""
+"""Names of the axes of arrays with the shape of the textures."""
 
 
 def check_saved(saved: State, fresh: State) -> None:

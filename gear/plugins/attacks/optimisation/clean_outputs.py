@@ -11,8 +11,8 @@ from torch import Tensor
 from gear.contracts.models import Model
 
 
-class CleanAnswers:
-    """Keeps outputs, or what an objective computes from them, by network and sample."""
+class CleanOutputs:
+    """Caches outputs, or values that an objective computes from them, by network and sample."""
 
     def __init__(self) -> None:
         self._kept: dict[tuple[int, int], Tensor] = {}

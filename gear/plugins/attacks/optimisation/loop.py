@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gear.contracts.attacks import Budget, Compositor, Objective, Patch, State, Watch
+from gear.contracts.attacks import Budget, Compositor, Monitor, Objective, Patch, State
 from gear.contracts.models import Model
 from gear.plugins.attacks.optimisation.appearance import vary
 from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
@@ -31,16 +31,18 @@ NO_GRADIENT = (
 )
 
 
-ARRAYS, NUMBERS = ("textures", "mean", "square"), ("done", "seed", "felt", "silent")
+ARRAYS, NUMBERS = ("textures", "mean", "square"), ("done", "seed", "has_gradient", "steps_without")
 """What a checkpoint holds."""
 
 
 class TextureOptimiser:
-    """Textures, Adam's moments, the number of steps done and what was felt: all that must be kept to go on later.
+    """The state of a texture optimisation: textures, Adam's moments, and the number of steps done.
+
+    `state` returns all of it, so that an interrupted optimisation can be resumed.
 
     Attributes:
-        felt: whether any gradient has reached the textures.
-        silent: steps since the last one did.
+        has_gradient: whether any gradient has reached the textures.
+        steps_without: number of steps since the last gradient that was not zero.
     """
 
     def __init__(self, surfaces: int, settings: TextureSettings, rng: np.random.Generator, saved: State | None) -> None:
@@ -50,18 +52,18 @@ class TextureOptimiser:
             self.textures = torch.from_numpy(rng.uniform(0, 1, shape).astype(np.float32))
             self.mean, self.square = torch.zeros(shape), torch.zeros(shape)
             self.done, self.seed = 0, int(rng.integers(2**62))
-            self.felt, self.silent = False, 0
+            self.has_gradient, self.steps_without = False, 0
             return
         blank, number = np.broadcast_to(np.float32(0), shape), np.array(0)
         check_saved(saved, dict.fromkeys(ARRAYS, blank) | dict.fromkeys(NUMBERS, number))
         self.textures, self.mean, self.square = (torch.from_numpy(saved[n].copy()) for n in ARRAYS)
         self.done, self.seed = int(saved["done"]), int(saved["seed"])
-        self.felt, self.silent = bool(saved["felt"]), int(saved["silent"])
+        self.has_gradient, self.steps_without = bool(saved["has_gradient"]), int(saved["steps_without"])
 
-    def feel(self, gradient: float | None) -> None:
-        """Takes note of how long a step's gradient was; None where nothing was left to be harmed."""
-        self.silent = self.silent + 1 if gradient == 0 else 0
-        self.felt |= (gradient or 0.0) > 0
+    def note_gradient(self, gradient: float | None) -> None:
+        """Records the length of a step's gradient; None where the batch has nothing left that could be harmed."""
+        self.steps_without = self.steps_without + 1 if gradient == 0 else 0
+        self.has_gradient |= (gradient or 0.0) > 0
 
     def step(self, ascent: Tensor, share: float) -> None:
         """One Adam step along the gradient, with `share` of the learning rate; textures stay in 0..1."""
@@ -73,12 +75,12 @@ class TextureOptimiser:
         self.textures = (self.textures + share * self.rate * mean / (square.sqrt() + EPSILON)).clamp(0, 1)
 
     def patches(self) -> tuple[Patch, ...]:
-        """As they are now."""
+        """The current textures, one patch per surface."""
         rgb = self.textures.permute(0, 2, 3, 1).contiguous().numpy()
         return tuple(Patch(name=f"patch_{n}", rgb=one.copy()) for n, one in enumerate(rgb))
 
     def state(self) -> State:
-        """To resume from."""
+        """The arrays from which the optimisation can be resumed."""
         arrays = {name: getattr(self, name).numpy().copy() for name in ARRAYS}
         numbers = {name: np.int64(getattr(self, name)) for name in NUMBERS}
         return {**arrays, **numbers}
@@ -86,11 +88,11 @@ class TextureOptimiser:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Problem:
-    """What is attacked, with what, seen how.
+    """An attacked model with the samples, the compositor and the settings of the attack.
 
     Attributes:
-        model, dataset, compositor: as `Attack.optimise` is given them.
-        settings: of the optimisation.
+        model, dataset, compositor: the arguments of `Attack.optimise`.
+        settings: settings of the optimisation.
     """
 
     model: Model
@@ -99,10 +101,10 @@ class Problem:
     settings: TextureSettings
 
     def surfaces(self) -> int:
-        """How many patches there are.
+        """Number of patches to optimise.
 
         Raises:
-            GearError: none, so there is nothing to attack.
+            GearError: the dataset has no sample with a patch surface.
         """
         count = len(self.dataset[0].record.surfaces) if len(self.dataset) else 0
         if not count:
@@ -110,7 +112,9 @@ class Problem:
         return count
 
     def seen(self, textures: Tensor, indexes: Sequence[int], step: int, seed: int) -> Seen:
-        """Pictures of some samples; both eyes see the same look of a patch, every sample another one."""
+        """Composes the textures into some samples' pictures. The appearance changes are drawn per sample and are the
+        same in both views of a stereo pair.
+        """
         samples = [self.dataset[index] for index in indexes]
         looks = []
         for index in indexes:
@@ -123,12 +127,12 @@ class Problem:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Seen:
-    """A batch with the patches in it.
+    """A batch of samples with the patches in their pictures.
 
     Attributes:
-        views: (B, 3, H, W) pictures by camera name, differentiable to the textures.
-        samples: their samples.
-        indexes: their numbers in the data set.
+        views: (B, 3, H, W) pictures by camera name, differentiable with respect to the textures.
+        samples: the samples of the batch.
+        indexes: indices of the samples in the dataset.
     """
 
     views: Mapping[str, Tensor]
@@ -136,36 +140,38 @@ class Seen:
     indexes: Sequence[int]
 
 
-Ascend = Callable[[Tensor, Seen], tuple[Tensor, dict[str, float]]]
-"""From (S, 3, h, w) textures that ask for gradients and a batch with them in it: the direction to go, and values,
-among them `gradient`, the length of the objective's gradient, unless nothing is left to be harmed."""
+Direction = Callable[[Tensor, Seen], tuple[Tensor, dict[str, float]]]
+"""A function from (S, 3, h, w) textures that require gradients, and a batch that shows them, to the ascent direction of
+the same shape and scalars for curves. The scalars hold `gradient`, the length of the objective's gradient, unless the
+batch has nothing left that could be harmed.
+"""
 
 
-def climb(
+def optimise_textures(
     problem: Problem,
-    ascend: Ascend,
+    ascend: Direction,
     *,
     budget: Budget,
     rng: np.random.Generator,
-    watch: Watch | None = None,
+    monitor: Monitor | None = None,
     before: Callable[[int], None] | None = None,
 ) -> tuple[Patch, ...]:
-    """Textures for every surface of the data set, optimised jointly.
+    """Optimises textures for all surfaces of the dataset jointly.
 
     Args:
-        problem: what is attacked.
-        ascend: says where to go.
-        budget: how many steps.
-        rng: where all chance comes from.
-        watch: told of every step.
-        before: called with the number of steps done before each.
+        problem: model, samples, compositor and settings.
+        ascend: computes the ascent direction.
+        budget: number of steps.
+        rng: generator of all random choices.
+        monitor: called after every step.
+        before: called before every step with the number of steps done.
 
     Raises:
-        GearError: no gradient of the objective reaches the textures or one is not finite, or there is nothing to
+        GearError: no gradient of the objective reaches the textures, a gradient is not finite, or there is nothing to
             attack.
     """
     settings, count = problem.settings, len(problem.dataset)
-    saved = watch.resume() if watch is not None else None
+    saved = monitor.resume() if monitor is not None else None
     optimiser = TextureOptimiser(problem.surfaces(), settings, rng, saved)
     begun = optimiser.done
     with frozen(problem.model):
@@ -178,20 +184,20 @@ def climb(
             direction, values = ascend(textures, problem.seen(textures, indexes, done, optimiser.seed))
             if not bool(direction.isfinite().all()):
                 raise not_finite(f"the gradient of step {done + 1}", indexes)
-            optimiser.feel(values.get("gradient"))
-            if optimiser.silent * settings.batch >= 2 * count + settings.batch:
+            optimiser.note_gradient(values.get("gradient"))
+            if optimiser.steps_without * settings.batch >= 2 * count + settings.batch:
                 raise GearError(NO_GRADIENT)
             share = 0.5 * (1 + math.cos(math.pi * done / budget.steps)) if settings.decay else 1.0
             optimiser.step(direction, share)
-            if watch is not None and watch.step(optimiser.done, values, optimiser.patches, optimiser.state):
+            if monitor is not None and monitor.step(optimiser.done, values, optimiser.patches, optimiser.state):
                 break
-    if optimiser.done > begun and not optimiser.felt:
+    if optimiser.done > begun and not optimiser.has_gradient:
         raise GearError(NO_GRADIENT)
     return optimiser.patches()
 
 
 def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
-    """Sample numbers of a step: every epoch is a permutation of its own; the same whether resumed or not."""
+    """Indices of the samples of a step. Every epoch has its own permutation, and a resumed run has the same batches."""
     size = min(size, count)
     steps_per_epoch = count // size
     epoch, place = divmod(step, steps_per_epoch)
@@ -199,8 +205,10 @@ def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
     return [int(index) for index in order[place * size : (place + 1) * size]]
 
 
-def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -> Ascend:
-    """The scene-specific attack's direction: one gradient a term, each of unit length, less the regularisers'."""
+def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -> Direction:
+    """The direction of the scene-specific attack: the gradient of each term at unit length, minus those of the
+    regularisers.
+    """
 
     def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
         terms = {
@@ -234,13 +242,14 @@ REGULARISERS = {"smoothness": smoothness, "printability": non_printability}
 def one_gradient(
     value: Callable[[Tensor, Seen], Mapping[str, Tensor]],
     penalties: Callable[[Tensor], Mapping[str, Tensor]] | None = None,
-) -> Ascend:
-    """The direction of attacks that add everything up: the gradient of the sum of named numbers, as it is.
+) -> Direction:
+    """The direction of attacks with one loss: the gradient of the sum of some scalars, without scaling.
 
     Args:
-        value: of the textures and a batch; no number where nothing is left to be harmed.
-        penalties: numbers more, of the textures alone, whose gradient is none of the objective's: there is one even
-            where nobody sees the patch.
+        value: computes the objective's scalars by name from the textures and a batch; empty where nothing is left that
+            could be harmed.
+        penalties: computes further scalars from the textures alone. Their gradients exist even where no picture shows
+            the patch, so they do not count as gradients of the objective.
     """
 
     def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
@@ -259,13 +268,13 @@ def one_gradient(
 
 
 def unit(gradient: Tensor) -> Tensor:
-    """At length 1 over everything; as it is where it is 0."""
+    """Scales a tensor to length 1 over all of its values; zeros stay zeros."""
     norm = gradient.norm()
     return gradient / norm if norm > 0 else gradient
 
 
 def gradient_to(value: Tensor, textures: Tensor, *, keep: bool = False) -> Tensor:
-    """The gradient of a number; zeros where none flows."""
+    """The gradient of a scalar with respect to a tensor; zeros where the scalar does not depend on it."""
     if not value.requires_grad:
         return torch.zeros_like(textures)
     (gradient,) = torch.autograd.grad(value, textures, retain_graph=keep, allow_unused=True)

@@ -1,4 +1,6 @@
-"""Models put together: several attacked at once, or one behind a defense that the attack knows of."""
+"""Models that wrap models: several that are attacked at once, and one behind a defense that the attack takes into
+account.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +20,15 @@ from gear.values.frames import UInt8Image
 
 DefendsBatches = Callable[[Mapping[str, Tensor]], DefendedBatch]
 CleansBatches = Callable[[Mapping[str, Tensor]], Mapping[str, Tensor]]
-"""(B, 3, H, W) pictures in 0..1 by camera name to the same."""
+"""A function from (B, 3, H, W) pictures in 0..1, by camera name, to cleaned pictures of the same shapes."""
 
 
 class Group(nn.Module):
-    """Several models as one: outputs, losses and taps are the members', under `<member>/<name>`.
+    """Several models as one. Outputs, losses and taps are those of all members, named `<member>/<name>`.
 
     Attributes:
-        members: by name.
-        device: where the first of them runs.
+        members: the models by name.
+        device: device of the first member.
     """
 
     def __init__(self, members: Mapping[str, Model]) -> None:
@@ -36,11 +38,11 @@ class Group(nn.Module):
         self.networks = _networks(*members.values())
 
     def predict(self, views: Mapping[str, UInt8Image]) -> dict[str, Any]:
-        """Every member's prediction by its name."""
+        """The prediction of every member, by its name."""
         return {name: member.predict(views) for name, member in self.members.items()}
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """Every member's outputs or losses."""
+        """The outputs or losses of every member."""
         return {
             f"{name}/{key}": value
             for name, member in self.members.items()
@@ -48,13 +50,14 @@ class Group(nn.Module):
         }
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """Every member's."""
+        """The feature maps of every member."""
         return {f"{name}/{key}": tap for name, member in self.members.items() for key, tap in member.taps().items()}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefenseWeights:
-    """How much an adaptive attack lowers what a defense says beside harming the task; 0 leaves a term out.
+    """Weights with which an adaptive attack lowers a defense's score and mask while it harms the task; 0 leaves a term
+    out.
 
     Attributes:
         score: weight of the defense's score.
@@ -69,19 +72,20 @@ USUAL_WEIGHTS = DefenseWeights()
 
 
 class Defended(nn.Module):
-    """A model that sees what a defense lets through, for attacks that know of the defense.
+    """A model whose pictures a defense cleans, for attacks that take the defense into account.
 
     Args:
-        model: as the defense wraps it.
-        defense: what cleans its pictures.
-        bare: the model that was wrapped, if the wrapping is another: its networks are attacked too.
-        clean: what cleans batches; by default the defense's `forward`.
-        detect: what cleans batches and says their scores and masks, instead of `clean`.
-        calibrate: makes the defense learn; called by `calibrate`.
+        model: the model as the defense wraps it.
+        defense: the defense.
+        bare: the model without the wrapper, if the defense wraps it; its networks are attacked as well.
+        clean: cleans batches; the defense's `forward` by default.
+        detect: cleans batches and gives scores and masks; replaces `clean`.
+        weights: weights of the terms that lower the defense's score and mask.
+        calibrate: fits the defense; called by `calibrate`.
 
     Attributes:
-        device: where the model runs, whatever is around it.
-        weights: of the terms that lower the defense's score and mask.
+        device: device of the model without the wrapper.
+        weights: weights of the terms that lower the defense's score and mask.
     """
 
     def __init__(
@@ -105,33 +109,33 @@ class Defended(nn.Module):
         self.networks = _networks(*(one for one in inside if one is not model or not isinstance(one, nn.Module)))
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """The guarded model's own, without the defense: attacks optimise `forward`."""
+        """The prediction of the guarded model without the defense; attacks optimise `forward`."""
         return self.model.predict(views)
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """The model's, of the cleaned pictures; gradients pass the defense as it declares."""
+        """Outputs or losses of the model on the cleaned pictures; gradients pass the defense as its spec declares."""
         return self.model.forward(self.defended(views).views, targets)
 
     def defended(self, views: Mapping[str, Tensor]) -> DefendedBatch:
-        """What the defense makes of a batch; computed once for the last one, whose graph is kept."""
+        """The defense's result for a batch. The last result is cached together with its graph."""
         has_gradients = torch.is_grad_enabled()
         if self._last is None or self._last[0] is not views or self._last[1] != has_gradients:
             self._last = (views, has_gradients, self._defend(views))
         return self._last[2]
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The model's."""
+        """The feature maps of the model."""
         return self.model.taps()
 
 
 class Cleaned(Defended):
-    """A model that sees what a defense without gradients lets through, for attacks that need none.
+    """A model whose pictures a defense without gradients cleans, for attacks that need no gradients.
 
-    Pictures go through the defense as bytes, one sample at a time, and no gradient comes back.
+    The defense receives uint8 pictures, one sample at a time.
 
     Args:
-        model, defense, bare: as of `Defended`.
-        clean: what the defense makes of a sample's pictures.
+        model, defense, bare: as for `Defended`.
+        clean: cleans the pictures of one sample.
     """
 
     def __init__(
@@ -165,23 +169,27 @@ def _cleaned_as_bytes(
 
 
 def _as_bytes(batch: Tensor) -> UInt8Image:
-    """(B, 3, H, W) 0..1 to (B, H, W, 3)."""
+    """(B, 3, H, W) values in 0..1 as (B, H, W, 3) uint8."""
     levels = (batch.clamp(0, 1) * 255).round().to(torch.uint8)
     return levels.permute(0, 2, 3, 1).contiguous().cpu().numpy()
 
 
 def _networks(*models: Model) -> nn.ModuleList:
-    """What models that are no modules themselves hold counts too, where weights are frozen and hashed."""
+    """The torch modules inside of models that may be no modules themselves, so that they are frozen and
+    hashed as well.
+    """
     return nn.ModuleList([network for model in models for _, network in networks_of(model)])
 
 
 def device_name(model: Model) -> str:
-    """Where a model says that it runs; the CPU where it does not say."""
+    """The device that a model states; `cpu` where it states none."""
     return str(getattr(model, "device", "cpu"))
 
 
 def members_of(model: Model) -> Mapping[str, Model]:
-    """What is attacked, by a prefix for its metrics: the members of a group, or the model itself under no name."""
+    """The attacked models by prefix of their metrics: the members of a group, or the model itself with an
+    empty prefix.
+    """
     if isinstance(model, Group):
         return {f"{name}/": member for name, member in model.members.items()}
     return {"": model}

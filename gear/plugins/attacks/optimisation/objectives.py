@@ -1,8 +1,8 @@
-"""What an attack maximises: the terms of each task, from a model's outputs or losses.
+"""The objectives of attacks: terms for each task, computed from a model's outputs or losses.
 
-Every term is a number that grows with the harm. In segmentation and depth, pixels on the patch never count: an attack
-is judged by what it does elsewhere. The losses of detectors and stereo networks are of the whole picture, as they are
-trained; there is no labelled object on a board.
+Every term grows with the harm. For segmentation and depth, pixels on the patch do not count, since an attack is
+measured by its effect on the rest of the picture. The losses of detectors and stereo networks cover the whole picture,
+as in training; no labelled object is on a board.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from gear.contracts.models import Model
 from gear.formats import rle
 from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
 from gear.networks.network import as_batch
-from gear.plugins.attacks.optimisation.clean_outputs import CleanAnswers
+from gear.plugins.attacks.optimisation.clean_outputs import CleanOutputs
 from gear.plugins.attacks.optimisation.frozen_model import frozen
 from gear.plugins.attacks.optimisation.model_group import Defended, members_of
 from gear.values.errors import GearError
@@ -35,7 +35,7 @@ Kind = Literal["semseg", "depth", "losses"]
 
 
 def default_objective(sample: Any) -> Objective:
-    """Untargeted harm to the sample's task."""
+    """The objective of untargeted harm to the sample's task."""
     kind = kind_of(sample)
     if kind == "semseg":
         return SemsegObjective()
@@ -43,14 +43,14 @@ def default_objective(sample: Any) -> Objective:
 
 
 def kind_of(sample: Any) -> Kind:
-    """Which terms suit a sample, by its ground truth: labels, depth, or the model's own losses."""
+    """The kind of terms that suit a sample, decided by its ground truth: labels, depth, or the model's own losses."""
     if hasattr(sample, "label_ids"):
         return "semseg"
     return "depth" if hasattr(sample, "depth_m") else "losses"
 
 
 def outside(samples: Sequence[Any], view: str, device: torch.device) -> Tensor:
-    """(B, H, W) bool: where no patch surface is seen."""
+    """(B, H, W) bool: pixels that show no patch surface."""
     masks = []
     for sample in samples:
         height, width = sample.images[view].shape[:2]
@@ -64,29 +64,30 @@ def outside(samples: Sequence[Any], view: str, device: torch.device) -> Tensor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SemsegObjective:
-    """Cross-entropy of pixels that are right (Y) and of those that are wrong already (N) (Rossolini et al., 2022).
+    """Cross-entropy of the correctly classified pixels (Y) and of the misclassified ones (N); Rossolini et al., 2022.
 
     Attributes:
-        gamma: share of Y's gradient, the rest is N's; `dynamic` is the share of pixels that are right.
-        attacked, target: label ids: pixels of `attacked` (of any class where None) are pushed to `target`; untargeted
-            where `target` is None.
+        gamma: weight of Y's gradient, where N's has 1 - gamma; `dynamic` is the share of pixels that are classified
+            correctly.
+        attacked, target: label ids. Pixels of the class `attacked` (of any class if None) are pushed to the class
+            `target`; the attack is untargeted if `target` is None.
     """
 
     gamma: float | Literal["dynamic"] = "dynamic"
     attacked: int | None = None
     target: int | None = None
-    _right: CleanAnswers = field(default_factory=CleanAnswers, init=False, repr=False, compare=False)
+    _right: CleanOutputs = field(default_factory=CleanOutputs, init=False, repr=False, compare=False)
 
     @property
-    def asks_for_clean(self) -> bool:
-        """Whether `harm` looks at the answer to the picture without the patch, too; once a sample."""
+    def needs_clean_output(self) -> bool:
+        """Whether `harm` needs the output on the picture without the patch, once per sample."""
         return self.target is None and self.gamma != "dynamic"
 
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """`correct` and `wrong`, or `target`."""
-        logits, labels, counts = self._answers(model, views, samples)
+        """Two terms, `correct` and `wrong`; or one, `target`."""
+        logits, labels, counts = self._outputs(model, views, samples)
         if self.target is not None:
             return self._targeted(logits, labels, counts)
         loss = functional.cross_entropy(logits, labels, ignore_index=IGNORED_TRAIN_ID, reduction="none")
@@ -99,16 +100,17 @@ class SemsegObjective:
         return _split(loss, {"correct": (right, gamma), "wrong": (wrong, 1 - gamma)})
 
     def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
-        """With a fixed `gamma` as the terms, but of the pixels that are right and wrong without the patch.
+        """With a fixed `gamma`, the weighted sum of the terms, but with Y and N taken from the output without the
+        patch.
 
-        Those that the patch makes wrong change sides, and what is right still is what is harmed least: of it alone, the
-        metric would fall as the attack succeeds, to 0 where nothing is right any more.
+        With the current Y and N the metric would fall as the attack succeeds: pixels that become wrong leave Y, the
+        mean over the rest of Y is small, and it is 0 once no pixel is right.
         """
-        if not self.asks_for_clean:
+        if not self.needs_clean_output:
             terms = [one.weight * one.value for one in self.terms(model, views, samples, indexes).values()]
             return torch.stack(terms).sum() if terms else torch.zeros(())
         assert self.gamma != "dynamic"
-        logits, labels, counts = self._answers(model, views, samples)
+        logits, labels, counts = self._outputs(model, views, samples)
 
         def rightly_said(sample: Any) -> Tensor:
             clean = _logits(model, as_batch([sample.images], list(views)))
@@ -118,10 +120,10 @@ class SemsegObjective:
         loss = functional.cross_entropy(logits, labels, ignore_index=IGNORED_TRAIN_ID, reduction="none")
         return self.gamma * _mean(loss, right) + (1 - self.gamma) * _mean(loss, counts & ~right)
 
-    def _answers(
+    def _outputs(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any]
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Logits, the labels that they should show, and which pixels count."""
+        """Logits, target labels, and (B, H, W) bool of the pixels that count."""
         logits = _logits(model, views)
         labels = train_labels(samples, logits.shape[1]).to(logits.device)
         return logits, labels, outside(samples, next(iter(views)), logits.device) & (labels != IGNORED_TRAIN_ID)
@@ -137,27 +139,29 @@ class SemsegObjective:
 
 
 class DepthObjective:
-    """Smooth L1 against the network's own answer to the picture without the patch, split where the error is small.
+    """Smooth L1 distance from the network's own output on the picture without the patch, in two terms: small and large
+    errors.
 
     Args:
-        gamma: share of the pixels whose error is still below `split_m`; the rest is the others'.
-        split_m: metres.
-        direction: `any` error, or only `farther` or `nearer` than the clean answer: log-depth is pushed that way.
+        gamma: weight of the term of small errors, those of at most `split_m`; large errors have 1 - gamma.
+        split_m: limit between small and large errors in metres.
+        direction: `any` error, or only depth that is `farther` or `nearer` than the output without the patch; then the
+            one term is the mean change of the logarithm of depth.
     """
 
-    asks_for_clean = True
+    needs_clean_output = True
 
     def __init__(
         self, *, gamma: float = 0.8, split_m: float = 0.5, direction: Literal["any", "farther", "nearer"] = "any"
     ) -> None:
         self._gamma, self._split_m, self._direction = gamma, split_m, direction
-        self._clean = CleanAnswers()
+        self._clean = CleanOutputs()
 
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """`small` and `large`, or the direction's name."""
-        depth_m, clean, free = self._answers(model, views, samples, indexes)
+        """Two terms, `small` and `large`; or one, named after the direction."""
+        depth_m, clean, free = self._outputs(model, views, samples, indexes)
         if self._direction != "any":
             return {self._direction: Term(value=self._pushed(depth_m, clean, free))}
         error = functional.smooth_l1_loss(depth_m, clean, reduction="none")
@@ -165,26 +169,26 @@ class DepthObjective:
         return _split(error, {"small": (small, self._gamma), "large": (free & ~small, 1 - self._gamma)})
 
     def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
-        """The mean error, whatever it is split into.
+        """The mean error over small and large errors together.
 
-        The sum of both means, weighted, would fall where an error grows past `split_m`, and one pixel that is far off
-        would count for more than all of them that are a little off.
+        A weighted sum of both means would fall when an error grows past `split_m`, and one pixel with a large error
+        would count for more than all pixels with small errors.
         """
-        depth_m, clean, free = self._answers(model, views, samples, indexes)
+        depth_m, clean, free = self._outputs(model, views, samples, indexes)
         if self._direction != "any":
             return self._pushed(depth_m, clean, free)
         return _mean(functional.smooth_l1_loss(depth_m, clean, reduction="none"), free)
 
-    def _answers(
+    def _outputs(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """(B, H, W) metres with the patch and without it, and where no patch is seen."""
+        """(B, H, W) depth in metres with the patch and without it, and bool of the pixels that show no patch."""
 
         def said(sample: Any) -> Tensor:
-            return _said(model, as_batch([sample.images], list(views)), "depth_m")[0]
+            return _output(model, as_batch([sample.images], list(views)), "depth_m")[0]
 
         clean = self._clean.of(model, samples, indexes, said)
-        depth_m = _said(model, views, "depth_m")
+        depth_m = _output(model, views, "depth_m")
         return depth_m, clean.to(depth_m.device, depth_m.dtype), outside(samples, next(iter(views)), depth_m.device)
 
     def _pushed(self, depth_m: Tensor, clean: Tensor, free: Tensor) -> Tensor:
@@ -195,10 +199,11 @@ class DepthObjective:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LossObjective:
-    """The model's own training losses against the ground truth, each its own term: detectors and stereo networks.
+    """The model's own training losses against the ground truth, one term per loss, for detectors and stereo networks.
 
     Attributes:
-        signs: by loss name: 1 to make it large, -1 small, 0 to leave it out; names that are not there count as 1.
+        signs: weight of each loss by name: 1 maximises it, -1 minimises it, 0 ignores it; losses without a sign have
+            weight 1.
     """
 
     signs: Mapping[str, float]
@@ -206,7 +211,7 @@ class LossObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One a loss."""
+        """One term per loss."""
         losses = model.forward(views, samples)
         signs = {name: self.signs.get(name, 1.0) for name in losses}
         return {name: Term(value=loss, weight=signs[name]) for name, loss in losses.items() if signs[name]}
@@ -219,9 +224,9 @@ def counted(
     samples: Sequence[Any],
     indexes: Sequence[int],
 ) -> list[Tensor]:
-    """Numbers that add up to the harm by which patches are compared, of all members of a group.
+    """Scalars whose sum is the harm by which patches are compared, over all members of a group.
 
-    They are the objective's own `harm` where it has one, its weighted terms otherwise.
+    These are the objective's `harm` if it has one, and its weighted terms otherwise.
     """
     if isinstance(objective, HarmObjective):
         harms = [objective.harm(member, views, samples, indexes) for member in members_of(model).values()]
@@ -239,7 +244,7 @@ def weighted(
     samples: Sequence[Any],
     indexes: Sequence[int],
 ) -> list[Tensor]:
-    """The terms of all members of a group, times their weights: what attacks climb that add everything up."""
+    """The weighted terms of all members of a group, for attacks that maximise their sum."""
     return [
         term.weight * term.value
         for member in members_of(model).values()
@@ -254,16 +259,17 @@ def all_terms(
     samples: Sequence[Any],
     indexes: Sequence[int],
 ) -> dict[str, Term]:
-    """The objective's terms of one model, and those that lower what its defense says, if there is one."""
+    """The objective's terms for one model, with the terms against its defense, if it has one."""
     return {**objective.terms(member, views, samples, indexes), **defense_terms(member, views, samples)}
 
 
 def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[Any]) -> dict[str, Term]:
-    """`defense_score` and `defense_mask`, which grow as a defense is less sure and covers less of the patch.
+    """The terms `defense_score` and `defense_mask`, which grow as the defense's score falls and its mask leaves the
+    patch.
 
-    They are the negative means of the scores and of the mask before rounding on the patch's visible pixels, as in the
+    They are the negative means of the scores, and of the unrounded mask on the visible pixels of the patch, as in the
     defense-aware attacks of Z-Mask's supplement (Rossolini et al., AAAI 2023). Empty for a model without a defense, for
-    one whose defense says neither, and for weights of 0.
+    a defense that gives neither score nor mask, and for weights of 0.
     """
     if not isinstance(member, Defended):
         return {}
@@ -277,7 +283,7 @@ def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[
 
 
 def not_finite(what: str, indexes: Sequence[int]) -> GearError:
-    """What is said of a number along which nothing can be optimised, with the samples that it came of."""
+    """The error for a value that is not finite, with the samples for which it was computed."""
     which = f"sample{'s' * (len(indexes) > 1)} {', '.join(map(str, indexes))}"
     return GearError(
         f"{what} is NaN or infinite, as is what the model says of {which} with the patch; see to its weights"
@@ -285,7 +291,9 @@ def not_finite(what: str, indexes: Sequence[int]) -> GearError:
 
 
 def loss_names(model: Model, sample: Any) -> list[str]:
-    """What a model calls its losses, of a group all members', in the order that they come in."""
+    """Names of a model's losses, or of those of all members of a group, in the order in which the model
+    returns them.
+    """
     views = as_batch([sample.images], list(sample.images))
     with torch.no_grad(), frozen(model):
         found = [name for member in members_of(model).values() for name in member.forward(views, [sample])]
@@ -296,7 +304,7 @@ def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
     """(B, H, W) int64 targets for logits over 19 train ids or over label ids; 255 is ignored in both.
 
     Raises:
-        ValueError: fewer classes than Cityscapes has train ids.
+        ValueError: there are fewer classes than Cityscapes has train ids.
     """
     labels = torch.from_numpy(np.stack([sample.label_ids for sample in samples])).long()
     trained = TRAIN_IDS[labels]
@@ -308,22 +316,22 @@ def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
 
 
 def class_of(label_id: int, classes: int) -> int:
-    """The channel of a label id."""
+    """The channel of a label id in logits over `classes` classes."""
     return int(TRAIN_IDS[label_id]) if classes == TRAIN_CLASSES else label_id
 
 
 def _is_right(logits: Tensor, labels: Tensor) -> Tensor:
-    """(B, H, W) bool: where the surest class is the label; anything where that is ignored."""
-    # The largest value is found much faster than where it is.
+    """(B, H, W) bool: whether the most probable class is the label; without meaning where the label is ignored."""
+    # `amax` is much faster than `argmax`.
     given = logits.gather(1, labels.clamp(max=logits.shape[1] - 1)[:, None])[:, 0]
     return given == logits.amax(1)
 
 
-def _said(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
-    """The output that every network of the task has, at the picture's size.
+def _output(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
+    """The output `name` of a model, checked for the picture's size.
 
     Raises:
-        GearError: this one has not, or at another size.
+        GearError: the model does not give this output, or gives it at another size.
     """
     outputs = model.forward(views)
     if name not in outputs:
@@ -342,12 +350,12 @@ def _said(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
 
 
 def _logits(model: Model, views: Mapping[str, Tensor]) -> Tensor:
-    """(B, C, H, W) of a network that knows Cityscapes' classes.
+    """(B, C, H, W) logits of a network over Cityscapes' classes.
 
     Raises:
-        GearError: it knows others.
+        GearError: the network has other classes.
     """
-    logits = _said(model, views, "logits")
+    logits = _output(model, views, "logits")
     known = TRAIN_CLASSES, len(TRAIN_IDS)
     if logits.shape[1] not in known:
         raise GearError(
@@ -365,14 +373,15 @@ def _mask(counts: str, height: int, width: int) -> npt.NDArray[np.bool_]:
 
 
 def _split(values: Tensor, parts: Mapping[str, tuple[Tensor, float]]) -> Mapping[str, Term]:
-    """A term for the mean over each part, which is where it lies and its weight; none for what is empty or weightless.
+    """One term per part: the mean over the part's pixels with the part's weight. Parts that are empty or have weight 0
+    have no term.
 
-    Counting is several times as fast as asking whether there is any.
+    Counting the pixels of a part is several times as fast as `any`.
     """
     return {n: Term(value=_mean(values, where), weight=w) for n, (where, w) in parts.items() if w and where.sum()}
 
 
 def _mean(values: Tensor, where: Tensor) -> Tensor:
-    """Over the chosen; 0 with a gradient of 0 where nothing is chosen."""
-    # As a number: a product with bools converts them in every direction that it goes.
+    """Mean over the chosen pixels; 0 with a gradient of 0 where none is chosen."""
+    # The mask is converted once: a product with bools converts them in the forward and in the backward pass.
     return (values * where.to(values.dtype)).sum() / where.sum().clamp_min(1)

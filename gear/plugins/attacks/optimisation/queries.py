@@ -24,7 +24,8 @@ Textures = npt.NDArray[np.float32]
 class Oracle:
     """Computes the harm of textures; one query is one forward pass of one model on a batch.
 
-    Objectives that compare with the output on the clean picture (`asks_for_clean`) cost one more query per new sample.
+    Objectives that need the output on the picture without the patch (`needs_clean_output`) cost one more query per new
+    sample.
 
     Attributes:
         left: queries that are left.
@@ -44,17 +45,17 @@ class Oracle:
         return {"left": np.array(self.left), "paid": np.array(sorted(self._seen), np.int64)}
 
     def restore(self, state: State) -> None:
-        """Restores the used queries from `state`.
+        """Restores the number of used queries from `state`.
 
         Raises:
-            GearError: it is no such state.
+            GearError: the saved state lacks that number.
         """
         check_saved(state, {"left": np.array(0), "paid": np.zeros(np.size(state.get("paid", ())), np.int64)})
         self.left, self._seen = int(state["left"]), {int(index) for index in state["paid"]}
 
     def cost(self, indexes: Sequence[int]) -> int:
         """Queries that one evaluation on these samples costs."""
-        asks = isinstance(self._objective, HarmObjective) and self._objective.asks_for_clean
+        asks = isinstance(self._objective, HarmObjective) and self._objective.needs_clean_output
         clean = len(set(indexes) - self._seen) if asks else 0
         return len(members_of(self._model)) * (1 + clean)
 

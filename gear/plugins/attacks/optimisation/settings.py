@@ -1,4 +1,4 @@
-"""Settings of the texture optimisation, as data without torch: options of attack plugins are made of them."""
+"""Settings of the texture optimisation. Importing them does not import torch, so that specs can use them."""
 
 from __future__ import annotations
 

@@ -134,9 +134,9 @@ class ZMask:
         Raises:
             ValueError: always.
         """
-        raise ValueError("Z-Mask looks into the model: it has `forward_taught`")
+        raise ValueError("Z-Mask looks into the model: it has `forward_fitted`")
 
-    def forward_taught(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> Mapping[str, Tensor]:
+    def forward_fitted(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> Mapping[str, Tensor]:
         """The pictures of `defend_batch`."""
         return self.defend_batch(views, model, state).views
 

@@ -16,13 +16,13 @@ from gear.contracts.attacks import Budget, Patch, State, Term
 from gear.plugins.attacks.optimisation.appearance import vary
 from gear.plugins.attacks.optimisation.loop import (
     ARRAYS,
-    Ascend,
+    Direction,
     Problem,
     Seen,
     TextureOptimiser,
     batch_of,
-    climb,
     one_gradient,
+    optimise_textures,
     unit_gradients,
 )
 from gear.plugins.attacks.optimisation.objectives import SemsegObjective, train_labels
@@ -42,7 +42,7 @@ class Contract(AttackContract):
     spec = scene_specific
 
 
-class Watching:
+class RecordingMonitor:
     """Keeps every state; may start from one; may stop early."""
 
     def __init__(self, start: State | None = None, stop_at: int = 10**9) -> None:
@@ -66,12 +66,12 @@ class Watching:
         return done >= self.stop_at
 
 
-def run(watch: Watching, steps: int = 6) -> tuple[Patch, ...]:
+def run(monitor: RecordingMonitor, steps: int = 6) -> tuple[Patch, ...]:
     contract = Contract()
     dataset = contract.dataset()
     problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=SETTINGS)
     ascend = unit_gradients(problem, SemsegObjective(), SETTINGS)
-    return climb(problem, ascend, budget=Budget(steps=steps), rng=derive_rng(3, "attack"), watch=watch)
+    return optimise_textures(problem, ascend, budget=Budget(steps=steps), rng=derive_rng(3, "attack"), monitor=monitor)
 
 
 def test_an_epoch_shows_every_sample_once() -> None:
@@ -83,12 +83,12 @@ def test_an_epoch_shows_every_sample_once() -> None:
 
 
 def test_what_was_cut_off_goes_on_as_if_it_had_not_been() -> None:
-    whole = Watching()
+    whole = RecordingMonitor()
     patches = run(whole)
-    cut = Watching(stop_at=3)
+    cut = RecordingMonitor(stop_at=3)
     run(cut)
     assert len(cut.states) == 3
-    resumed = Watching(start=cut.states[-1])
+    resumed = RecordingMonitor(start=cut.states[-1])
     assert not difference(run(resumed), patches, "patches")
     assert not difference(resumed.states[-1], whole.states[-1], "state")
     assert {"wrong", "gradient", "smoothness"} <= set(whole.values[0])
@@ -97,24 +97,24 @@ def test_what_was_cut_off_goes_on_as_if_it_had_not_been() -> None:
 def test_what_was_felt_before_it_was_cut_off_counts() -> None:
     """One sample in three shows the patch: steps that feel nothing may be all that are left."""
 
-    def ascend_at(steps_felt: set[int]) -> Ascend:
+    def ascend_at(steps_with_gradient: set[int]) -> Direction:
         count = iter(range(100))
 
         def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
-            felt = next(count) in steps_felt
-            return torch.full_like(textures, float(felt)), {"gradient": float(felt)}
+            has_gradient = next(count) in steps_with_gradient
+            return torch.full_like(textures, float(has_gradient)), {"gradient": float(has_gradient)}
 
         return ascend
 
     contract = Contract()
     dataset = contract.dataset()
     problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=SETTINGS)
-    cut = Watching(stop_at=2)
-    climb(problem, ascend_at({0}), budget=Budget(steps=4), rng=derive_rng(3, "attack"), watch=cut)
-    resumed = Watching(start=cut.states[-1])
-    climb(problem, ascend_at(set()), budget=Budget(steps=4), rng=derive_rng(3, "attack"), watch=resumed)
-    whole = Watching()
-    climb(problem, ascend_at({0}), budget=Budget(steps=4), rng=derive_rng(3, "attack"), watch=whole)
+    cut = RecordingMonitor(stop_at=2)
+    optimise_textures(problem, ascend_at({0}), budget=Budget(steps=4), rng=derive_rng(3, "attack"), monitor=cut)
+    resumed = RecordingMonitor(start=cut.states[-1])
+    optimise_textures(problem, ascend_at(set()), budget=Budget(steps=4), rng=derive_rng(3, "attack"), monitor=resumed)
+    whole = RecordingMonitor()
+    optimise_textures(problem, ascend_at({0}), budget=Budget(steps=4), rng=derive_rng(3, "attack"), monitor=whole)
     assert not difference(resumed.states[-1], whole.states[-1], "state")
 
 
@@ -143,13 +143,13 @@ def test_the_rate_falls_with_a_cosine_where_it_is_to(decay: bool) -> None:
     settings = replace(SETTINGS, learning_rate=0.1, decay=decay)
     problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=settings)
     black = TextureOptimiser(1, settings, derive_rng(0, "black"), None).state()
-    watch = Watching(start=black | {"textures": np.zeros_like(black["textures"])})
-    climb(
+    monitor = RecordingMonitor(start=black | {"textures": np.zeros_like(black["textures"])})
+    optimise_textures(
         problem, lambda textures, _: (torch.ones_like(textures), {"gradient": 1.0}), budget=Budget(steps=5),
-        rng=derive_rng(0, "climb"), watch=watch,
+        rng=derive_rng(0, "optimise_textures"), monitor=monitor,
     )  # fmt: skip
     shares = [0.5 * (1 + math.cos(math.pi * done / 5)) if decay else 1.0 for done in range(5)]
-    gone = [float(state["textures"].mean()) for state in watch.states]
+    gone = [float(state["textures"].mean()) for state in monitor.states]
     assert gone == pytest.approx(np.cumsum(shares) * 0.1, abs=1e-5)
 
 
@@ -216,11 +216,11 @@ def test_without_a_surface_there_is_nothing_to_attack() -> None:
 
 
 def test_a_state_of_another_size_is_refused() -> None:
-    whole = Watching()
+    whole = RecordingMonitor()
     run(whole)
     state = whole.states[-1] | {name: np.zeros((1, 3, 4, 4), np.float32) for name in ARRAYS}
     with pytest.raises(GearError, match=r"patches of \(1, 3, 4, 4\).*start it afresh"):
-        run(Watching(start=state))
+        run(RecordingMonitor(start=state))
 
 
 @pytest.mark.parametrize(
@@ -235,18 +235,18 @@ def test_a_state_of_another_size_is_refused() -> None:
 )
 def test_a_damaged_state_is_refused(damage: State, said: str) -> None:
     """Moments of one column would be spread over all of them, in silence."""
-    whole = Watching()
+    whole = RecordingMonitor()
     run(whole)
     with pytest.raises(GearError, match=f"{said}.*start it afresh$"):
-        run(Watching(start=dict(whole.states[-1]) | dict(damage)))
+        run(RecordingMonitor(start=dict(whole.states[-1]) | dict(damage)))
 
 
 def test_a_state_of_an_older_gear_is_refused() -> None:
-    whole = Watching()
+    whole = RecordingMonitor()
     run(whole)
-    state = {name: value for name, value in whole.states[-1].items() if name not in ("felt", "silent")}
-    with pytest.raises(GearError, match="older gear, it lacks felt, silent; start it afresh"):
-        run(Watching(start=state))
+    state = {name: value for name, value in whole.states[-1].items() if name not in ("has_gradient", "steps_without")}
+    with pytest.raises(GearError, match="older gear, it lacks has_gradient, steps_without; start it afresh"):
+        run(RecordingMonitor(start=state))
 
 
 def test_a_model_that_passes_no_gradient_is_told_of() -> None:
@@ -265,7 +265,7 @@ def test_a_model_that_passes_no_gradient_is_told_of() -> None:
 
     with pytest.raises(GearError, match="no gradient reaches the patch"):
         problem = Problem(model=Opaque(), dataset=dataset, compositor=TinyCompositor(dataset), settings=SETTINGS)
-        climb(
+        optimise_textures(
             problem,
             unit_gradients(problem, SemsegObjective(), SETTINGS),
             budget=Budget(steps=50),
@@ -279,16 +279,16 @@ def test_a_gradient_that_is_no_number_ends_it_there(value: float) -> None:
     contract = Contract()
     dataset = contract.dataset()
     problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=SETTINGS)
-    watch = Watching()
+    monitor = RecordingMonitor()
 
     def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
         slope = torch.ones_like(textures)
-        slope[0, 0, 0, 0] = value if len(watch.states) == 2 else 1.0
+        slope[0, 0, 0, 0] = value if len(monitor.states) == 2 else 1.0
         return slope, {"gradient": float(slope.norm())}
 
     with pytest.raises(GearError, match=r"^the gradient of step 3 is NaN or infinite.* sample \d with the patch"):
-        climb(problem, ascend, budget=Budget(steps=5), rng=derive_rng(3, "attack"), watch=watch)
-    assert len(watch.states) == 2
+        optimise_textures(problem, ascend, budget=Budget(steps=5), rng=derive_rng(3, "attack"), monitor=monitor)
+    assert len(monitor.states) == 2
 
 
 def test_looks_differ_and_have_gradients() -> None:

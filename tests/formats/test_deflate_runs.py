@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gear.formats.byte_runs import compress
+from gear.formats.deflate_runs import compress
 
 runs = st.lists(st.tuples(st.integers(0, 255), st.integers(1, 1200)), min_size=1, max_size=60)
 

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gear.groundtruth import raster
-from gear.groundtruth.raster import NEAR_M, bounds, clip_near, count, fill, project_mesh
+from gear.groundtruth import silhouettes
+from gear.groundtruth.silhouettes import NEAR_M, bounds, clip_near, count, fill, project_mesh
 from gear.values.geometry import Intrinsics
 
 WINDOW = (0, 0, 40, 30)
@@ -60,7 +60,7 @@ def test_triangles_may_be_filled_in_portions(portion: int, monkeypatch: pytest.M
     rng = np.random.default_rng(5)
     triangles = rng.uniform(-10, 50, (60, 1, 2)) + rng.uniform(-9, 9, (60, 3, 2))
     whole = fill(triangles, WINDOW)
-    monkeypatch.setattr(raster, "SPANS_AT_ONCE", portion)
+    monkeypatch.setattr(silhouettes, "SPANS_AT_ONCE", portion)
     np.testing.assert_array_equal(fill(triangles, WINDOW), whole)
 
 
@@ -71,7 +71,7 @@ def test_counts_are_those_of_masks(seed: int, triangles: int, portion: int) -> N
     corners = rng.uniform(-20, 60, (triangles, 1, 2)) + rng.uniform(-30, 30, (triangles, 3, 2))
     expected = int(fill(corners, WINDOW).sum())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(raster, "SPANS_AT_ONCE", portion)
+        patch.setattr(silhouettes, "SPANS_AT_ONCE", portion)
         assert count(corners, WINDOW, 30) == count(corners, WINDOW, 1000) == expected
 
 

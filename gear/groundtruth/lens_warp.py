@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from gear.camera.effects import PixelMap, recorded_effects
-from gear.groundtruth.raster import Mask, Window
+from gear.groundtruth.silhouettes import Mask, Window
 from gear.values.geometry import Array
 from gear.values.scene import CameraRecord
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bend:
+class LensWarp:
     """How a camera's effects move pixels, for the silhouettes of the ground truth.
 
     Attributes:
@@ -23,14 +23,14 @@ class Bend:
     map: PixelMap
 
     @staticmethod
-    def of(camera: CameraRecord) -> Bend | None:
+    def of(camera: CameraRecord) -> LensWarp | None:
         """The map that a camera's record holds; None for a pinhole.
 
         Raises:
             ValueError: the distortion folds the picture over.
         """
         moving = recorded_effects(camera)
-        return Bend(moving[0].pixel_map(camera)) if moving else None
+        return LensWarp(moving[0].pixel_map(camera)) if moving else None
 
     def points(self, pinhole_px: Array) -> Array:
         """Where points of the pinhole's picture appear; also for points outside of the picture.
@@ -68,9 +68,9 @@ class Bend:
         (x0, y0, x1, y1), part = window, np.s_[wanted[1] : wanted[3], wanted[0] : wanted[2]]
         column, row = (np.rint(one[part]).astype(np.intp) for one in (self.map.x, self.map.y))
         held = (column >= x0) & (column < x1) & (row >= y0) & (row < y1)
-        bent = np.zeros(held.shape, dtype=np.bool_)
-        bent[held] = mask[row[held] - y0, column[held] - x0]
-        return bent
+        warped = np.zeros(held.shape, dtype=np.bool_)
+        warped[held] = mask[row[held] - y0, column[held] - x0]
+        return warped
 
 
 def _border(window: Window) -> Array:

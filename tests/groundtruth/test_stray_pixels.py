@@ -1,6 +1,6 @@
 import numpy as np
 
-from gear.groundtruth.strays import without_strays
+from gear.groundtruth.stray_pixels import without_strays
 
 
 def body() -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gear.groundtruth.labelmaps import coarsen, instance_map, label_map
+from gear.groundtruth.label_maps import coarsen, instance_map, label_map
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.things import CAR, PERSON, TRAFFIC_LIGHT, Part, Thing
 from gear.values.frames import GeomTable

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gear.formats.runs import Runs
+from gear.formats.pixel_runs import Runs
 
 pictures = st.tuples(st.integers(1, 150), st.integers(1, 40), st.integers(0, 2**32 - 1))
 

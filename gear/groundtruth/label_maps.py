@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.formats.cityscapes import INSTANCE_FACTOR
-from gear.formats.runs import STRIP_ROWS, Runs
+from gear.formats.pixel_runs import STRIP_ROWS, Runs
 from gear.values.frames import GeomTable, IdImage, SceneObject
 from gear.values.labels import LABELS
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gear.formats.runs import Runs
+from gear.formats.pixel_runs import Runs
 from gear.values.frames import GeomTable, IdImage, SceneObject
 
 Mask = npt.NDArray[np.bool_]
