@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gear.groundtruth.visible import gather, visible_parts
+from gear.groundtruth.visible_parts import gather, visible_parts
 from gear.values.frames import GeomTable, SceneObject, Shape
 from gear.values.geometry import RigidTransform
 from gear.values.labels import LABEL_BY_NAME
