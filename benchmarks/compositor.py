@@ -21,10 +21,10 @@ from gear.camera.pipeline import CameraPipeline
 from gear.collecting.job import Job, resolve
 from gear.collecting.lookup import scene_library
 from gear.collecting.pipeline import collect_samples
-from gear.collecting.run import manifest_facts
 from gear.collecting.session import Session
 from gear.compositor.registry import COMPOSITORS, open_compositor
 from gear.config.load import load_collection
+from gear.dataset.plan import manifest_facts
 from gear.dataset.reading import Dataset
 from gear.dataset.store import Store
 from gear.measuring.gap.picture_gap import picture_gap, visible_mask
@@ -128,7 +128,7 @@ def collect_both(world: World, clean: Job, twin: Job) -> None:
             one.root.mkdir(parents=True)
             store.open(one.patch.files)
             collect_samples(replace(session, job=one), store, store.missing(), lambda _: None)
-            store.close(task, manifest_facts(one))
+            store.close(task, manifest_facts(one.plan))
     finally:
         renderer.close()
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from gear.verbs.evaluate.run import evaluate
     from gear.verbs.export import export
     from gear.verbs.gap.run import gap
+    from gear.verbs.merge import MergeReport, merge
     from gear.verbs.models import ModelFacts, list_models
     from gear.verbs.sheet import sheet
     from gear.verbs.towns.facts import Town, read_town, towns
@@ -52,6 +53,7 @@ __all__ = [
     "EvaluateReport",
     "GapReport",
     "GearError",
+    "MergeReport",
     "ModelFacts",
     "Town",
     "TownReport",
@@ -70,6 +72,7 @@ __all__ = [
     "export",
     "gap",
     "list_models",
+    "merge",
     "open_dataset",
     "open_twins",
     "read_town",
@@ -92,6 +95,7 @@ _HOME = {
     "EvaluateReport": "gear.verbs.evaluate.report",
     "GapReport": "gear.measuring.gap.report",
     "GearError": "gear.values.errors",
+    "MergeReport": "gear.verbs.merge",
     "ModelFacts": "gear.verbs.models",
     "Town": "gear.verbs.towns.facts",
     "TownReport": "gear.verbs.towns.write",
@@ -110,6 +114,7 @@ _HOME = {
     "export": "gear.verbs.export",
     "gap": "gear.verbs.gap.run",
     "list_models": "gear.verbs.models",
+    "merge": "gear.verbs.merge",
     "open_dataset": "gear.plugins.datasets",
     "open_twins": "gear.plugins.datasets",
     "read_town": "gear.verbs.towns.facts",

@@ -30,6 +30,7 @@ COMMANDS: dict[str, str] = {
     "evaluate": "run a model, with or without a defense, over datasets: metrics, predictions, twins compared",
     "bench": "run a whole benchmark, networks x defenses x scenes x patches, with a report",
     "verify": "check every file of a dataset, and make damaged samples again",
+    "merge": "join folders with shards of one collection into one dataset",
     "export": "write a dataset in another layout",
     "towns": "list towns and their scenes, or draw a map and a picture of every scene",
     "models": "list the installed networks: size, input, published weights, shipped weights and what is missing",

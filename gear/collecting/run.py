@@ -13,11 +13,12 @@ from gear.collecting.pipeline import collect_samples
 from gear.collecting.session import open_session
 from gear.dataset.executors.engines import DEFAULT, open_engine
 from gear.dataset.executors.executor import Done, Executor, InThisProcess
+from gear.dataset.plan import manifest_facts
+from gear.dataset.shards import WHOLE, Shard
 from gear.dataset.store import Store
 from gear.plugins.build import blamed, build, find
 from gear.values.counted import counted
 from gear.values.progress import Callbacks
-from gear.values.serial import Json, to_json
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,20 +28,27 @@ class CollectReport:
     Attributes:
         root: folder of the dataset.
         split: name of the split.
-        samples: number of samples in the split.
+        samples: number of samples in the split, or in the shard of it that was collected.
         made: number of samples made by this run.
+        shard: the shard that was collected, as `I/N`; None for the whole split.
     """
 
     root: Path
     split: str
     samples: int
     made: int
+    shard: str | None = None
 
     def summary(self) -> str:
         """The result in one line."""
         kept = self.samples - self.made
         resumed = f" ({kept} were there already)" if kept else ""
-        return f"{self.root}: {counted(self.samples, 'sample')} in split {self.split!r}{resumed}"
+        if self.shard is None:
+            return f"{self.root}: {counted(self.samples, 'sample')} in split {self.split!r}{resumed}"
+        return (
+            f"{self.root}: {counted(self.samples, 'sample')} of shard {self.shard} of split {self.split!r}{resumed}; "
+            "after the last shard run the same command without --shard, or `gear merge` for separate folders"
+        )
 
 
 def executor_of(job: Job, workers: int, *, engine: str = DEFAULT, in_subprocess: bool = False) -> Executor:
@@ -56,14 +64,20 @@ def executor_of(job: Job, workers: int, *, engine: str = DEFAULT, in_subprocess:
 
 
 def run_job(
-    job: Job, *, executor: Executor | None = None, force: bool = False, callbacks: Callbacks | None = None
+    job: Job,
+    *,
+    executor: Executor | None = None,
+    force: bool = False,
+    shard: Shard | None = None,
+    callbacks: Callbacks | None = None,
 ) -> CollectReport:
-    """Collects the missing samples of a resolved job and closes the split.
+    """Collects the missing samples of a resolved job and closes the split; a shard of it is collected and not closed.
 
     Args:
         job: the job.
         executor: executor that makes the samples; this process by default.
         force: whether a split made with another configuration is replaced.
+        shard: the part of the split to collect; None for all of it.
         callbacks: callbacks that receive the progress.
 
     Raises:
@@ -71,29 +85,38 @@ def run_job(
     """
     store = Store(job.root, job.plan)
     plugin = find("task", job.config.task)
+    part = shard or WHOLE
     with store.begun(job.patch.files, force=force):
-        store.refuse_damaged()
-        made = _collect_missing(job, store, executor or InThisProcess(), callbacks or Callbacks())
-        task = build(plugin, job.config.options)
-        with blamed(plugin, "finalise"):
-            store.close(task, manifest_facts(job))
-    return CollectReport(root=job.root, split=job.plan.info.split, samples=job.plan.samples, made=made)
+        store.refuse_damaged(part)
+        made = _collect_missing(job, store, part, executor or InThisProcess(), callbacks or Callbacks())
+        if shard is None:
+            task = build(plugin, job.config.options)
+            with blamed(plugin, "finalise"):
+                store.close(task, manifest_facts(job.plan))
+    return CollectReport(
+        root=job.root,
+        split=job.plan.info.split,
+        samples=len(store.indices(part)),
+        made=made,
+        shard=None if shard is None else str(shard),
+    )
 
 
-def _collect_missing(job: Job, store: Store, executor: Executor, callbacks: Callbacks) -> int:
-    """Makes the missing samples; returns their number."""
-    missing = store.missing()
-    finished = job.plan.samples - len(missing)
+def _collect_missing(job: Job, store: Store, shard: Shard, executor: Executor, callbacks: Callbacks) -> int:
+    """Makes the missing samples of a shard; returns their number."""
+    missing = store.missing(shard)
+    total = len(store.indices(shard))
+    finished = total - len(missing)
 
     forecast = Forecast(store, len(missing), callbacks.on_warning)
 
     def done(index: int) -> None:
         nonlocal finished
         finished += 1
-        callbacks.on_progress(finished, job.plan.samples)
+        callbacks.on_progress(finished, total)
         forecast.sample_done(index)
 
-    callbacks.on_progress(finished, job.plan.samples)
+    callbacks.on_progress(finished, total)
     executor.run(partial(_make_samples, job), missing, done)
     return len(missing)
 
@@ -102,20 +125,3 @@ def _make_samples(job: Job, indices: Iterator[int], done: Done) -> None:
     """The work of one worker: a world and a renderer, opened once for all of its samples."""
     with open_session(job) as session:
         collect_samples(session, Store(job.root, job.plan), indices, done)
-
-
-def manifest_facts(job: Job) -> dict[str, Json]:
-    """The facts of the manifest beside hashes; none depends on paths of the machine, the clock or the workers."""
-    return {
-        "task": dict(job.plan.task),
-        "options": job.plan.options,
-        "info": to_json(job.plan.info),
-        "seed": job.split.seed,
-        "patch": dict(job.plan.patch),
-        "renderer": to_json(job.renderer),
-        "versions": job.plan.content["versions"],
-        "scene": job.plan.content["scene"],
-        "weather": to_json(job.weather),
-        "assets": job.plan.content["assets"],
-        "config": job.plan.recipe,
-    }

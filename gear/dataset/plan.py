@@ -52,6 +52,12 @@ class Plan:
         content = {"twin": self.twin_key, "patch": self.patch}
         return _digest(content | ({"auxiliary": list(self.auxiliary)} if self.auxiliary else {}))
 
+    @property
+    def frames_per_sequence(self) -> int:
+        """Number of samples of each driving sequence; 1 where every sample is a single picture."""
+        frames = self.content.get("frames", 1) if isinstance(self.content, dict) else 1
+        return frames if isinstance(frames, int) and frames > 0 else 1
+
     def as_json(self) -> Json:
         """The content of its file. Entries of auxiliary files and of a recipe are only there where the plan has any."""
         content = to_json(self)
@@ -59,6 +65,31 @@ class Plan:
             if not getattr(self, name):
                 del content[name]
         return content
+
+
+def manifest_facts(plan: Plan) -> dict[str, Json]:
+    """The facts of the manifest that are not hashes; none depends on paths of the machine, the clock or the workers.
+
+    Raises:
+        DatasetError: the plan lacks one of them; it was edited.
+    """
+    try:
+        return {
+            "task": dict(plan.task),
+            "options": plan.options,
+            "info": to_json(plan.info),
+            "seed": plan.content["seed"],
+            "patch": dict(plan.patch),
+            "renderer": plan.content["renderer"],
+            "versions": plan.content["versions"],
+            "scene": plan.content["scene"],
+            "weather": plan.content["weather"],
+            "assets": plan.content["assets"],
+            "config": plan.recipe,
+        }
+    except (KeyError, TypeError) as error:
+        problem = f"is not of this version of gear (content: {error}); collect the split again"
+        raise DatasetError(plan_path(plan.info.split), problem) from error
 
 
 def _digest(value: Json) -> str:
@@ -185,22 +216,29 @@ def write_plan(root: Path, plan: Plan) -> None:
     write_whole(root, plan_path(plan.info.split), sealed_json(plan.as_json()))
 
 
-def differences(old: Json, new: Json, key: str = "") -> list[str]:
-    """One text for each key in which two JSON values differ, with both values."""
+def differences(old: Json, new: Json, key: str = "", *, places: tuple[str, str] = ("there", "now")) -> list[str]:
+    """One text for each key in which two JSON values differ, with both values.
+
+    Args:
+        old, new: the values; `samples`, `info` and `recipe` of two plans are left out.
+        key: of both values in what they are part of, with dots.
+        places: words that say of each of the two values where it is.
+    """
     if isinstance(old, dict) and isinstance(new, dict):
         found: list[str] = []
         for name in sorted(old.keys() | new.keys()):
             if name in ("samples", "info", "recipe") and not key:
                 continue
-            found += differences(old.get(name), new.get(name), f"{key}.{name}" if key else name)
+            inner = f"{key}.{name}" if key else name
+            found += differences(old.get(name), new.get(name), inner, places=places)
         return found
     if isinstance(old, list) and isinstance(new, list):
         return [
             difference
             for place, (before, after) in enumerate(zip_longest(old, new))
-            for difference in differences(before, after, f"{key}[{place}]")
+            for difference in differences(before, after, f"{key}[{place}]", places=places)
         ]
-    return [] if old == new else [f"{key}: {_short(old)} there, {_short(new)} now"]
+    return [] if old == new else [f"{key}: {_short(old)} {places[0]}, {_short(new)} {places[1]}"]
 
 
 def _short(value: Json) -> str:

@@ -17,6 +17,7 @@ from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, pla
 from gear.dataset.locks import at_work, is_at_work, turn
 from gear.dataset.plan import Plan, begin, read_plan, refuse_copy, refuse_other_tasks
 from gear.dataset.sealed_json import REPAIR, DamagedError, load_sealed, sealed_json
+from gear.dataset.shards import WHOLE, Shard
 from gear.dataset.sidecar import no_sidecar, read_sidecar, sidecar_bytes
 from gear.values.errors import DatasetError, FieldError, ReplaceableError
 from gear.values.serial import Json
@@ -152,14 +153,19 @@ class Store:
                     with contextlib.suppress(FileNotFoundError):
                         folder.rmdir()
 
-    def missing(self) -> list[int]:
-        """Indices of the samples that have no sidecar; a sample that has one is complete."""
+    def indices(self, shard: Shard = WHOLE) -> list[int]:
+        """Indices of the samples of a shard, in order; all frames of a sequence are in the same shard."""
+        frames = self.plan.frames_per_sequence
+        return [index for index in range(self.plan.samples) if shard.holds(index // frames)]
+
+    def missing(self, shard: Shard = WHOLE) -> list[int]:
+        """Indices of a shard's samples that have no sidecar; a sample that has one is complete."""
         folder = inside(self.root, split_folder(self.split)) / "samples"
         there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-        return [i for i in range(self.plan.samples) if f"{i:06d}.json" not in there]
+        return [index for index in self.indices(shard) if f"{index:06d}.json" not in there]
 
-    def refuse_damaged(self) -> None:
-        """Checks all files of the samples that are there against the hashes in their sidecars.
+    def refuse_damaged(self, shard: Shard = WHOLE) -> None:
+        """Checks all files of a shard's samples that are there against the hashes in their sidecars.
 
         A sample that lacks a file loses its sidecar, so that it is made again. A changed file is never overwritten
         without being asked: somebody may have edited it.
@@ -167,8 +173,8 @@ class Store:
         Raises:
             DamagedError: a file is not the one that was written.
         """
-        missing = set(self.missing())
-        indices = [index for index in range(self.plan.samples) if index not in missing]
+        missing = set(self.missing(shard))
+        indices = [index for index in self.indices(shard) if index not in missing]
         incomplete: list[str] = []
         changed: list[str] = []
         for index, (lacking, different) in zip(indices, in_threads(self._damage_of, indices), strict=True):

@@ -6,14 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from gear.config.nodes import parse_text
-from gear.contracts.tasks import Sample
+from gear.contracts.tasks import Sample, Task
+from gear.dataset.plan import Plan
 from gear.dataset.reading import Dataset, Twins, pair_twins, read_manifest
 from gear.dataset.store import plan_of, splits_of
 from gear.plugins.build import build_task, name_of_task
 from gear.values.counted import counted
 from gear.values.errors import DatasetError
 
-__all__ = ["Dataset", "Twins", "open_dataset", "open_twins", "root_and_split", "roots_of"]
+__all__ = ["Dataset", "Twins", "open_dataset", "open_twins", "root_and_split", "roots_of", "task_of"]
 
 DEEPEST = 3
 """Folders between one that is given and the roots in it."""
@@ -46,8 +47,22 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
         split = names[0]
     plan = plan_of(root, split)
     manifest = read_manifest(root, plan)
+    return Dataset(root=root, plan=plan, task=task_of(root, plan), manifest=manifest)
+
+
+def task_of(root: Path, plan: Plan) -> Task[Any, Any]:
+    """The task that made a split, with its options.
+
+    Args:
+        root: of the dataset, for messages.
+        plan: of the split.
+
+    Raises:
+        UnknownNameError: the task's plugin is not installed.
+        ConfigError: the plugin does not accept the options in the plan.
+    """
     _, task = build_task(name_of_task(plan.task), parse_text(_as_yaml(plan.options), f"{root} options"))
-    return Dataset(root=root, plan=plan, task=task, manifest=manifest)
+    return task
 
 
 def root_and_split(path: str | Path) -> tuple[Path, str | None]:

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from gear.dataset.files import explained, read_bytes, sync_folder, write_whole
-from gear.dataset.guarded_paths import owned, remove_empty_folders, remove_files, remove_tree
-from gear.dataset.locks import alone_at_work
+from gear.dataset.files import read_bytes, write_whole
+from gear.dataset.guarded_paths import owned, remove_empty_folders, remove_files
 from gear.dataset.reading import check_hash
 from gear.dataset.store import check_output, plan_of, splits_of
+from gear.dataset.whole_tree import check_target, unfinished_place, whole_tree
 from gear.formats.exports import SplitRecords, layouts
 from gear.plugins.datasets import open_dataset
 from gear.reporting.display import displayed
 from gear.values.errors import DatasetError, UnknownNameError
 from gear.values.progress import Callbacks, Progress
-
-UNFINISHED = ".gear-export"
-"""Ends the name of the hidden folder, beside the new tree's place, in which the tree is written."""
 
 
 def export(
@@ -66,37 +62,15 @@ def export(
         for sidecar in sidecars:
             hashes |= sidecar.files
         splits.append(SplitRecords(info=plan.info, records=records))
-    _check_target(target)
     tree = known[layout].tree(splits, lambda path: check_hash(source, path, hashes.get(path, "")))
-    unfinished = owned(target.parent, f".{target.name}{UNFINISHED}")
-    check_output(unfinished, "delete it, or use another --out")
-    with alone_at_work(unfinished):
-        try:
-            with displayed(Callbacks.of(on_progress=on_progress), "export", progress=progress, unit="file") as shown:
-                _write_tree(unfinished, tree, shown.on_progress)
-            with explained(target):
-                _check_target(target)  # another command may have written there
-                unfinished.replace(target)
-                sync_folder(target.parent)
-        except BaseException:  # Ctrl-C, too
-            with contextlib.suppress(DatasetError):
-                remove_tree(unfinished.parent, unfinished.name)
-            raise
+    check_target(target, "export")
+    check_output(unfinished_place(target, "export"), "delete it, or use another --out")
+    with (
+        whole_tree(target, "export") as unfinished,
+        displayed(Callbacks.of(on_progress=on_progress), "export", progress=progress, unit="file") as shown,
+    ):
+        _write_tree(unfinished, tree, shown.on_progress)
     return sum(len(split.records) for split in splits)
-
-
-def _check_target(target: Path) -> None:
-    """Checks that the new tree can take its place.
-
-    Raises:
-        DatasetError: something is in the folder, or it is one that cannot be replaced by another.
-    """
-    with explained(target):
-        if target.exists() and any(target.iterdir()):
-            raise DatasetError(target, "is not empty; export into a new folder")
-    if target.is_mount() or target == Path.cwd():
-        kind = "a mounted file system" if target.is_mount() else "the current folder"
-        raise DatasetError(target, f"is {kind}; export into a new folder in it")
 
 
 def _write_tree(root: Path, tree: Iterable[tuple[str, bytes]], on_progress: Progress) -> None:

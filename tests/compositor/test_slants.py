@@ -15,10 +15,10 @@ import pytest
 import gear
 from gear.collecting.job import resolve
 from gear.collecting.pipeline import collect_samples
-from gear.collecting.run import manifest_facts
 from gear.collecting.session import Session, open_session
 from gear.compositor.transport import TransportCompositor
 from gear.config.load import load_collection
+from gear.dataset.plan import manifest_facts
 from gear.dataset.reading import Dataset
 from gear.dataset.store import Store
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
@@ -88,7 +88,7 @@ def looks(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Twins]:
             parts = {name: getattr(plain, name) for name in Session.__dataclass_fields__}
             session = Looking(**parts)
             collect_samples(session, store, store.missing(), lambda _: None)
-        store.close(session.task, manifest_facts(job))
+        store.close(session.task, manifest_facts(job.plan))
         return gear.open_dataset(root)
 
     @cache

@@ -27,9 +27,9 @@ ALLOWED = {
     "dataset/guarded_paths.py": {"unlink", "rmdir", "rmtree"},
     "dataset/scratch.py": {"unlink", "rmdir"},
     "dataset/store.py": {"rmdir"},  # of empty folders at and above the root, that this run has made
+    "dataset/whole_tree.py": {"replace"},  # of the whole tree into its place
     "plugins/probe.py": {"replace"},  # gear's own cache
     "plugins/probe_process.py": {"open"},  # a temporary file of the parent process
-    "verbs/export.py": {"replace"},  # of the whole tree into its place
     "verbs/scaffold/write.py": {"rename", "rmtree", "write_text"},  # of a folder that it has just made
     "verbs/verify/recipe.py": {"write_bytes"},  # into a temporary folder
     "world/compilation/world_cache.py": {"rename", "rmtree", "unlink", "open"},  # gear's own cache

@@ -9,6 +9,7 @@ EXAMPLE = """examples:
   gear collect --task semseg --scene billboard04 --patch patches/ --out data/twin
   gear collect --task semseg --split train --probes --out data/train
   gear collect --task depth --weather WetNight --set weather.fog_density=10
+  gear collect --task semseg --split train --shard 2/8 --out part2
   gear collect --config my.yml --set weather.cloudiness=30 --set options.width_px=1024
 """
 
@@ -54,6 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--engine", metavar="NAME", help="engine that makes the samples (processes)")
     parser.add_argument(
         "--workers", type=positive, default=1, metavar="N", help="processes; the result does not depend on them (1)"
+    )
+    parser.add_argument(
+        "--shard",
+        metavar="I/N",
+        help="collect the I-th of N parts, on any machine; a run without --shard, or `gear merge`, closes the split",
     )
     parser.add_argument(
         "--probes",

@@ -8,6 +8,7 @@ from pathlib import Path
 from gear.config.collection import CollectionConfig
 from gear.config.load import load_collection
 from gear.dataset.executors.engines import DEFAULT
+from gear.dataset.shards import Shard
 from gear.values.errors import GearError
 
 
@@ -16,7 +17,7 @@ class CollectRequest:
     """As the keywords of `gear.collect`, where they are explained.
 
     Raises:
-        GearError: the number of workers is not at least 1.
+        GearError: the number of workers is not at least 1, or the shard is not `I/N`.
     """
 
     task: str | None = None
@@ -35,12 +36,22 @@ class CollectRequest:
     settings: tuple[str, ...] = ()
     engine: str = DEFAULT
     workers: int = 1
+    shard: str | None = None
     in_subprocess: bool = False
     force: bool = False
 
     def __post_init__(self) -> None:
         if self.workers < 1:
             raise GearError(f"workers must be at least 1, got {self.workers}")
+        self.chosen_shard()
+
+    def chosen_shard(self) -> Shard | None:
+        """The part of the split that is collected; None for all of it.
+
+        Raises:
+            GearError: the shard is not `I/N` with 1 ≤ I ≤ N.
+        """
+        return None if self.shard is None else Shard.parse(self.shard)
 
     def loaded(self) -> CollectionConfig:
         """The collection config: the values of a file, overridden by the request's.

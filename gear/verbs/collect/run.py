@@ -31,6 +31,7 @@ def collect(
     settings: Iterable[str] = (),
     engine: str = DEFAULT,
     workers: int = 1,
+    shard: str | None = None,
     in_subprocess: bool = False,
     force: bool = False,
     progress: bool = False,
@@ -48,6 +49,9 @@ def collect(
         settings: further `KEY=VALUE` texts for any key of the config.
         engine: name of the engine that makes the samples; `processes` are those of this machine.
         workers: number of workers of the engine; they change nothing but time.
+        shard: `I/N`, to collect the I-th of N parts of the split. Sequences stay whole. Shards may be collected in any
+            order, at any time and on any machine. A run without a shard makes what is missing and closes the split;
+            `gear.merge` joins shards of separate folders.
         in_subprocess: whether a single worker is a process of its own, too, which gives all its memory back.
         force: replaces a split that was made with another configuration.
         progress: shows a progress bar.
@@ -75,6 +79,7 @@ def collect(
         settings=tuple(settings),
         engine=engine,
         workers=workers,
+        shard=shard,
         in_subprocess=in_subprocess,
         force=force,
     )
@@ -93,4 +98,5 @@ def run_collect(request: CollectRequest, callbacks: Callbacks) -> CollectReport:
     for note in job.notes:
         callbacks.on_warning(note)
     executor = executor_of(job, request.workers, engine=request.engine, in_subprocess=request.in_subprocess)
-    return run_job(job, executor=executor, force=request.force, callbacks=callbacks)
+    shard = request.chosen_shard()
+    return run_job(job, executor=executor, force=request.force, shard=shard, callbacks=callbacks)

@@ -17,6 +17,7 @@ from gear.cli.commands import (
     evaluate,
     export,
     gap,
+    merge,
     models,
     new,
     plugins,
@@ -30,7 +31,7 @@ from gear.cli.commands import (
 from gear.cli.main import COMMANDS, full_parser
 
 MODULES = [
-    attack, bench, collect, completion, defend, doctor, evaluate, export, gap, models, new, plugins, sheet,
+    attack, bench, collect, completion, defend, doctor, evaluate, export, gap, merge, models, new, plugins, sheet,
     show_config, towns, train, view, weights,
 ]  # fmt: skip
 

@@ -1,0 +1,210 @@
+"""Joins folders that each hold some samples of the same split, such as shards of several machines, into one folder.
+
+Each sample costs the same, however many there are: its sidecar and files are read once, checked against their hashes,
+and written once. Nothing is kept in memory but which folder has which sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.dataset.files import inside, read_bytes, write_whole
+from gear.dataset.guarded_paths import owned, remove_file, remove_tree
+from gear.dataset.hashing import in_threads
+from gear.dataset.layout import GEAR, patch_path, sidecar_path, split_folder
+from gear.dataset.locks import is_at_work
+from gear.dataset.plan import Plan, differences, read_plan, write_plan
+from gear.dataset.reading import check_hash
+from gear.dataset.sidecar import read_sidecar
+from gear.dataset.store import plan_of
+from gear.values.counted import counted
+from gear.values.errors import DatasetError
+from gear.values.progress import Progress
+from gear.values.serial import Json
+
+SAMPLES_AT_A_TIME = 256
+"""Samples that are handed to the copying threads at a time."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """The folders that hold samples of one split.
+
+    Attributes:
+        plan: of the split, the same in each folder.
+        roots: the folders.
+        homes: by index of a sample, the positions in `roots` of the folders that have it.
+    """
+
+    plan: Plan
+    roots: tuple[Path, ...]
+    homes: tuple[tuple[int, ...], ...]
+
+    @property
+    def split(self) -> str:
+        """Name of the split."""
+        return self.plan.info.split
+
+
+def find_parts(roots: Sequence[Path], split: str) -> Parts:
+    """Finds the samples of a split in several folders, of which each must have the same plan of it.
+
+    Args:
+        roots: datasets, not all of which need to have the split.
+        split: its name.
+
+    Raises:
+        DatasetError: two folders were made with different configurations, a run is at work in one, or a sample is in
+            none.
+    """
+    having = tuple(root for root in roots if inside(root, f"{split_folder(split)}/plan.json").exists())
+    plans = [plan_of(root, split) for root in having]
+    for root, plan in zip(having, plans, strict=True):
+        _refuse_other_plan(having[0], plans[0], root, plan)
+        if is_at_work(inside(root, split_folder(split))):
+            raise DatasetError(root, f"a run is making split {split!r} just now; wait for its end")
+    homes: list[list[int]] = [[] for _ in range(plans[0].samples)]
+    for position, root in enumerate(having):
+        folder = inside(root, f"{split_folder(split)}/samples")
+        for path in folder.glob("*.json") if folder.is_dir() else ():
+            if path.stem.isdecimal() and int(path.stem) < len(homes):
+                homes[int(path.stem)].append(position)
+    lacking = [index for index, home in enumerate(homes) if not home]
+    if lacking:
+        problem = f"{len(lacking)} of {counted(len(homes), 'sample')} of split {split!r} are in none of the folders"
+        remedy = "collect the missing shard, or run the same `gear collect` without --shard in one of the folders"
+        raise DatasetError(having[0], f"{problem} (first: sample {lacking[0]}); {remedy}")
+    return Parts(plan=plans[0], roots=having, homes=tuple(tuple(home) for home in homes))
+
+
+def _refuse_other_plan(first_root: Path, first: Plan, root: Path, plan: Plan) -> None:
+    """Refuses a folder whose plan of the split is not the one of the first folder.
+
+    Raises:
+        DatasetError: says what differs.
+    """
+    places = (f"in {first_root}", f"in {root}")
+    what = differences({"plan": first.as_json()}, {"plan": plan.as_json()}, places=places)
+    if what:
+        more = f" and {len(what) - 2} more" if len(what) > 2 else ""
+        problem = f"split {plan.info.split!r} was made with another configuration"
+        remedy = "merge only folders that the same command has made"
+        raise DatasetError(root, f"{problem} ({'; '.join(what[:2])}{more}); {remedy}")
+
+
+def prepare_merge(root: Path, plans: Sequence[Plan]) -> None:
+    """Empties the folder that is to be filled, unless a stopped merge of the same splits has left it.
+
+    Args:
+        root: the folder, which holds no link.
+        plans: of the splits that are merged.
+
+    Raises:
+        DatasetError: the disk refuses.
+    """
+    wanted = {plan.info.split: plan.as_json() for plan in plans}
+    there: dict[str, Json] = {}
+    for path in sorted(root.glob(f"{GEAR}/*/plan.json")):
+        try:
+            found = read_plan(root, path.parent.name)
+        except DatasetError:
+            found = None
+        there[path.parent.name] = None if found is None else found.as_json()
+    if any(wanted.get(split) != plan for split, plan in there.items()):
+        for entry in sorted(root.iterdir()):
+            (remove_tree if entry.is_dir() else remove_file)(root, entry.name)
+        there = {}
+    for plan in plans:
+        if there.get(plan.info.split) != wanted[plan.info.split]:
+            write_plan(root, plan)
+
+
+def copy_patches(parts: Parts, out: Path, check: Callable[[Mapping[str, Path]], None]) -> None:
+    """Copies the pictures of the patch that a split shows.
+
+    Args:
+        parts: the folders; where several have the pictures, those must be the same.
+        out: the folder that is filled.
+        check: called with the paths of the pictures by name; raises where they are not those of the plan.
+
+    Raises:
+        DatasetError: two folders have different pictures, or none has any.
+    """
+    label = parts.plan.patch["label"]
+    chosen: dict[str, bytes] = {}
+    for root in parts.roots:
+        folder = inside(root, patch_path(label, "patch_0.png")).parent
+        paths = {path.name: path for path in sorted(folder.glob("patch_*.png")) if inside(root, _of(root, path))}
+        pictures = {name: read_bytes(path) for name, path in paths.items()}
+        if not pictures:
+            continue
+        if not chosen:
+            check(paths)
+            chosen = pictures
+        elif pictures != chosen:
+            raise DatasetError(folder, f"holds other pictures than {parts.roots[0]}; repair it with `gear verify`")
+    for name, data in chosen.items():
+        _put(out, patch_path(label, name), data)
+
+
+def copy_samples(parts: Parts, out: Path, on_progress: Progress) -> None:
+    """Copies all samples of a split: for each one its files, and its sidecar last. Samples that are there are kept.
+
+    Args:
+        parts: the folders that have the samples.
+        out: the folder that is filled.
+        on_progress: called after every sample.
+
+    Raises:
+        DatasetError: a file is missing or damaged, leads outside its folder, or two samples name the same file.
+    """
+    total = len(parts.homes)
+    on_progress(0, total)
+    for start in range(0, total, SAMPLES_AT_A_TIME):
+        some = range(start, min(start + SAMPLES_AT_A_TIME, total))
+        for index, _ in zip(some, in_threads(lambda index: _copy_sample(parts, out, index), some), strict=True):
+            on_progress(index + 1, total)
+
+
+def _copy_sample(parts: Parts, out: Path, index: int) -> None:
+    """Copies one sample from the first folder that has it.
+
+    Raises:
+        DatasetError: as `copy_samples`.
+    """
+    relative = sidecar_path(parts.split, index)
+    first, *others = (parts.roots[position] for position in parts.homes[index])
+    data = read_bytes(inside(first, relative))
+    for other in others:
+        if read_bytes(inside(other, relative)) != data:
+            problem = f"is another sample than that of {first}; check both folders with `gear verify`"
+            raise DatasetError(inside(other, relative), problem)
+    target = owned(out, relative)
+    if target.is_file() and read_bytes(target) == data:  # of a merge that was stopped
+        return
+    files = read_sidecar(inside(first, relative)).files
+    own = f"{split_folder(parts.split)}/"
+    for name, digest in sorted(files.items()):
+        if name.startswith((f"{own}samples/", f"{own}begun/", f"{own}plan.json", f"{own}manifest.json")):
+            raise DatasetError(inside(first, relative), f"names {name}, which is no file of a sample")
+        _put(out, name, check_hash(first, name, digest))
+    _put(out, relative, data)
+
+
+def _put(out: Path, relative: str, data: bytes) -> None:
+    """Writes a file that is not there.
+
+    Raises:
+        DatasetError: a file of that name with other content is there.
+    """
+    target = owned(out, relative)
+    if not target.exists():
+        write_whole(out, relative, data)
+    elif read_bytes(target) != data:
+        raise DatasetError(target, "belongs to two samples, or is another one in two of the folders")
+
+
+def _of(root: Path, path: Path) -> str:
+    return path.relative_to(root).as_posix()

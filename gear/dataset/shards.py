@@ -1,0 +1,50 @@
+"""Shards: the parts of a split that several runs make, on any machine and in any order."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from gear.values.errors import GearError
+
+_WRITTEN = re.compile(r"([0-9]{1,9})/([0-9]{1,9})")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shard:
+    """One part of a split: every `count`-th sequence of it.
+
+    Sequences are dealt out in turn, so that a sequence stays in its shard when the split is extended.
+
+    Attributes:
+        number: of this shard, from 1 to `count`.
+        count: number of shards.
+    """
+
+    number: int
+    count: int
+
+    @classmethod
+    def parse(cls, text: str) -> Shard:
+        """A shard from `I/N`.
+
+        Raises:
+            GearError: the text is not `I/N` with 1 ≤ I ≤ N.
+        """
+        found = _WRITTEN.fullmatch(text)
+        shard = cls(number=int(found[1]), count=int(found[2])) if found else None
+        if shard is None or not 1 <= shard.number <= shard.count:
+            problem = "must be I/N with I from 1 to N, such as 2/8 for the second of eight shards"
+            raise GearError(f"shard {text!r}: {problem}")
+        return shard
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+    def holds(self, sequence: int) -> bool:
+        """Whether a sequence, counted from 0, is part of this shard."""
+        return sequence % self.count == self.number - 1
+
+
+WHOLE = Shard(number=1, count=1)
+"""The shard that is the whole split."""

@@ -1,0 +1,127 @@
+"""`gear.merge`: shards in separate folders become one dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+
+from gear.collecting.patch_sources import digest_of, read_patch
+from gear.contracts.tasks import NO_PATCH
+from gear.dataset.merging import Parts, copy_patches, copy_samples, find_parts, prepare_merge
+from gear.dataset.plan import manifest_facts, refuse_other_tasks
+from gear.dataset.sealed_json import REPAIR, DamagedError
+from gear.dataset.store import Store, splits_of
+from gear.dataset.whole_tree import check_target, whole_tree
+from gear.plugins.build import blamed, find, name_of_task
+from gear.plugins.datasets import task_of
+from gear.reporting.display import displayed
+from gear.values.counted import counted
+from gear.values.errors import DatasetError, GearError
+from gear.values.progress import Callbacks, Progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MergeReport:
+    """The result of a merge.
+
+    Attributes:
+        root: folder of the new dataset.
+        samples: number of samples of each split, by its name.
+        sources: number of folders that were joined.
+    """
+
+    root: Path
+    samples: Mapping[str, int]
+    sources: int
+
+    def summary(self) -> str:
+        """The result in one line."""
+        splits = ", ".join(f"{counted(count, 'sample')} in split {name!r}" for name, count in self.samples.items())
+        return f"{self.root}: {splits} from {counted(self.sources, 'folder')}"
+
+
+def merge(
+    datasets: Iterable[str | Path],
+    *,
+    out: str | Path,
+    progress: bool = False,
+    on_progress: Progress | None = None,
+) -> MergeReport:
+    """Joins folders with shards of the same collection into one dataset, and closes its splits.
+
+    The result is byte for byte the folder that one run would have made. It is written into a hidden folder beside its
+    place, which is renamed when it is whole; after a merge that was killed, the same command takes up what is there.
+    The folders that are read stay as they are.
+
+    Args:
+        datasets: roots, each with some samples of one or several splits.
+        out: folder of the new dataset; must be empty or new.
+        progress: shows a progress bar.
+        on_progress: called after every sample with (samples so far, samples of the split).
+
+    Raises:
+        DatasetError: the folders were made with different configurations, a sample is in none of them, a file is
+            damaged or leads outside its folder, `out` holds something, or the disk refuses.
+        UnknownNameError: the plugin of the task is not installed.
+    """
+    roots, target = [Path(root) for root in datasets], Path(out).resolve()
+    if not roots:
+        raise GearError("merge: no folder was given; name the folders with the shards")
+    parts = [find_parts(roots, split) for split in sorted({split for root in roots for split in splits_of(root)})]
+    for one in parts:
+        _check_versions(one)
+        for root in roots:
+            refuse_other_tasks(root, one.plan)
+    check_target(target, "merge")
+    for root in roots:
+        if target.is_relative_to(root.resolve()):
+            raise DatasetError(target, f"lies in {root}, which is merged; use another --out")
+    with (
+        whole_tree(target, "merge", is_kept=True) as unfinished,
+        displayed(Callbacks.of(on_progress=on_progress), "merge", progress=progress) as shown,
+    ):
+        prepare_merge(unfinished, [one.plan for one in parts])
+        for one in parts:
+            if one.plan.patch["label"] != NO_PATCH:
+                copy_patches(one, unfinished, partial(_check_patch, one))
+            copy_samples(one, unfinished, shown.on_progress)
+            with blamed(find("task", name_of_task(one.plan.task)), "finalise"):
+                Store(unfinished, one.plan).close(task_of(one.roots[0], one.plan), manifest_facts(one.plan))
+    return MergeReport(root=Path(out), samples={one.split: one.plan.samples for one in parts}, sources=len(roots))
+
+
+def _check_versions(parts: Parts) -> None:
+    """Refuses samples of another version of gear or of the task, which would get other index files here.
+
+    Raises:
+        DatasetError: names both versions.
+        UnknownNameError: the plugin of the task is not installed.
+    """
+    owner = find("task", name_of_task(parts.plan.task)).owner
+    made_by = parts.plan.task.get("package", "?"), parts.plan.task.get("version", "?")
+    if made_by != (owner.package, owner.version):
+        raise _other_version(parts, *made_by, f"{owner.package} {owner.version}")
+    versions = parts.plan.content.get("versions") if isinstance(parts.plan.content, dict) else None
+    made = versions.get("gear", "?") if isinstance(versions, dict) else "?"
+    if made not in (installed := version("mujoco-gear"), "source"):
+        raise _other_version(parts, "mujoco-gear", str(made), f"mujoco-gear {installed}")
+
+
+def _other_version(parts: Parts, package: str, made_by: str, installed: str) -> DatasetError:
+    problem = f"split {parts.split!r} was made by {package} {made_by}, this is {installed}"
+    return DatasetError(parts.roots[0], f"{problem}; merge it with the version that made it")
+
+
+def _check_patch(parts: Parts, pictures: Mapping[str, Path]) -> None:
+    """Refuses pictures of a patch that are not those of the plan.
+
+    Raises:
+        DamagedError: other pictures, or another number of them.
+        PatchError: one cannot be read.
+    """
+    ordered = [path for _, path in sorted(pictures.items(), key=lambda item: (len(item[0]), item[0]))]
+    if digest_of(read_patch(path) for path in ordered) != parts.plan.patch["sha256"]:
+        raise DamagedError(ordered[0].parent, f"are not the pictures of the patch that was collected; {REPAIR}")
