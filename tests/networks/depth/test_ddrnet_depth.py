@@ -63,7 +63,7 @@ def test_it_learns_a_street(precision: str, memory: torch.memory_format) -> None
 
     At half precision in the order of memory that `gear train` takes then.
     """
-    task = DepthTask(DepthConfig(width_px=192, height_px=96))
+    task = DepthTask(DepthConfig(width_px=96, height_px=64))
     samples = [task.ground_truth(*synthetic_frame(task.rig(), index=index, seed=5)) for index in range(4)]
     shown = as_batch([sample.images for sample in samples])
     pictures = {name: picture.contiguous(memory_format=memory) for name, picture in shown.items()}
