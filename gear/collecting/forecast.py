@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable
 
 from gear.contracts.tasks import Sidecar
 from gear.dataset.files import inside
+from gear.dataset.free_space import check_free_space, free_bytes, size_text
 from gear.dataset.layout import sidecar_path
 from gear.dataset.sidecar import read_sidecar
 from gear.dataset.store import Store
 from gear.reporting.pace import duration_text
-from gear.values.errors import GearError
 from gear.values.progress import Warn
 
 FIRST = 3
@@ -20,8 +19,6 @@ FIRST = 3
 
 LARGE_BYTES, LONG_S = 2 * 10**9, 1800.0
 """A collection that needs more is announced with its size and time."""
-
-UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB")
 
 
 class Forecast:
@@ -57,27 +54,19 @@ class Forecast:
     def _forecast(self) -> None:
         made = len(self._sizes)
         needed = sum(self._sizes) / made * (self._missing - made)
-        free = shutil.disk_usage(self._store.root).free
-        if needed > free:
-            raise GearError(
-                f"{self._store.root}: {self._missing} samples need about {size_text(needed)} more, and "
-                f"{size_text(free)} are free there; collect fewer with --samples N, or give --out on another disk"
-            )
+        check_free_space(
+            self._store.root,
+            needed,
+            what=f"the missing ones of {self._missing} samples need",
+            advice="collect fewer with --samples N, or give --out on another disk",
+        )
         each_s = (self._clock_s() - self._first_s) / max(made - 1, 1)  # the first one includes compiling the world
         left_s = each_s * (self._missing - made)
         if needed > LARGE_BYTES or left_s > LONG_S:
             self._on_warning(
-                f"{self._missing} samples need about {size_text(needed)} of the {size_text(free)} that are free, and "
-                f"{duration_text(left_s)}"
+                f"{self._missing} samples need about {size_text(needed)} of the "
+                f"{size_text(free_bytes(self._store.root))} that are free, and {duration_text(left_s)}"
             )
-
-
-def size_text(size: float) -> str:
-    """A size for a person, in powers of 1000: `3.2 GB`."""
-    power = 0
-    while size >= 999.5 and power < len(UNITS) - 1:
-        size, power = size / 1000, power + 1
-    return f"{size:.0f} {UNITS[power]}" if power == 0 or size >= 99.5 else f"{size:.2g} {UNITS[power]}"
 
 
 def _bytes_of(store: Store, index: int) -> int:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from gear.dataset.files import read_bytes, write_whole
+from gear.dataset.files import inside, read_bytes, write_whole
+from gear.dataset.free_space import check_free_space
 from gear.dataset.guarded_paths import owned, remove_empty_folders, remove_files
 from gear.dataset.reading import check_hash
 from gear.dataset.store import check_output, plan_of, splits_of
@@ -50,6 +51,7 @@ def export(
     source, target = Path(dataset), Path(out).resolve()
     splits: list[SplitRecords] = []
     hashes: dict[str, str] = {}
+    auxiliary: set[str] = set()
     for name in splits_of(source):
         plan = plan_of(source, name)
         if plan.task["name"] != known[layout].task:
@@ -61,9 +63,16 @@ def export(
         records = tuple(sidecar.record for sidecar in sidecars)
         for sidecar in sidecars:
             hashes |= sidecar.files
+            auxiliary |= {one.path for one in sidecar.auxiliary.values()}
         splits.append(SplitRecords(info=plan.info, records=records))
     tree = known[layout].tree(splits, lambda path: check_hash(source, path, hashes.get(path, "")))
     check_target(target, "export")
+    check_free_space(
+        target,
+        sum(inside(source, path).stat().st_size for path in hashes.keys() - auxiliary),
+        what="the exported files need",
+        advice="give --out on another disk",
+    )
     check_output(unfinished_place(target, "export"), "delete it, or use another --out")
     with (
         whole_tree(target, "export") as unfinished,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import pytest
 
 from gear.collecting import forecast
-from gear.collecting.forecast import Forecast, size_text
+from gear.collecting.forecast import Forecast
 from gear.values.errors import GearError
 
 
@@ -19,7 +20,7 @@ def run(
     """The lines that a collection of equal samples is announced with."""
     now_s, said = [0.0], list[str]()
     monkeypatch.setattr(forecast, "_bytes_of", lambda store, index: sample_bytes)
-    monkeypatch.setattr(forecast.shutil, "disk_usage", lambda root: SimpleNamespace(free=free))
+    monkeypatch.setattr(shutil, "disk_usage", lambda root: SimpleNamespace(free=free))
     store: Any = SimpleNamespace(root=Path("data"))
     watched = Forecast(store, samples, said.append, lambda: now_s[0])
     for index in range(min(samples, 10)):
@@ -29,7 +30,7 @@ def run(
 
 
 def test_a_collection_that_the_disk_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = r"data: 1000000 samples need about 12 TB more, and 20 GB are free there; collect fewer with --samples"
+    problem = r"data: the missing ones of 1000000 samples need about 12 TB, and 20 GB are free there; collect fewer with"
     with pytest.raises(GearError, match=problem):
         run(monkeypatch, samples=1_000_000, sample_bytes=12_000_000, free=20_000_000_000)
     assert run(monkeypatch, samples=100, sample_bytes=10_000, free=970_000) == []
@@ -42,9 +43,3 @@ def test_a_large_one_is_announced_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert said == ["7203 samples need about 7.2 GB of the 1 TB that are free, and 4.0 hours"]
     assert run(monkeypatch, samples=1000, sample_bytes=1000, free=10**12) == []
     assert run(monkeypatch, samples=1, sample_bytes=1000, free=10**12) == []
-
-
-def test_sizes_in_words() -> None:
-    assert [size_text(size) for size in (3, 999, 1000, 4.24e6, 105e9, 2e20)] == [
-        "3 bytes", "999 bytes", "1 kB", "4.2 MB", "105 GB", "200000 PB",
-    ]  # fmt: skip

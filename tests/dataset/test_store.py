@@ -4,12 +4,14 @@ import dataclasses
 import json
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -149,6 +151,14 @@ def test_exports_go_into_new_folders_and_fit_their_task(tmp_path: Path) -> None:
         export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
     with pytest.raises(DatasetError, match="the layout 'kitti' is for stereo3d"):
         export(tmp_path / "a", layout="kitti", out=tmp_path / "c")
+
+
+def test_an_export_that_does_not_fit_its_disk_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fill(tmp_path / "a", plan())
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=1000))
+    with pytest.raises(GearError, match=r"the exported files need about .* kB, and 1 kB are free there"):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
 def test_an_export_that_is_stopped_leaves_nothing_and_can_be_given_again(tmp_path: Path) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -102,6 +104,14 @@ def test_it_is_taken_up_again_and_gives_the_same(stereo: Path, tmp_path: Path) -
     (folder / "plan.json").write_text("{")
     with pytest.raises(DatasetError, match=r"plan.json: is not JSON .*; use another --out, or delete this folder$"):
         defend(stereo, defense="lgs", out=tmp_path / "clean")
+
+
+def test_pictures_that_do_not_fit_the_disk_are_refused(
+    stereo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=1000))
+    with pytest.raises(GearError, match=r"1 more cleaned sample will need about .* kB, and 1 kB are free there"):
+        defend(stereo, defense="jpeg", out=tmp_path / "clean")
 
 
 def test_bad_input_is_refused_before_anything_is_written(stereo: Path, tmp_path: Path) -> None:

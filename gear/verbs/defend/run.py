@@ -12,6 +12,7 @@ from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.specs import DefenseSpec
 from gear.dataset.files import clear_scratch, explained, inside, write_whole
+from gear.dataset.free_space import check_free_space
 from gear.dataset.json_text import dump_json, load_json
 from gear.dataset.store import check_output
 from gear.measuring.checked_defense import CheckedDefense
@@ -120,7 +121,14 @@ def run_defend(request: DefendRequest, callbacks: Callbacks) -> DefendReport:
     for finished, index in enumerate(missing, count - len(missing) + 1):
         sample = opened[index]
         result = guard.apply(sample.images, derive_rng(request.seed, "defend", spec.name, index), index)
-        markers[index] = write_sample(root, opened, index, sample, spec, result)
+        markers[index] = marker = write_sample(root, opened, index, sample, spec, result)
+        if finished == count - len(missing) + 1:
+            check_free_space(
+                root,
+                (len(missing) - 1) * sum(inside(root, path).stat().st_size for path in marker.files),
+                what=f"{counted(len(missing) - 1, 'more cleaned sample')} will need",
+                advice="give --out on another disk",
+            )
         callbacks.on_progress(finished, count)
     if "score" in spec.outputs:
         scores = [marker.score for marker in markers.values() if marker is not None]
