@@ -30,7 +30,7 @@ def run(
 
 
 def test_a_collection_that_the_disk_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = r"data: the missing ones of 1000000 samples need about 12 TB, and 20 GB are free there; collect fewer with"
+    problem = r"data: the missing ones of 1000000 samples need about 12 TB, and 20 GB are free there; collect fewer"
     with pytest.raises(GearError, match=problem):
         run(monkeypatch, samples=1_000_000, sample_bytes=12_000_000, free=20_000_000_000)
     assert run(monkeypatch, samples=100, sample_bytes=10_000, free=970_000) == []
