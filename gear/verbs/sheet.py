@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from gear.contracts.legends import ColourNames, WithLegends
 from gear.contracts.tasks import Sample
 from gear.dataset.files import refuse_folder, write_alone
 from gear.dataset.output_checks import check_previews
 from gear.plugins.build import blamed, find, name_of_task
 from gear.plugins.datasets import open_dataset
+from gear.reporting.display import displayed
+from gear.reporting.legend import INK, PAPER, draw_legend
 from gear.values.frames import UInt8Image
+from gear.values.progress import Callbacks, Progress
 
 CELL_WIDTH_PX = 640
 CAPTION_PX = 22
-INK, PAPER = (235, 235, 235), (24, 24, 24)
 
 
-def contact_sheet(path: str | Path, *, split: str | None = None, samples: int = 12) -> UInt8Image:
+def contact_sheet(
+    path: str | Path, *, split: str | None = None, samples: int = 12, on_progress: Progress | None = None
+) -> UInt8Image:
     """Pictures of the first samples, one row each: every preview that the task offers, with its name.
+
+    Below them stand the legends of the previews, where the task has them.
 
     Returns:
         (H, W, 3) uint8 RGB.
@@ -32,12 +40,19 @@ def contact_sheet(path: str | Path, *, split: str | None = None, samples: int = 
     dataset = open_dataset(path, split)
     found = find("task", name_of_task(dataset.plan.task))
     rows: list[UInt8Image] = []
-    for sample in dataset[: min(samples, len(dataset))]:
+    names: list[str] = []
+    count = min(samples, len(dataset))
+    report = Callbacks.of(on_progress=on_progress).on_progress
+    for sample in dataset[:count]:
         with blamed(found, f"preview of sample {sample.record.index}"):
             previews = check_previews(dataset.task.preview(sample))
             if not previews:
                 raise ValueError("there is no picture")
         rows.append(_beside([_cell(picture, caption(sample, name)) for name, picture in previews.items()]))
+        names = list(previews)
+        report(len(rows), count)
+    with blamed(found, "legends"):
+        rows += _legends(dataset.task, names)
     width = max(row.shape[1] for row in rows)
     return np.concatenate([_widened(row, width) for row in rows])
 
@@ -54,17 +69,45 @@ def caption(sample: Sample, name: str) -> str:
     return f"{record.split} {record.index:06d}  {name}  {record.scene}  {surfaces}"
 
 
-def sheet(path: str | Path, out: str | Path = "sheet.png", *, split: str | None = None, samples: int = 12) -> Path:
+def sheet(
+    path: str | Path,
+    out: str | Path = "sheet.png",
+    *,
+    split: str | None = None,
+    samples: int = 12,
+    progress: bool = False,
+    on_progress: Progress | None = None,
+) -> Path:
     """Writes the contact sheet of a dataset as a PNG.
+
+    Args:
+        path: root of a dataset.
+        out: the PNG.
+        split: of the dataset; may be left out where there is only one.
+        samples: number of rows.
+        progress: shows a progress bar.
+        on_progress: called after every sample.
 
     Raises:
         DatasetError: there is nothing to show, or `out` cannot be written.
     """
     target = Path(out)
     refuse_folder(target)
-    data = cv2.imencode(".png", contact_sheet(path, split=split, samples=samples)[..., ::-1])[1].tobytes()
-    write_alone(target, data)
+    with displayed(Callbacks.of(on_progress=on_progress), "sheet", progress=progress) as shown:
+        picture = contact_sheet(path, split=split, samples=samples, on_progress=shown.on_progress)
+    write_alone(target, cv2.imencode(".png", picture[..., ::-1])[1].tobytes())
     return target
+
+
+def _legends(task: object, names: Sequence[str]) -> list[UInt8Image]:
+    """One row with the legend of each preview below it; none where the task has no legends."""
+    if not isinstance(task, WithLegends):
+        return []
+    legends = task.legends()
+    if not any(name in legends for name in names):
+        return []
+    empty = ColourNames(entries=())
+    return [_beside([draw_legend(legends.get(name, empty), CELL_WIDTH_PX) for name in names])]
 
 
 def _cell(picture: UInt8Image, caption: str) -> UInt8Image:

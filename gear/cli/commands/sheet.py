@@ -23,7 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Writes the sheet and prints its path."""
+    from gear.reporting.display import Display
     from gear.verbs.sheet import sheet
 
-    print(sheet(args.dataset, args.out, split=args.split, samples=args.samples))
+    with Display("sheet") as display:
+        on_progress = display.callbacks.on_progress
+        path = sheet(args.dataset, args.out, split=args.split, samples=args.samples, on_progress=on_progress)
+    print(path)
     return 0

@@ -165,6 +165,10 @@ def _read(root: Path, relative: str, decode: Callable[[bytes], npt.NDArray[Any]]
         raise DatasetError(path, f"{error}; {REPAIR}") from error
 
 
+IGNORED_COLOUR = (170, 170, 170)
+"""Colour of objects and regions that evaluations ignore, RGB."""
+
+
 def draw_surfaces(picture: UInt8Image, sample: Sample, camera: str) -> None:
     """Outlines every surface of a view in magenta, in place."""
     for truth in sample.surfaces:

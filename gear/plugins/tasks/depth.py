@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from gear.augment.geometry import Geometry, Window, cut_map, cut_picture, flip_array
 from gear.augment.registry import register
 from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
+from gear.contracts.legends import ColourBar, Legend
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
 from gear.formats import kitti_depth, results
@@ -37,7 +40,8 @@ from gear.values.scene import SceneRecord
 from gear.values.serial import Json
 
 VIEW = "left"
-PREVIEW_MAX_DEPTH_M = 80.0
+PREVIEW_DEPTHS_M = (2.0, 3.0, 5.0, 10.0, 20.0, 40.0, 80.0)
+"""Depths that the preview's legend names; nearer and farther ones have the colours of the ends."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,11 +179,39 @@ class DepthTask:
         """The picture, and inverse depth in colours, nearest red, nothing black."""
         picture = sample.images[VIEW].copy()
         draw_surfaces(picture, sample, VIEW)
-        known = np.isfinite(sample.depth_m)
-        nearness = np.sqrt(2.0 / np.clip(np.where(known, sample.depth_m, PREVIEW_MAX_DEPTH_M), 2.0, None))
-        colours = cv2.applyColorMap((nearness * 255).astype(np.uint8), cv2.COLORMAP_TURBO)[..., ::-1].copy()
-        colours[~known] = 0
+        colours = depth_colours(sample.depth_m)
+        colours[~np.isfinite(sample.depth_m)] = 0
         return {"image": picture, "depth": colours}
+
+    def legends(self) -> Mapping[str, Legend]:
+        """The depths of the preview's colours."""
+        nearness = np.linspace(1.0, _nearness(np.float64(PREVIEW_DEPTHS_M[-1])), 64)
+        colours = depth_colours(PREVIEW_DEPTHS_M[0] / np.square(nearness)[None])[0]
+        places = (1 - _nearness(np.array(PREVIEW_DEPTHS_M))) / (1 - nearness[-1])
+        ticks = zip(places.tolist(), (f"{depth_m:g}" for depth_m in PREVIEW_DEPTHS_M), strict=True)
+        return {
+            "depth": ColourBar(
+                quantity="depth (m)", colours=tuple((int(r), int(g), int(b)) for r, g, b in colours), ticks=tuple(ticks)
+            )
+        }
+
+
+def depth_colours(depth_m: npt.NDArray[np.floating[Any]]) -> UInt8Image:
+    """Colours of depths for people, from red (2 m and nearer) to dark blue (80 m and farther, or unknown).
+
+    Args:
+        depth_m: (H, W) metres; NaN or infinity where it is unknown.
+
+    Returns:
+        (H, W, 3) uint8 RGB. The colour is linear in the square root of inverse depth, so that near things differ most.
+    """
+    levels = (_nearness(np.where(np.isfinite(depth_m), depth_m, PREVIEW_DEPTHS_M[-1])) * 255).astype(np.uint8)
+    return cv2.applyColorMap(levels, cv2.COLORMAP_TURBO)[..., ::-1].copy()
+
+
+def _nearness(depth_m: npt.NDArray[np.floating[Any]] | np.float64) -> Any:
+    """1 at the nearest depth that has a colour of its own, falling with distance."""
+    return np.sqrt(PREVIEW_DEPTHS_M[0] / np.clip(depth_m, PREVIEW_DEPTHS_M[0], PREVIEW_DEPTHS_M[-1]))
 
 
 WHITE_FROM_M = 80.0

@@ -25,6 +25,7 @@ from gear.augment.geometry import (
 from gear.augment.registry import register
 from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
+from gear.contracts.legends import ColourNames, Legend, Rgb
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
 from gear.formats import coco, results, rle
@@ -40,6 +41,7 @@ from gear.groundtruth.visibility import Visibility
 from gear.metrics.coco_ap import CocoEvaluator
 from gear.metrics.coco_reference import TallObjects
 from gear.plugins.tasks.common import (
+    IGNORED_COLOUR,
     CameraOptions,
     check_objects,
     draw_box,
@@ -271,6 +273,12 @@ class Detect2dTask:
         draw_surfaces(picture, sample, VIEW)
         return {"boxes": picture}
 
+    def legends(self) -> Mapping[str, Legend]:
+        """Colours of the categories that occur in gear's worlds, and of regions that evaluations ignore."""
+        occurring = sorted({label.coco_id for label in LABELS if label.coco_id is not None})
+        named = tuple((coco.CATEGORY_NAMES[one], _category_colour(one)) for one in occurring)
+        return {"boxes": ColourNames(entries=(*named, ("ignored", IGNORED_COLOUR)))}
+
     def _picture(self, sidecar: Sidecar) -> coco.Picture:
         picture = self._as_picture(sidecar.record, _objects(sidecar, Path()))
         if self.config.masks == "rle":
@@ -360,10 +368,12 @@ def _annotation(thing: Object2d, camera: CameraRecord) -> coco.Annotation:
     )
 
 
-def _colour(thing: Object2d) -> tuple[int, int, int]:
-    if thing.is_ignored:
-        return (170, 170, 170)
-    hue = np.array([[[thing.category_id * 47 % 180, 200, 255]]], dtype=np.uint8)
+def _colour(thing: Object2d) -> Rgb:
+    return IGNORED_COLOUR if thing.is_ignored else _category_colour(thing.category_id)
+
+
+def _category_colour(category_id: int) -> Rgb:
+    hue = np.array([[[category_id * 47 % 180, 200, 255]]], dtype=np.uint8)
     red, green, blue = (int(v) for v in cv2.cvtColor(hue, cv2.COLOR_HSV2RGB)[0, 0])
     return (red, green, blue)
 

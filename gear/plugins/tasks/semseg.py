@@ -15,6 +15,7 @@ from gear.augment.geometry import Geometry, Window, cut_map, cut_picture, flip_a
 from gear.augment.registry import register
 from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
+from gear.contracts.legends import ColourNames, Legend
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
 from gear.formats import cityscapes, results
@@ -198,6 +199,12 @@ class SemsegTask:
         picture[edge & (instances >= cityscapes.INSTANCE_FACTOR)] = 255
         draw_surfaces(picture, sample, VIEW)
         return {"labels": picture}
+
+    def legends(self) -> Mapping[str, Legend]:
+        """The benchmark's colours of the classes that it evaluates; other classes are not counted."""
+        return {
+            "labels": ColourNames(entries=tuple((one.name, one.rgb) for one in cityscapes.LABELS if one.is_evaluated))
+        }
 
 
 UNLABELLED = 0

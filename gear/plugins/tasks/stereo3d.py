@@ -14,6 +14,7 @@ from gear.augment.pinhole import cut_index_box, index_frame, mirrored_pinhole, w
 from gear.augment.registry import register
 from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
+from gear.contracts.legends import ColourNames, Legend
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
 from gear.dataset.files import read_bytes
@@ -42,6 +43,7 @@ from gear.groundtruth.visibility import Visibility, VisibilityLimits
 from gear.metrics.kitti_ap import KittiEvaluator
 from gear.metrics.kitti_reference import NearCars
 from gear.plugins.tasks.common import (
+    IGNORED_COLOUR,
     CameraOptions,
     check_objects,
     draw_box,
@@ -65,7 +67,6 @@ LEFT, RIGHT = "left", "right"
 LEAST_BASELINE_M, MOST_BASELINE_M = 0.01, 10.0
 COLOURS = {"Car": (60, 220, 60), "Van": (60, 200, 200), "Truck": (80, 140, 255), "Pedestrian": (255, 80, 80)}
 OTHER_COLOUR = (255, 200, 60)
-IGNORED_COLOUR = (170, 170, 170)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -284,6 +285,11 @@ class Stereo3dTask:
         draw_surfaces(left, sample, LEFT)
         draw_surfaces(right, sample, RIGHT)
         return {LEFT: left, RIGHT: right}
+
+    def legends(self) -> Mapping[str, Legend]:
+        """Colours of the boxes by type, and of regions that evaluations ignore."""
+        entries = (*COLOURS.items(), ("other types", OTHER_COLOUR), ("DontCare", IGNORED_COLOUR))
+        return {LEFT: ColourNames(entries=entries)}
 
 
 WIRES = tuple((i, (i + 1) % 4) for i in range(4)) + tuple((i + 4, (i + 1) % 4 + 4) for i in range(4)) + tuple(
