@@ -206,7 +206,8 @@ def depth_colours(depth_m: npt.NDArray[np.floating[Any]]) -> UInt8Image:
         (H, W, 3) uint8 RGB. The colour is linear in the square root of inverse depth, so that near things differ most.
     """
     levels = (_nearness(np.where(np.isfinite(depth_m), depth_m, PREVIEW_DEPTHS_M[-1])) * 255).astype(np.uint8)
-    return cv2.applyColorMap(levels, cv2.COLORMAP_TURBO)[..., ::-1].copy()
+    colours: UInt8Image = cv2.applyColorMap(levels, cv2.COLORMAP_TURBO)[..., ::-1].copy()
+    return colours
 
 
 def _nearness(depth_m: npt.NDArray[np.floating[Any]] | np.float64) -> Any:
