@@ -7,6 +7,8 @@ through the hole.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -115,3 +117,24 @@ def _partners(order: Ints) -> list[int]:
     partners = np.empty(len(order), dtype=np.int64)
     partners[order[0::2]], partners[order[1::2]] = order[1::2], order[0::2]
     return [int(one) for one in partners]
+
+
+def joined_polygons(polygons: Sequence[Sequence[int]]) -> list[int]:
+    """Several polygons as one, for formats that have one polygon per object.
+
+    Each polygon is joined to those before it by a bridge of no width between their two nearest corners. Filled, the
+    result covers what the polygons cover.
+
+    Args:
+        polygons: `x, y, x, y, ...` of each; at least one.
+
+    Returns:
+        `x, y, x, y, ...` of the one polygon.
+    """
+    ring = np.asarray(polygons[0], dtype=np.int64).reshape(-1, 2)
+    for polygon in polygons[1:]:
+        piece = np.asarray(polygon, dtype=np.int64).reshape(-1, 2)
+        distances = ((ring[:, None] - piece[None]) ** 2).sum(axis=2)
+        here, there = divmod(int(distances.argmin()), len(piece))
+        ring = np.concatenate([ring[: here + 1], np.roll(piece, -there, axis=0), piece[there : there + 1], ring[here:]])
+    return [int(value) for value in ring.reshape(-1)]

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, overload
 
+from gear.config.overrides import with_overrides
+from gear.config.reader import read_node
+from gear.contracts.tasks import Sidecar
 from gear.dataset.files import inside, read_bytes, write_whole
 from gear.dataset.free_space import check_free_space
 from gear.dataset.guarded_paths import owned, remove_empty_folders, remove_files
-from gear.dataset.reading import check_hash
+from gear.dataset.layout import GEAR, sidecar_path
+from gear.dataset.reading import Dataset, check_hash
 from gear.dataset.store import check_output, plan_of, splits_of
 from gear.dataset.whole_tree import check_target, unfinished_place, whole_tree
-from gear.formats.exports import SplitRecords, layouts
+from gear.formats.exports.layout import ExportSplit
+from gear.formats.exports.registry import find_layout
+from gear.plugins.build import NO_OPTIONS
 from gear.plugins.datasets import open_dataset
 from gear.reporting.display import displayed
-from gear.values.errors import DatasetError, UnknownNameError
+from gear.values.errors import DatasetError
 from gear.values.progress import Callbacks, Progress
+from gear.values.serial import Json
 
 
 def export(
@@ -23,6 +32,7 @@ def export(
     *,
     layout: str,
     out: str | Path,
+    settings: Iterable[str] = (),
     progress: bool = False,
     on_progress: Progress | None = None,
 ) -> int:
@@ -33,8 +43,9 @@ def export(
 
     Args:
         dataset: root of a dataset whose splits are finished.
-        layout: one of `gear.formats.exports.layouts()`.
+        layout: name of a layout, such as `coco`.
         out: folder of the new tree; must be empty or new.
+        settings: options of the layout as `KEY=VALUE`, each of them.
         progress: shows a progress bar.
         on_progress: called after every file with (files so far, 0): their number is not known before.
 
@@ -43,33 +54,28 @@ def export(
 
     Raises:
         UnknownNameError: there is no such layout.
+        ConfigError: the layout has no such option, or the option has no such value.
+        GearError: the layout needs a package that is not installed.
         DatasetError: the layout is another task's, a split is not finished, `out` holds something, or the disk refuses.
     """
-    known = layouts()
-    if layout not in known:
-        raise UnknownNameError("layout", layout, known)
+    chosen = find_layout(layout)
+    options = read_node(chosen.options, with_overrides(NO_OPTIONS, settings, flag="--set"), "options")
     source, target = Path(dataset), Path(out).resolve()
-    splits: list[SplitRecords] = []
+    splits: list[ExportSplit] = []
     hashes: dict[str, str] = {}
-    auxiliary: set[str] = set()
     for name in splits_of(source):
-        plan = plan_of(source, name)
-        if plan.task["name"] != known[layout].task:
-            raise DatasetError(
-                source, f"is a {plan.task['name']} dataset; the layout {layout!r} is for {known[layout].task}"
-            )
+        task = plan_of(source, name).task["name"]
+        if chosen.tasks and task not in chosen.tasks:
+            problem = f"is a {task} dataset; the layout {layout!r} is for {' and '.join(chosen.tasks)}"
+            raise DatasetError(source, problem)
         opened = open_dataset(source, name)
-        sidecars = [opened.sidecar(index) for index in range(len(opened))]
-        records = tuple(sidecar.record for sidecar in sidecars)
-        for sidecar in sidecars:
-            hashes |= sidecar.files
-            auxiliary |= {one.path for one in sidecar.auxiliary.values()}
-        splits.append(SplitRecords(info=plan.info, records=records))
-    tree = known[layout].tree(splits, lambda path: check_hash(source, path, hashes.get(path, "")))
+        splits.append(_split_of(opened, task))
+        hashes |= _hashes(opened.manifest)
+    tree = chosen.tree(splits, lambda path: check_hash(source, path, hashes.get(path, "")), options)
     check_target(target, "export")
     check_free_space(
         target,
-        sum(inside(source, path).stat().st_size for path in hashes.keys() - auxiliary),
+        _size_of(source, hashes),
         what="the exported files need",
         advice="give --out on another disk",
     )
@@ -79,13 +85,59 @@ def export(
         displayed(Callbacks.of(on_progress=on_progress), "export", progress=progress, unit="file") as shown,
     ):
         _write_tree(unfinished, tree, shown.on_progress)
-    return sum(len(split.records) for split in splits)
+    return sum(len(split.sidecars) for split in splits)
+
+
+@dataclass(frozen=True, slots=True)
+class _Sidecars(Sequence[Sidecar]):
+    """The sidecars of a split, each read from the disk when it is accessed."""
+
+    opened: Dataset[Any]
+
+    def __len__(self) -> int:
+        return len(self.opened)
+
+    @overload
+    def __getitem__(self, index: int) -> Sidecar: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Sidecar]: ...
+    def __getitem__(self, index: int | slice) -> Sidecar | Sequence[Sidecar]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        return self.opened.sidecar(index)
+
+
+def _split_of(opened: Dataset[Any], task: str) -> ExportSplit:
+    """What a layout is given of a split."""
+    info = opened.plan.info
+    paths = [sidecar_path(info.split, index) for index in range(len(opened))]
+    return ExportSplit(info=info, task=task, sidecars=_Sidecars(opened), sidecar_paths=paths, manifest=opened.manifest)
+
+
+def _hashes(manifest: Json) -> dict[str, str]:
+    """SHA-256 of every file that a manifest lists, by path."""
+    hashes: dict[str, str] = {**manifest["indexes"], **manifest.get("sidecars", {})}
+    for sample in manifest["samples"]:
+        hashes |= sample["files"]
+    return hashes
+
+
+def _size_of(root: Path, files: Iterable[str]) -> int:
+    """Bytes of the files that are there, without gear's own, such as sidecars and probes."""
+    paths = [inside(root, path) for path in files if not path.startswith(f"{GEAR}/")]
+    return sum(path.stat().st_size for path in paths if path.is_file())
 
 
 def _write_tree(root: Path, tree: Iterable[tuple[str, bytes]], on_progress: Progress) -> None:
-    """Writes what is missing of a tree, and deletes what an earlier export, that was killed, left of another one."""
+    """Writes what is missing of a tree, and deletes what an earlier export, that was killed, left of another one.
+
+    Raises:
+        DatasetError: two samples are to be in one file, or the disk refuses.
+    """
     written: set[str] = set()
     for relative, data in tree:
+        if relative in written:
+            raise DatasetError(root, f"two samples of the dataset have the same name {relative!r} in this layout")
         path = owned(root, relative)
         if not (path.is_file() and read_bytes(path) == data):
             write_whole(root, relative, data)

@@ -6,18 +6,21 @@ import argparse
 
 EXAMPLE = """examples:
   gear export data/stereo3d/town10-billboard01-ClearNoon/none --layout kitti --out kitti/
-  gear export data/depth/town10-billboard01-ClearNoon/none --layout kitti-depth --out depth/
+  gear export data/detect2d/town10-billboard01-ClearNoon/none --layout yolo --set labels=polygons --out yolo/
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags to its parser."""
+    from gear.formats.exports.registry import layout_names
+
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset")
-    parser.add_argument(
-        "--layout", required=True, help="kitti (object, one training/ pool) or kitti-depth (the devkit's)"
-    )
+    parser.add_argument("--layout", required=True, help=f"{', '.join(layout_names())}")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder of the new tree; must be empty or new")
+    parser.add_argument(
+        "--set", action="append", default=[], dest="settings", metavar="KEY=VALUE", help="option of the layout"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -26,6 +29,12 @@ def run(args: argparse.Namespace) -> int:
     from gear.verbs.export import export
 
     with Display("export", unit="file") as display:
-        count = export(args.dataset, layout=args.layout, out=args.out, on_progress=display.callbacks.on_progress)
+        count = export(
+            args.dataset,
+            layout=args.layout,
+            out=args.out,
+            settings=args.settings,
+            on_progress=display.callbacks.on_progress,
+        )
     print(f"{args.out}: {count} samples in the layout {args.layout}")
     return 0

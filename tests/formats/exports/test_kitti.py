@@ -4,15 +4,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from gear.formats.export_kitti import kitti_tree
-from gear.formats.exports import SplitRecords
+from gear.formats.exports.kitti import kitti_tree
+from gear.formats.exports.layout import NoOptions
 from gear.formats.kitti_object import parse_labels
 from gear.plugins.tasks.stereo3d import stereo3d
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.task_contract import INFO
 from gear.values.rig import CameraMount, Rig
 from gear.values.scene import SceneRecord
-from tests.formats.exported import collected, export
+from tests.formats.exports.trees import exported, split_of, written
 
 RIG = Rig(cameras=(CameraMount(name="left", width_px=16, height_px=16),))
 
@@ -22,13 +22,13 @@ def records(indices: Sequence[int]) -> tuple[SceneRecord, ...]:
 
 
 def test_kitti_is_one_pool_with_lists(tmp_path: Path) -> None:
-    val = collected(tmp_path, stereo3d, {"width_px": 306, "height_px": 92})
+    val = written(tmp_path, stereo3d, {"width_px": 306, "height_px": 92})
     for folder in ("image_2", "image_3", "calib", "label_2"):
         (tmp_path / "train" / folder).mkdir(parents=True)
         for path in (tmp_path / "val" / folder).glob("000000.*"):
             (tmp_path / "train" / folder / path.name).write_bytes(path.read_bytes())
-    train = replace(val, info=replace(INFO, split="train"), records=val.records[:1])
-    files = export("kitti", [train, val], tmp_path)
+    train = replace(val, info=replace(INFO, split="train"), sidecars=val.sidecars[:1])
+    files = exported("kitti", [train, val], tmp_path)
     assert files["ImageSets/train.txt"] == b"000000\n"
     assert files["ImageSets/val.txt"] == b"000001\n000002\n"
     assert files["ImageSets/trainval.txt"] == b"000000\n000001\n000002\n"
@@ -40,10 +40,10 @@ def test_kitti_is_one_pool_with_lists(tmp_path: Path) -> None:
 def test_every_file_comes_from_its_own_split_and_index() -> None:
     """Three splits, one with a gap in its indices; the lists of the benchmark keep the order of the ids."""
     splits = [
-        SplitRecords(info=replace(INFO, split=name), records=records(indices))
+        split_of(replace(INFO, split=name), "stereo3d", *records(indices))
         for name, indices in (("val", (0, 3)), ("test", (5,)), ("train", (1, 2)))
     ]
-    files = dict(kitti_tree(splits, str.encode))
+    files = dict(kitti_tree(splits, str.encode, NoOptions()))
     sources = ["val/{}/000000", "val/{}/000003", "test/{}/000005", "train/{}/000001", "train/{}/000002"]
     expected = {
         f"training/{folder}/{number:06d}.{suffix}": f"{source.format(folder)}.{suffix}".encode()
@@ -61,5 +61,7 @@ def test_every_file_comes_from_its_own_split_and_index() -> None:
 
 def test_one_list_alone_makes_no_trainval() -> None:
     for name in ("train", "val"):
-        split = SplitRecords(info=replace(INFO, split=name), records=records((0,)))
-        assert [path for path, _ in kitti_tree([split], str.encode) if "ImageSets" in path] == [f"ImageSets/{name}.txt"]
+        split = split_of(replace(INFO, split=name), "stereo3d", *records((0,)))
+        assert [path for path, _ in kitti_tree([split], str.encode, NoOptions()) if "ImageSets" in path] == [
+            f"ImageSets/{name}.txt"
+        ]

@@ -3,11 +3,11 @@ reads."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from gear.formats.exports import Read, SplitRecords
+from gear.formats.exports.layout import ExportSplit, Layout, NoOptions, Read, Tree
 from gear.formats.kitti_depth import intrinsics_text
 from gear.formats.png import decode_plain, decode_rgb, encode_labels, encode_rgb
 from gear.values.scene import SceneRecord
@@ -15,7 +15,7 @@ from gear.values.scene import SceneRecord
 CROP_WIDTH_PX, CROP_HEIGHT_PX = 1216, 352
 
 
-def kitti_depth_tree(splits: Sequence[SplitRecords], read: Read) -> Iterator[tuple[str, bytes]]:
+def kitti_depth_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
     """The files of the new tree, from a depth dataset.
 
     `<date>/<drive>/image_02/data/` holds pictures, `train|val/<drive>/proj_depth/groundtruth/image_02/` depth in
@@ -31,9 +31,10 @@ def kitti_depth_tree(splits: Sequence[SplitRecords], read: Read) -> Iterator[tup
     for split in splits:
         info = split.info
         pool = "train" if info.split == "train" else "val"
-        is_driving = any(record.frame > 0 for record in split.records)
+        is_driving = any(sidecar.record.frame > 0 for sidecar in split.sidecars)
         pairs = []
-        for record in split.records:
+        for sidecar in split.sidecars:
+            record = sidecar.record
             key = (info.split, record.sequence if is_driving else 0)
             date = info.created.replace("-", "_")
             drive = f"{date}_drive_{drives.setdefault(key, len(drives) + 1):04d}_sync"
@@ -50,7 +51,7 @@ def kitti_depth_tree(splits: Sequence[SplitRecords], read: Read) -> Iterator[tup
         yield f"filenames/{info.split}.txt", "".join(pairs).encode()
 
 
-def _selection(record: SceneRecord, drive: str, frame: int, image: bytes, depth: bytes) -> Iterator[tuple[str, bytes]]:
+def _selection(record: SceneRecord, drive: str, frame: int, image: bytes, depth: bytes) -> Tree:
     """The benchmark's own crop: at the bottom, in the middle."""
     camera = record.cameras[0]
     top, left = camera.height_px - CROP_HEIGHT_PX, (camera.width_px - CROP_WIDTH_PX) // 2
@@ -65,3 +66,10 @@ def _selection(record: SceneRecord, drive: str, frame: int, image: bytes, depth:
     )
     matrix = camera.intrinsics.matrix - np.array([[0, 0, left], [0, 0, top], [0, 0, 0]])
     yield f"{folder}/intrinsics/{drive}_image_{middle}.txt", intrinsics_text(matrix)
+
+
+LAYOUT = Layout(
+    tasks=("depth",),
+    summary="KITTI depth: drives, proj_depth, val_selection_cropped for the devkit",
+    tree=kitti_depth_tree,
+)

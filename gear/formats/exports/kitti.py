@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from gear.formats.exports import Read, SplitRecords
+from gear.formats.exports.layout import ExportSplit, Layout, NoOptions, Read, Tree
 
 FOLDERS = (("image_2", "png"), ("image_3", "png"), ("calib", "txt"), ("label_2", "txt"))
 
 
-def kitti_tree(splits: Sequence[SplitRecords], read: Read) -> Iterator[tuple[str, bytes]]:
+def kitti_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
     """The files of the new tree, from a stereo3d dataset.
 
     Ids run from 0 through all splits in the order given, so that `ImageSets/<split>.txt` tells them apart in one pool.
@@ -23,10 +23,10 @@ def kitti_tree(splits: Sequence[SplitRecords], read: Read) -> Iterator[tuple[str
     number = 0
     for split in splits:
         names = lists.setdefault(split.info.split, [])
-        for record in split.records:
+        for sidecar in split.sidecars:
             name = f"{number:06d}"
             for folder, suffix in FOLDERS:
-                source = f"{split.info.split}/{folder}/{record.index:06d}.{suffix}"
+                source = f"{split.info.split}/{folder}/{sidecar.record.index:06d}.{suffix}"
                 yield f"training/{folder}/{name}.{suffix}", read(source)
             names.append(name)
             number += 1
@@ -34,3 +34,6 @@ def kitti_tree(splits: Sequence[SplitRecords], read: Read) -> Iterator[tuple[str
         lists["trainval"] = sorted(lists["train"] + lists["val"])
     for split_name, names in lists.items():
         yield f"ImageSets/{split_name}.txt", "".join(f"{name}\n" for name in names).encode()
+
+
+LAYOUT = Layout(tasks=("stereo3d",), summary="KITTI object: one training/ pool, ImageSets/", tree=kitti_tree)

@@ -1,0 +1,59 @@
+"""Cityscapes as the benchmark itself is laid out, with train ids, in the splits that its tools know."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from gear.formats.cityscapes import LABELS, Paths, city_name, paths
+from gear.formats.exports.layout import ExportSplit, Layout, NoOptions, Read, Tree
+from gear.formats.label_png import encode_label_map
+from gear.formats.png import decode_plain
+
+SPLITS = ("train", "val", "test")
+"""The splits of the benchmark; torchvision refuses others, and the benchmark's evaluation reads `val` alone."""
+
+TRAIN_IDS = np.array([label.train_id for label in LABELS], dtype=np.uint8)
+"""(34,) train ids by label id: 0 to 18, and 255 for what is not evaluated."""
+
+
+def cityscapes_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
+    """The files of the new tree, from a semseg dataset: those of the dataset, and `_gtFine_labelTrainIds.png`.
+
+    A split of another name than the benchmark's goes to the one that its first word names, such as `val_night` to
+    `val`, or to `val`. Its city is called after it, so that no two splits share a city.
+
+    Args:
+        splits: of the dataset.
+        read: the bytes of a file of the dataset, by relative path.
+    """
+    for split in splits:
+        info = split.info
+        pool = next((name for name in SPLITS if name == info.split.partition("_")[0]), "val")
+        city = city_name(info.town if pool == info.split else f"{info.town}{info.split}")
+        for sidecar in split.sidecars:
+            record = sidecar.record
+            there = paths(info.town, info.split, record.sequence, record.frame)
+            name = f"{city}_{record.sequence:06d}_{record.frame:06d}"
+            for path, data in _files(there, sidecar.files, read):
+                kind, suffix = path.partition("/")[0], re.sub(r"^[^_]*_\d+_\d+_", "", path.rpartition("/")[2])
+                yield f"{kind}/{pool}/{city}/{name}_{suffix}", data
+
+
+def _files(there: Paths, known: Mapping[str, str], read: Read) -> Tree:
+    """The files of one sample under the dataset's own paths, and its train ids."""
+    labels = read(there.label_ids)
+    for path in (there.image, there.label_ids, there.instance_ids, there.colour, there.polygons, there.camera):
+        if path in known:  # a dataset may have no polygons
+            yield path, labels if path == there.label_ids else read(path)
+    train_ids = TRAIN_IDS[decode_plain(labels)]
+    yield there.label_ids.replace("_labelIds.png", "_labelTrainIds.png"), encode_label_map(train_ids)
+
+
+LAYOUT = Layout(
+    tasks=("semseg",),
+    summary="Cityscapes: leftImg8bit, gtFine with labelTrainIds, camera; splits train, val, test",
+    tree=cityscapes_tree,
+)
