@@ -183,3 +183,34 @@ def test_an_object_in_an_ignored_box_is_still_to_be_found() -> None:
     metric = evaluator()
     metric.update(shown, [found(0.9, (110, 100, 160, 160)), found(0.95, (112, 110, 178, 180))])
     assert metric.result()["ap"] == pytest.approx(1)
+
+
+def test_a_size_that_no_label_has_is_not_known() -> None:
+    """The car has 6000 px2, which COCO calls medium."""
+    metric = evaluator()
+    metric.update(picture(0, CAR), [found(0.9)])
+    result = metric.result()
+    assert [result["ap_medium"], result["ar_medium"]] == pytest.approx([1.0, 1.0])
+    for name in ("ap_small", "ap_large", "ar_small", "ar_large"):
+        assert math.isnan(result[name]), name
+
+
+def test_without_labels_nothing_is_known() -> None:
+    result = evaluator().result()
+    assert len(result) == 12 and all(math.isnan(value) for value in result.values())
+
+
+def test_names_of_categories_have_no_spaces() -> None:
+    metric = evaluator()
+    metric.update(picture(0, (10, (20.0, 20.0, 100.0, 60.0), False)), [found(0.9, category_id=10)])
+    assert metric.result()["ap_traffic_light"] == pytest.approx(1.0)
+    assert metric.resampled(np.array([[0, 0]]))["ap_traffic_light"] == pytest.approx([1.0])
+
+
+def test_a_false_alarm_of_any_height_counts() -> None:
+    flat = found(0.9, (150, 150, 190, 150.5))
+    assert evaluator().update(picture(0, CAR), [flat])["false_alarms"] == 1
+
+
+def test_every_metric_is_a_share() -> None:
+    assert evaluator().range_of("ap") == (0.0, 1.0)

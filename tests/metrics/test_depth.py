@@ -224,3 +224,57 @@ def test_no_metric_depends_on_where_memory_lies(count: int) -> None:
         for offset in range(0, 64, 4)
     }
     assert len(results) == 1
+
+
+def test_the_metrics_of_eigen_have_their_names_and_definitions() -> None:
+    """Eigen et al. 2014, and `eigen_log10` of Laina et al. 2016; thresholds are powers of 1.25."""
+    truth = np.array([[10.0, 40.0, 5.0, 20.0]], dtype=np.float32)
+    found = np.array([[12.0, 28.0, 9.4, 60.0]], dtype=np.float32)  # off by 1.2, 1.43, 1.88 and 3
+    t, p = truth.astype(float), found.astype(float)
+    result = DepthEvaluator().update(Deep(truth), found)
+    log = np.log(p / t)
+    assert {name: value for name, value in result.items() if name.startswith("eigen_")} == pytest.approx(
+        {
+            "eigen_d1": 1 / 4,
+            "eigen_d2": 2 / 4,
+            "eigen_d3": 3 / 4,
+            "eigen_abs_rel": np.mean(np.abs(p - t) / t),
+            "eigen_sq_rel": np.mean((p - t) ** 2 / t),
+            "eigen_rmse_m": np.sqrt(np.mean((p - t) ** 2)),
+            "eigen_rmse_log": np.sqrt(np.mean(log**2)),
+            "eigen_log10": np.mean(np.abs(np.log10(p / t))),
+            "eigen_silog": np.sqrt(np.mean(log**2) - 0.5 * np.mean(log) ** 2),
+        },
+        rel=1e-6,
+    )
+
+
+@pytest.mark.parametrize("edge_m", [1e-3, 80.0])
+def test_eigens_range_ends_before_its_bounds(edge_m: float) -> None:
+    """As in the published code: ground truth counts where it is greater than one bound and less than the other."""
+    truth = np.array([[edge_m, 40.0]], dtype=np.float32)
+    assert DepthEvaluator().update(Deep(truth), np.array([[10.0, 40.0]], dtype=np.float32))["eigen_d1"] == 1.0
+
+
+def test_the_farthest_depth_of_a_picture_counts() -> None:
+    truth = np.array([[MAX_PNG_DEPTH_M, 10.0]], dtype=np.float32)
+    found = np.array([[300.0, 12.0]], dtype=np.float32)
+    assert DepthEvaluator().update(Deep(truth), found)["mae_m"] == pytest.approx((0 + 2) / 2)
+
+
+@pytest.mark.parametrize(("truth_m", "found_m"), [(2e-38, 256.0), (1.0, 1e25)])
+def test_quotients_beyond_single_precision_are_measured(truth_m: float, found_m: float) -> None:
+    """The nearest truth in the devkit's metrics, and a far prediction in Eigen's."""
+    truth, found = np.array([[truth_m]], dtype=np.float32), np.array([[found_m]], dtype=np.float32)
+    result = DepthEvaluator(max_depth_m=1e30).update(Deep(truth), found)
+    t, p = float(truth[0, 0]), float(found[0, 0])
+    assert result["abs_rel"] == pytest.approx((min(p, MAX_PNG_DEPTH_M) - t) / t)
+    if t > 1e-3:
+        assert result["eigen_sq_rel"] == pytest.approx((p - t) ** 2 / t)
+
+
+def test_shares_end_at_one_and_errors_nowhere() -> None:
+    for name in ("d1", "d2", "d3", "eigen_d1", "eigen_d3"):
+        assert DepthEvaluator().range_of(name) == (0.0, 1.0)
+    for name in ("rmse_m", "eigen_rmse_m", "silog"):
+        assert DepthEvaluator().range_of(name) == (0.0, math.inf)

@@ -327,3 +327,17 @@ def test_a_detection_of_a_type_that_is_none_is_refused(evaluator: Any) -> None:
 def test_what_cannot_be_measured_is_refused_rather_than_taken_for_a_miss(change: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=r"finite|left, top, right, bottom"):
         evaluate([([CAR], [replace(CAR, **{"score": 0.9, **change})])])
+
+
+def test_merged_pictures_count_as_if_one_had_seen_them_all() -> None:
+    whole, first, second = (KittiEvaluator[list[KittiLabel]](lambda labels: labels) for _ in range(3))
+    for seed in range(4):
+        for evaluator in (whole, first if seed < 2 else second):
+            evaluator.update(*picture(seed))
+    first.merge(second)
+    assert first.result() == pytest.approx(whole.result(), nan_ok=True)
+    assert len(first.pictures) == 4
+
+
+def test_every_metric_is_a_share() -> None:
+    assert KittiEvaluator(lambda labels: labels).range_of("car_3d_moderate_r40") == (0.0, 1.0)

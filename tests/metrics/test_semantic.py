@@ -162,3 +162,25 @@ def test_an_id_below_0_is_no_pixel_of_the_class_before() -> None:
     unsure = np.where(sample.label_ids == 7, -1, sample.label_ids.astype(np.int64))
     with pytest.raises(ValueError, match=r"label ids 0\.\.33, got -1"):
         SemanticEvaluator().update(sample, unsure)
+
+
+def test_names_of_classes_have_no_spaces() -> None:
+    sample = Labelled(np.full((4, 8), 19, dtype=np.uint16))
+    for evaluator in (SemanticEvaluator(), PresentClasses()):
+        evaluator.update(sample, sample.label_ids)
+        assert evaluator.result()["iou_traffic_light"] == 1.0
+
+
+def test_a_single_pixel_of_a_class_is_its_presence() -> None:
+    picture = np.full((4, 8), 7, dtype=np.uint16)
+    picture[1, 2] = 19
+    sample = Labelled(picture)
+    evaluator = PresentClasses()
+    evaluator.update(sample, np.full((4, 8), 7, dtype=np.uint8))
+    result = evaluator.result()
+    assert (result["iou_traffic_light"], result["iou_road"]) == (0.0, pytest.approx(31 / 32))
+    assert result["miou"] == pytest.approx(31 / 64)
+
+
+def test_every_metric_is_a_share() -> None:
+    assert SemanticEvaluator().range_of("miou") == (0.0, 1.0)
