@@ -32,7 +32,8 @@ def find_config(kind: str, name: str) -> Path:
     if is_there and (is_path or path.name == name):
         return found
     if is_path:
-        raise UnknownNameError(f"{kind} config", name, hint="(that file does not exist)")
+        hint = "(that is not a regular file)" if path.exists() else "(that file does not exist)"
+        raise UnknownNameError(f"{kind} config", name, hint=hint)
     raise UnknownNameError(f"{kind} config", name, (p.stem for p in folder.glob("*.yml")))
 
 

@@ -1,11 +1,12 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
 from gear.config.collection import CollectionConfig, SplitConfig
-from gear.config.load import load_collection, load_simulation, split_of
+from gear.config.load import find_config, load_collection, load_simulation, split_of
 from gear.values.errors import ConfigError, UnknownNameError
 
 
@@ -243,3 +244,9 @@ def test_unknown_configs_say_what_there_is() -> None:
         load_simulation("defalt")
     with pytest.raises(UnknownNameError, match="that file does not exist"):
         load_simulation("nowhere.yml")
+
+
+def test_a_pipe_is_no_config(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.yml")
+    with pytest.raises(UnknownNameError, match="that is not a regular file"):
+        find_config("collections", str(tmp_path / "pipe.yml"))

@@ -21,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--patch", help="patch that the dataset shows, where its own copy is damaged")
     parser.add_argument("--town", metavar="FILE", help="MJCF file of a town that is none of gear's own")
     parser.add_argument("--scenes", metavar="FILE", help="scene library of that town")
+    parser.add_argument("--simulation", metavar="FILE", help="simulation config that is none of gear's own")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes that make samples again (1)")
 
 
@@ -39,6 +40,7 @@ def run(args: argparse.Namespace) -> int:
             patch=args.patch,
             town=args.town,
             scenes=args.scenes,
+            simulation=args.simulation,
             workers=max(args.workers, 1),
             on_progress=display.callbacks.on_progress,
         )

@@ -39,11 +39,13 @@ class Sources:
         patch: the patch, where the dataset's own copy is damaged; else None.
         town: MJCF file of a town that is none of gear's own.
         scenes: its scene library.
+        simulation: simulation config, where it is none of gear's own.
     """
 
     patch: str | Path | None = None
     town: str | Path | None = None
     scenes: str | Path | None = None
+    simulation: str | Path | None = None
 
 
 def job_of(root: Path, check: SplitCheck, sources: Sources) -> Job:
@@ -67,14 +69,15 @@ def job_of(root: Path, check: SplitCheck, sources: Sources) -> Job:
             "patch": patch,
             "root": str(root),
             **({"scenes": str(sources.scenes)} if sources.scenes else {}),
+            **({"simulation": str(sources.simulation)} if sources.simulation else {}),
         }
         try:
             name = f"{root} split {check.split}"
             node = in_one_place(parse_text(yaml.safe_dump(config, sort_keys=False), name), Place(name))
             job = resolve(read_node(CollectionConfig, node))
         except (UnknownNameError, ConfigError, PatchError, BackendError) as error:
-            files = "" if sources.town else "; of a town of your own, name the files with --town and --scenes"
-            raise DatasetError(root, f"split {check.split!r} cannot be made again ({error}){files}") from error
+            advice = "name files of your own with --town, --scenes and --simulation"
+            raise DatasetError(root, f"split {check.split!r} cannot be made again ({error}); {advice}") from error
     plan = dataclasses.replace(job.plan, recipe=known["recipe"])
     if plan.content_key != known["content_key"]:
         what = ", ".join(differences(check.plan.as_json(), plan.as_json())[:2]) if check.plan is not None else ""

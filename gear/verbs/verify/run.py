@@ -26,6 +26,7 @@ def verify(
     patch: str | Path | None = None,
     town: str | Path | None = None,
     scenes: str | Path | None = None,
+    simulation: str | Path | None = None,
     workers: int = 1,
     progress: bool = False,
     on_progress: Progress | None = None,
@@ -43,6 +44,7 @@ def verify(
         patch: for a repair, the patch that the dataset shows, where its own copy is damaged.
         town: for a repair, the MJCF file of a town that is none of gear's own.
         scenes: for a repair, that town's scene library.
+        simulation: for a repair, the simulation config, where it is none of gear's own.
         workers: processes that make samples again.
         progress: whether to show the progress on stderr.
         on_progress: called with (samples, samples of the split), while a split is checked and while it is repaired.
@@ -50,7 +52,7 @@ def verify(
     Raises:
         DatasetError: it is no dataset, a file cannot be read, or one leads outside of the dataset.
     """
-    sources = Sources(patch=patch, town=town, scenes=scenes)
+    sources = Sources(patch=patch, town=town, scenes=scenes, simulation=simulation)
     with displayed(Callbacks.of(on_progress=on_progress), "verify", progress=progress) as callbacks:
         return _verified(Path(dataset), split, sources if repair else None, workers, callbacks)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -213,7 +214,23 @@ def test_a_collection_does_not_pass_over_damage(tmp_path: Path, copy_small: Copy
     assert "--force" not in str(caught.value) and "gear verify DIR --repair" in str(caught.value)
 
 
+def test_a_split_of_ones_own_simulation_config_is_repaired_where_that_lies(
+    tmp_path: Path, collect_small: Callable[..., Any]
+) -> None:
+    config = tmp_path / "mine.yml"
+    config.write_text("splits:\n  odd: {seed: 5, samples: 1, frames: 2, interval_s: 0.5}\nmax_vehicles: 3\n")
+    root = tmp_path / "data"
+    collect_small("depth", root, split="odd", samples=1, settings=[f"simulation={config}"])
+    before = tree(root)
+    moved = config.rename(tmp_path / "moved.yml")
+    next(root.rglob("*.png")).unlink()
+    report = repaired(root)
+    assert not report.is_whole and "with --town, --scenes and --simulation" in report.lines()[1]
+    assert repaired(root, simulation=moved).is_whole
+    assert tree(root) == before
+
+
 def test_sources_are_looked_at_only_for_a_repair(tmp_path: Path, copy_small: Copy) -> None:
     root = copy_small("depth", tmp_path / "data")
     assert module.verify(root, patch=tmp_path / "nowhere").is_whole
-    assert Sources() == Sources(patch=None, town=None, scenes=None)
+    assert Sources() == Sources(patch=None, town=None, scenes=None, simulation=None)
