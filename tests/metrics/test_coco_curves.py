@@ -67,6 +67,7 @@ def test_each_draw_counts_a_picture_as_often_as_it_was_drawn() -> None:
 def test_a_mean_leaves_out_what_is_not_known() -> None:
     values = np.array([[1.0, np.nan, 4.0], [np.nan, np.nan, np.nan]])
     np.testing.assert_array_equal(known_mean(values, (1,)), [2.5, np.nan])
+    np.testing.assert_array_equal(known_mean(values, (0,)), [1.0, np.nan, 4.0])
     np.testing.assert_array_equal(known_mean(values, (0, 1)), 2.5)
 
 
@@ -98,3 +99,17 @@ def test_matches_are_read_by_category_from_the_first_range_of_areas() -> None:
     assert car.counts.tolist() == [[True, True, False], [True, True, False]]
     assert car.wanted.tolist() == [1, 2]
     assert truck.owner.tolist() == [1] and truck.wanted.tolist() == [0, 2]
+
+
+def test_equal_scores_keep_the_order_of_the_pictures() -> None:
+    """As in pycocotools, whose sort is stable: of 40 detections as sure as each other, the last ten are right."""
+    hits = [int(number >= 30) for number in range(40)]
+    rows = [row([0.5], [[hit]], [[0]], [0]) for hit in hits]
+    evaluation = SimpleNamespace(
+        params=SimpleNamespace(imgIds=list(range(40)), areaRng=[0], catIds=[3], maxDets=[100], iouThrs=[0.5]),
+        evalImgs=rows,
+    )
+    found = matches(evaluation)[3]
+    assert found.owner.tolist() == list(range(40)) and found.hit[0].tolist() == [bool(hit) for hit in hits]
+    # The best precision, 10 of 40, is that of all of them; recalls end at 10 of 40 labels.
+    assert average_precision(found, np.ones(40, np.int64)) == pytest.approx([26 / 101 * 10 / 40], abs=1e-12)

@@ -62,3 +62,8 @@ def test_without_pictures_nothing_is_known() -> None:
         for name in ("person", "bicycle", "car", "motorcycle", "bus", "truck")
     }
     assert all(math.isnan(value) for value in result.values())
+
+
+@pytest.mark.parametrize(("bottom", "precision"), [(30.0, 1.0), (29.0, 0.0)])
+def test_half_an_overlap_finds_an_instance(bottom: float, precision: float) -> None:
+    assert evaluated([shown()] * 50, bottom=bottom).result()["ap50_car"] == pytest.approx(precision)

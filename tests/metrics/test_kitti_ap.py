@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from gear.formats.kitti_object import KittiLabel, dont_care, label_corners
-from gear.metrics.kitti_ap import KittiEvaluator
+from gear.metrics.kitti_ap import KittiEvaluator, perfect_curve
 from gear.metrics.kitti_match import DIFFICULTIES, choose, count, matched_scores, picture_boxes
 from gear.metrics.kitti_reference import NearCars
 from gear.values.ground_truth import BoxPx
@@ -341,3 +341,22 @@ def test_merged_pictures_count_as_if_one_had_seen_them_all() -> None:
 
 def test_every_metric_is_a_share() -> None:
     assert KittiEvaluator(lambda labels: labels).range_of("car_3d_moderate_r40") == (0.0, 1.0)
+
+
+def test_draws_are_evaluated_at_moderate_difficulty_each_for_itself() -> None:
+    """Picture 0 has no labels, so a draw of it alone is not known; picture 1 has a car that only `moderate` wants."""
+    evaluator: KittiEvaluator[list[KittiLabel]] = KittiEvaluator(lambda labels: labels)
+    evaluator.update([], [])
+    evaluator.update([CAR, replace(CAR, occluded=1, box_px=(500, 100, 600, 160))], [replace(CAR, score=0.9)])
+    values = evaluator.resampled(np.array([[0] * 60, [1] * 60]))["car_2d_moderate_r40"]
+    assert math.isnan(values[0])
+    assert values[1] == pytest.approx(0.5), "half of the labels are found, at recalls up to 20 of 40"
+
+
+def test_without_labels_nothing_is_known_and_nothing_has_a_ceiling() -> None:
+    evaluator: KittiEvaluator[list[KittiLabel]] = KittiEvaluator(lambda labels: labels)
+    evaluator.update([], [replace(CAR, score=0.9)])
+    assert all(math.isnan(value) for value in evaluator.result().values())
+    assert evaluator.ceilings() == {}
+    curve = perfect_curve([])
+    assert curve.shape == (41,) and np.isnan(curve).all()

@@ -154,7 +154,7 @@ def test_the_first_low_detection_is_taken_where_no_proper_one_is() -> None:
     """Whatever their overlaps: the second, which fits better, is left for the next label."""
     label = replace(CAR, box_px=(100.0, 100.0, 150.0, 126.0))
     low = [found(box_px=(100.0, 100.0, 150.0, bottom)) for bottom in (123.0, 124.9)]
-    assert counts(chosen([label], low)) == (0, 0, 0)
+    assert counts(chosen([label], low)) == (0, 0, 0) and matched_scores(chosen([label], low)) == []
     assert counts(chosen([label, label], low)) == (0, 0, 0)
     assert counts(chosen([label, label, label], low)) == (0, 0, 1)
 

@@ -184,3 +184,16 @@ def test_a_single_pixel_of_a_class_is_its_presence() -> None:
 
 def test_every_metric_is_a_share() -> None:
     assert SemanticEvaluator().range_of("miou") == (0.0, 1.0)
+
+
+def test_the_first_and_the_last_id_may_be_predicted_and_no_later_one() -> None:
+    sample = Labelled(np.full((4, 8), 7, dtype=np.uint16))
+    for label in (0, 33):
+        assert SemanticEvaluator().update(sample, np.full((4, 8), label, dtype=np.uint8))["miou"] == 0.0
+    with pytest.raises(ValueError, match="got 34"):
+        SemanticEvaluator().update(sample, np.full((4, 8), 34, dtype=np.uint8))
+
+
+def test_a_picture_without_pixels_has_no_metric() -> None:
+    empty = Labelled(np.zeros((0, 8), dtype=np.uint16))
+    assert np.isnan(SemanticEvaluator().update(empty, np.zeros((0, 8), dtype=np.uint8))["miou"])
