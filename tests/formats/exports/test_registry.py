@@ -16,6 +16,7 @@ def test_each_layout_takes_the_datasets_of_its_task() -> None:
     found = {name: find_layout(name).tasks for name in layout_names()}
     assert found == {
         "cityscapes": ("semseg",), "coco": ("detect2d",), "kitti": ("stereo3d",), "kitti-depth": ("depth",),
+        "hf": (), "parquet": (), "webdataset": (),
         "yolo": ("detect2d",),
     }  # fmt: skip
 

@@ -1,0 +1,147 @@
+"""Dataset cards: the `README.md` with which Hugging Face's hub and its package `datasets` describe and find data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from gear.contracts.tasks import SplitInfo
+from gear.values.counted import counted
+from gear.values.serial import Json
+
+TASK_CATEGORIES = {
+    "semseg": "image-segmentation",
+    "detect2d": "object-detection",
+    "stereo3d": "object-detection",
+    "depth": "depth-estimation",
+}
+"""The hub's name of each of gear's tasks."""
+
+SPLITS = {"val": "validation"}
+"""The hub's names of splits, where they differ from gear's."""
+
+SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
+
+USES = "Training and evaluation of perception networks, of physical adversarial patches and of defenses against them."
+LIMITS = (
+    "Pictures are rendered. Streets, road users and textures are synthetic and few; what holds on them need not hold "
+    "on photographs. Weather, light and traffic follow the configuration, not their frequency in a real country."
+)
+COLLECTION = (
+    "Scenes are drawn from a seed, simulated and rendered with MuJoCo by gear. Ground truth is read off the renderer's "
+    "buffers; no person labelled anything. Nothing in the data shows or describes a real person."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SplitFacts:
+    """What a card says of one finished split.
+
+    Attributes:
+        name: of the split.
+        task, town, scene, weather, patch, renderer: names.
+        seed: of the split.
+        samples: number of samples.
+        created: ISO date.
+        gear, mujoco: versions.
+    """
+
+    name: str
+    task: str
+    town: str
+    scene: str
+    weather: str
+    patch: str
+    renderer: str
+    seed: int
+    samples: int
+    created: str
+    gear: str
+    mujoco: str
+
+    @property
+    def hub_name(self) -> str:
+        """The split's name on the hub."""
+        return SPLITS.get(self.name, self.name)
+
+    @staticmethod
+    def of(info: SplitInfo, task: str, samples: int, manifest: Json) -> SplitFacts:
+        """The facts of a split; "unknown" where the manifest lacks one."""
+
+        def at(key: str, inner: str) -> str:
+            entry = manifest.get(key) if isinstance(manifest, dict) else None
+            value = entry.get(inner) if isinstance(entry, dict) else None
+            return value if isinstance(value, str) else "unknown"
+
+        return SplitFacts(
+            name=info.split,
+            task=task,
+            town=info.town,
+            scene=info.scene,
+            weather=at("weather", "name"),
+            patch=info.patch_label,
+            renderer=at("renderer", "name"),
+            seed=info.seed,
+            samples=samples,
+            created=info.created,
+            gear=at("versions", "gear"),
+            mujoco=at("versions", "mujoco"),
+        )
+
+
+def title(splits: Sequence[SplitFacts]) -> str:
+    """The name of a dataset for people."""
+    first = splits[0]
+    return f"gear {first.task} {first.town} {first.scene}, patch {first.patch}"
+
+
+def size_category(samples: int) -> str:
+    """The hub's class of sizes."""
+    return next((name for most, name in SIZES if samples < most), "n>1M")
+
+
+def card(splits: Sequence[SplitFacts], configs: Mapping[str, Mapping[str, Sequence[str]]], structure: str) -> str:
+    """The text of a dataset card.
+
+    Args:
+        splits: at least one.
+        configs: for each configuration of the dataset, patterns of files by split.
+        structure: what the files are, in Markdown.
+    """
+    first, samples = splits[0], sum(split.samples for split in splits)
+    category = TASK_CATEGORIES.get(first.task)
+    hub_names = {split.name: split.hub_name for split in splits}
+    lines = [
+        "---",
+        "license: mit",
+        f"pretty_name: {title(splits)}",
+        "language: [en]",
+        "annotations_creators: [machine-generated]",
+        "source_datasets: [original]",
+        *([f"task_categories: [{category}]"] if category else []),
+        f"size_categories: [{size_category(samples)}]",
+        "tags: [synthetic, adversarial, autonomous-driving, croissant]",
+        *(["configs:"] if configs else []),
+    ]
+    for place, (config, files) in enumerate(configs.items()):
+        lines += [f"- config_name: {config}", *(["  default: true"] if place == 0 else []), "  data_files:"]
+        for split, patterns in files.items():
+            quoted = ", ".join(f'"{pattern}"' for pattern in patterns)
+            lines += [f"  - split: {hub_names[split]}", f"    path: [{quoted}]"]
+    lines += ["---", "", f"# {title(splits)}", "", f"{counted(samples, 'sample')} of driving scenes, made by gear."]
+    lines += ["", "| split | samples | town/scene | weather | patch | seed |", "|---|---|---|---|---|---|"]
+    lines += [
+        f"| {one.name} | {one.samples} | {one.town}/{one.scene} | {one.weather} | {one.patch} | {one.seed} |"
+        for one in splits
+    ]
+    made = f"gear {first.gear}, MuJoCo {first.mujoco}, renderer {first.renderer}"
+    lines += ["", "## Structure", "", structure, "", "## Creation", "", f"{COLLECTION} Versions: {made}."]
+    lines += ["", "## Uses", "", USES, "", "## Limits", "", LIMITS]
+    lines += [
+        "",
+        "## Licence",
+        "",
+        "MIT, as gear and its assets. A patch, a town or an asset of another author keeps the licence of that author.",
+        "",
+    ]
+    return "\n".join(lines)
