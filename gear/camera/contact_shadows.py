@@ -75,10 +75,8 @@ class SkyOcclusion:
         """
         rows, columns, cells_per_m = _grid(shape)
         layers = _layers(_points(shape, 1.5 * cells_per_m) * cells_per_m, rows, columns)
-        hidden = np.zeros((rows, columns), np.float32)
-        for to_east, to_north in _slopes():
-            hidden += _shadow(layers, to_east, to_north)
-        hidden = cv2.blur(hidden / np.float32(DIRECTIONS), (3, 3), borderType=cv2.BORDER_CONSTANT)
+        hidden = _shadow_count(layers) / np.float32(DIRECTIONS)
+        hidden = cv2.blur(hidden, (3, 3), borderType=cv2.BORDER_CONSTANT)
         for axis, size in ((0, rows), (1, columns)):
             from_border = (np.minimum(np.arange(size), np.arange(size)[::-1]) / cells_per_m).astype(np.float32)
             rim = smooth_step(from_border, 0, _RIM * _reach_m(shape))
@@ -110,17 +108,34 @@ def _layers(points: Array, rows: int, columns: int) -> list[Mask]:
     return [(low <= height + 0.5) & (high >= height - 0.5) for height in heights]
 
 
-def _shadow(layers: list[Mask], to_east: float, to_north: float) -> Mask:
-    """(rows, columns) shadow of all layers for one direction: each layer is shifted in proportion to its height."""
-    shadow = np.zeros_like(layers[0])
-    rows, columns = shadow.shape
-    for level, layer in enumerate(layers):
-        down, left = round((level + 0.5) * to_north), round((level + 0.5) * to_east)
-        if abs(down) >= rows or abs(left) >= columns:
-            break
-        onto = slice(max(-down, 0), rows - max(down, 0)), slice(max(-left, 0), columns - max(left, 0))
-        shadow[onto] |= layer[max(down, 0) : rows + min(down, 0), max(left, 0) : columns + min(left, 0)]
-    return shadow
+def _shadow_count(layers: list[Mask]) -> FloatImage:
+    """(rows, columns) float32 number of directions, of `DIRECTIONS`, from which each cell is shadowed.
+
+    A picture of bits is one integer, so that one shift moves all of its cells; arrays take 2.4 times as long.
+    """
+    rows, columns = layers[0].shape
+    # A row has as many empty columns beside it as a shift can move cells beyond its ends.
+    stride = 2 * columns
+    padded = np.zeros((rows, stride), np.bool_)
+    bits = []
+    for layer in layers:
+        padded[:, :columns] = layer
+        bits.append(int.from_bytes(np.packbits(padded, bitorder="little").tobytes(), "little"))
+    size = -(-rows * stride // 8)
+    inside = (1 << rows * stride) - 1
+    assert DIRECTIONS < 256
+    count = np.zeros(8 * size, np.uint8)
+    # Each layer is shifted in proportion to its height.
+    moves = np.rint((np.arange(len(layers)) + 0.5)[:, None, None] * np.array(list(_slopes()))).astype(np.int64)
+    is_inside = (np.abs(moves) < (columns, rows)).all(axis=2)
+    shifts = moves @ (1, stride)
+    for direction in range(DIRECTIONS):
+        shadow = 0
+        for picture, shift in zip(bits, shifts[is_inside[:, direction], direction].tolist(), strict=False):
+            shadow |= picture >> shift if shift >= 0 else picture << -shift
+        data = (shadow & inside).to_bytes(size, "little")
+        count += np.unpackbits(np.frombuffer(data, np.uint8), bitorder="little")
+    return count[: rows * stride].reshape(rows, stride)[:, :columns].astype(np.float32)
 
 
 def _slopes() -> Iterator[tuple[float, float]]:

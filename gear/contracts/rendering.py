@@ -34,12 +34,15 @@ class Stage:
         data: poses of the sample; kinematics, lights and cameras are up to date.
         paint_rgb: linear albedo (0..1) by geom id, for geoms whose colour this sample chose.
         faces: sRGB albedo, (H, W, 3) uint8, by geom id of the surface's face; all of the same size.
+        is_absent: (ngeom,) bool, geoms of actors that wait out of sight, under the ground: a renderer may leave them
+            out. None where there are none.
     """
 
     model: mujoco.MjModel
     data: mujoco.MjData
     paint_rgb: Mapping[int, Vec3] = field(default_factory=dict)
     faces: Mapping[int, UInt8Image] = field(default_factory=dict)
+    is_absent: npt.NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

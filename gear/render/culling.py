@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import mujoco
 import numpy as np
 import numpy.typing as npt
@@ -61,6 +62,30 @@ def in_beam(centre_m: Array, direction: Array, half_side_m: float, centres_m: Ar
     towards = centres_m - centre_m
     across = towards - (towards @ unit)[:, None] * unit
     return np.asarray(np.linalg.norm(across, axis=1) < radii_m + np.sqrt(2) * half_side_m)
+
+
+def may_shadow(receivers_m: Array, axes: Array, margin_m: float, centres_m: Array, radii_m: Array) -> Mask:
+    """(ngeom,) bool, whether a sphere may shadow a convex part of the world: never False for one that does.
+
+    Args:
+        receivers_m: (N, 3) corners of that part.
+        axes: (3, 3) rows: two unit vectors across the light's rays, and one towards the light.
+        margin_m: distance by which the part is enlarged.
+        centres_m: (ngeom, 3) in the world.
+        radii_m: (ngeom,).
+    """
+    middle_m = receivers_m.mean(axis=0)
+    corners, spheres = (receivers_m - middle_m) @ axes.T, (centres_m - middle_m) @ axes.T
+    reach_m = radii_m + margin_m
+    shadows = spheres[:, 2] + reach_m >= corners[:, 2].min()
+    outline = cv2.convexHull(corners[:, :2].astype(np.float32)).reshape(-1, 2).astype(np.float64)
+    for begin, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        along = end - begin
+        outwards = np.array((along[1], -along[0])) / max(float(np.hypot(*along)), 1e-9)
+        # The order of the outline's corners is OpenCV's choice; its middle is inside.
+        outwards *= np.sign(outwards @ (begin - outline.mean(axis=0)))
+        shadows &= (spheres[:, :2] - begin) @ outwards <= reach_m
+    return np.asarray(shadows)
 
 
 def near_to_far(chosen: Mask, depth_m: Array) -> npt.NDArray[np.intp]:

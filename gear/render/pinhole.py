@@ -50,6 +50,18 @@ class Frustum:
             centre_up_m=NEAR_M * (pinhole.cy_px - (camera.height_px - 1) / 2) / pinhole.fy_px,
         )
 
+    def slice_corners(self, begin_m: float, end_m: float) -> Array:
+        """(8, 3) corners in the world of the part of the view between two distances along the optical axis."""
+        right = np.cross(self.forward_world, self.up_world)
+        rays = [
+            self.forward_world
+            + right * (self.centre_right_m + across * self.half_width_m) / NEAR_M
+            + self.up_world * (self.centre_up_m + up * self.half_height_m) / NEAR_M
+            for across in (-1, 1)
+            for up in (-1, 1)
+        ]
+        return np.concatenate([self.position_world_m + distance_m * np.array(rays) for distance_m in (begin_m, end_m)])
+
 
 def depth_from_reversed(reversed_depth: npt.NDArray[np.float32]) -> FloatImage:
     """Planar z in metres from a reversed depth buffer (1 at `NEAR_M`, 0 at `FAR_M` and where nothing was drawn).

@@ -192,10 +192,15 @@ class World:
         surface_index = np.full(self.model.ngeom, -1, np.int16)
         for index, face in enumerate(self.faces):
             surface_index[face.geom_id] = index
-        for array in (object_id, surface_index):
+        is_absent = np.zeros(self.model.ngeom, np.bool_)
+        for geoms in self._slot_geoms:
+            is_absent[list(geoms.geom_ids)] = True
+        for geoms in taken:
+            is_absent[list(geoms.geom_ids)] = False
+        for array in (object_id, surface_index, is_absent):
             array.setflags(write=False)
         return PlacedStage(
-            stage=Stage(model=self.model, data=self._data, paint_rgb=paint, faces=faces),
+            stage=Stage(model=self.model, data=self._data, paint_rgb=paint, faces=faces, is_absent=is_absent),
             geoms=GeomTable(label_code=self.classes.label_code, object_id=object_id, surface_index=surface_index),
             objects=objects,
         )

@@ -1,13 +1,5 @@
-// Data that all shaders share: the geoms, and the lights of one frame. "Relative" positions are in metres, along the
-// world's axes, from the camera (or from the middle of a shadow map): 32-bit floats are precise near their origin.
-
-struct Geom {
-    vec4 camera_from_geom[3]; // rows
-    vec4 colour;              // linear albedo
-    vec4 surface;             // perceptual roughness, metallic, emission, reflectance at normal incidence (f0)
-};
-
-layout(std430, binding = 0) readonly buffer Geoms { Geom geoms[]; };
+// The lights of one frame, which all shaders share. "Relative" positions are in metres, along the world's axes, from
+// the camera (or from the middle of a shadow map): 32-bit floats are precise near their origin.
 
 layout(std140, binding = 0) uniform Frame {
     vec4 sun_axes[3];          // rows: two directions across the sun's rays, and the direction towards the sun
@@ -20,24 +12,3 @@ layout(std140, binding = 0) uniform Frame {
     vec4 light[4];             // irradiance of a distant light, intensity of a point light
     vec4 environment;          // x: last mip level of the environment map
 };
-
-// A vertex of a geom as a relative position.
-vec3 relative_position(uint geom, vec3 position) {
-    vec4 point = vec4(position, 1.0);
-    Geom g = geoms[geom];
-    // Equal to the last bit in every shader: the colour pass draws where its depth equals that of the id pass.
-    precise vec3 at = vec3(
-        dot(g.camera_from_geom[0], point), dot(g.camera_from_geom[1], point), dot(g.camera_from_geom[2], point)
-    );
-    return at;
-}
-
-// A direction in a geom's frame, in the world's axes.
-vec3 rotate_to_world(uint geom, vec3 direction) {
-    Geom g = geoms[geom];
-    return vec3(
-        dot(g.camera_from_geom[0].xyz, direction),
-        dot(g.camera_from_geom[1].xyz, direction),
-        dot(g.camera_from_geom[2].xyz, direction)
-    );
-}

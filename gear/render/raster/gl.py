@@ -15,11 +15,12 @@ from gear.values.errors import BackendError
 
 _VERSION = "#version 450 core\n"
 _LEAST = (4, 5)
+_OF_GEOMS = ("positions.vert", "surface.vert")
 _REMEDY = "update the driver, or use --renderer filament"
 
 
 def require_version() -> None:
-    """Refuses a current context without OpenGL 4.5 or without storage buffers in vertex shaders.
+    """Refuses a current context without OpenGL 4.5.
 
     Raises:
         BackendError: says what the driver has.
@@ -28,15 +29,13 @@ def require_version() -> None:
     found = re.match(r"(\d+)\.(\d+)", words)
     if not found or (int(found[1]), int(found[2])) < _LEAST:
         raise BackendError("raster", f"it needs OpenGL {_LEAST[0]}.{_LEAST[1]}, and the driver has {words}", _REMEDY)
-    if GL.glGetIntegerv(GL.GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS) < 1:
-        raise BackendError("raster", "the driver's vertex shaders read no storage buffers", _REMEDY)
 
 
 class Program:
     """A vertex and a fragment shader, compiled and linked."""
 
     def __init__(self, vertex: str, fragment: str, flags: tuple[str, ...] = ()) -> None:
-        """Compiles two shaders of this folder, each after `frame.glsl`.
+        """Compiles two shaders of this folder, each after `frame.glsl`, those of geoms after `pose.glsl` too.
 
         Args:
             vertex, fragment: names of files, without `.glsl`.
@@ -49,7 +48,8 @@ class Program:
         head = _VERSION + "".join(f"#define {flag}\n" for flag in flags) + _source("frame")
         for kind, name in ((GL.GL_VERTEX_SHADER, vertex), (GL.GL_FRAGMENT_SHADER, fragment)):
             shader = GL.glCreateShader(kind)
-            GL.glShaderSource(shader, head + _source(name))
+            pose = _source("pose") if name in _OF_GEOMS else ""
+            GL.glShaderSource(shader, head + pose + _source(name))
             GL.glCompileShader(shader)
             if not GL.glGetShaderiv(shader, GL.GL_COMPILE_STATUS):
                 raise BackendError("raster", f"{name}.glsl: {_text(GL.glGetShaderInfoLog(shader))}", _REMEDY)

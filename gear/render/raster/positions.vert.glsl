@@ -2,7 +2,6 @@
 
 layout(location = 0) in vec3 position;
 layout(location = 3) in uint piece;
-layout(location = 4) in uint geom;
 
 uniform mat4 clip_from_relative;
 flat out int id;
@@ -10,5 +9,5 @@ invariant gl_Position;
 
 void main() {
     id = int(piece);
-    gl_Position = clip_from_relative * vec4(relative_position(geom, position), 1.0);
+    gl_Position = clip_from_relative * vec4(relative_position(position), 1.0);
 }

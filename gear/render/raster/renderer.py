@@ -115,7 +115,7 @@ class RasterRenderer:
         centres_m, radii_m = spheres = self._scene.spheres(stage)
         self._scene.set_poses(stage, frustum.position_world_m)
         distance_m = np.linalg.norm(centres_m - frustum.position_world_m, axis=1) - radii_m
-        seen = near_to_far(in_frustum(frustum, centres_m, radii_m), distance_m)
+        seen = near_to_far(self._scene.present(stage) & in_frustum(frustum, centres_m, radii_m), distance_m)
         truth = None
         if shape is None:
             truth = self._render_ids(size, seen, frustum)

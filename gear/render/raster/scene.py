@@ -24,7 +24,8 @@ Selection = npt.NDArray[np.intp]
 
 _SEEN_GROUPS, _VERTEX_SAMPLES = 3, 8
 _ENVIRONMENT_UNIT, _SPLIT_SUM_UNIT = 5, 7
-_GEOM = np.dtype([("camera_from_geom", "<f4", (3, 4)), ("colour", "<f4", 4), ("surface", "<f4", 4)])
+_VERTICES, _NUMBERS, _PIECES = 0, 1, 2
+_PIECE = np.dtype([("camera_from_geom", "<f4", (3, 4)), ("colour", "<f4", 4), ("surface", "<f4", 4)])
 _FRAME = np.dtype(
     [
         ("sun_axes", "<f4", (3, 4)),
@@ -69,7 +70,7 @@ class Scene:
         self._split_sum = gl.upload_table(split_sum_table())
         sky = sky_of(model)
         self.sky = 0 if sky is None or sky not in cubes else gl.upload_cubemap((cubes[sky],))
-        self._geoms = gl.StreamBuffer(GL.GL_SHADER_STORAGE_BUFFER)
+        self._pieces = gl.StreamBuffer(GL.GL_ARRAY_BUFFER)
         self._frame = gl.StreamBuffer(GL.GL_UNIFORM_BUFFER)
         self._draws = gl.StreamBuffer(GL.GL_DRAW_INDIRECT_BUFFER)
         self._surfaces: dict[tuple[str, ...], gl.Program] = {}
@@ -86,7 +87,7 @@ class Scene:
             stage: the posed world.
             camera_m: (3,) world position that positions are relative to.
         """
-        geoms = np.zeros(stage.model.ngeom, _GEOM)
+        geoms = np.zeros(stage.model.ngeom, _PIECE)
         geoms["camera_from_geom"][..., :3] = stage.data.geom_xmat.reshape(-1, 3, 3)
         geoms["camera_from_geom"][..., 3] = stage.data.geom_xpos - camera_m
         geoms["colour"][:, :3] = self._materials.albedo
@@ -95,8 +96,8 @@ class Scene:
             geoms["colour"][geom, :3] = rgb
         for geom in stage.faces:
             geoms["colour"][geom, :3] = 1.0
-        self._geoms.upload(geoms)
-        GL.glBindBufferBase(GL.GL_SHADER_STORAGE_BUFFER, 0, self._geoms.handle)
+        self._pieces.upload(geoms[self.geom_of_piece])
+        GL.glVertexArrayVertexBuffer(self._vertex_array, _PIECES, self._pieces.handle, 0, _PIECE.itemsize)
 
     def set_lights(self, lights: Lights, maps: ShadowMaps | None, camera_m: Array) -> None:
         """Uploads the lights of a frame.
@@ -130,6 +131,12 @@ class Scene:
         centres_m, radii_m = self._spheres
         turns = stage.data.geom_xmat.reshape(-1, 3, 3)[self.geom_of_piece]
         return np.einsum("pij,pj->pi", turns, centres_m) + stage.data.geom_xpos[self.geom_of_piece], radii_m
+
+    def present(self, stage: Stage) -> Mask:
+        """(P,) bool, the pieces of geoms that a stage shows."""
+        if stage.is_absent is None:
+            return np.ones(len(self.geom_of_piece), np.bool_)
+        return np.asarray(~stage.is_absent[self.geom_of_piece])
 
     def sample_vertices(self, stage: Stage, chosen: Mask) -> Array:
         """(N, 3) world positions of a few vertices of each chosen piece; the origin where none is chosen."""
@@ -203,13 +210,13 @@ def _sample_vertices(geometry: Geometry) -> Array:
 
 
 def _vertex_array(geometry: Geometry) -> int:
-    """A vertex array: vertices, indices, and per draw command the piece's number and its geom's id."""
-    pieces = np.stack([np.arange(len(geometry.geoms)), geometry.geoms], axis=1).astype(np.uint32)
+    """A vertex array: vertices and indices; per draw command the piece's number, and (not yet bound) its `_PIECE`."""
     array = np.zeros(1, np.uint32)
     GL.glCreateVertexArrays(1, array)
     handle = int(array[0])
-    GL.glVertexArrayVertexBuffer(handle, 0, gl.static_buffer(geometry.vertices), 0, VERTEX.itemsize)
-    GL.glVertexArrayVertexBuffer(handle, 1, gl.static_buffer(pieces), 0, 8)
+    numbers = np.arange(len(geometry.geoms), dtype=np.uint32)
+    GL.glVertexArrayVertexBuffer(handle, _VERTICES, gl.static_buffer(geometry.vertices), 0, VERTEX.itemsize)
+    GL.glVertexArrayVertexBuffer(handle, _NUMBERS, gl.static_buffer(numbers), 0, numbers.itemsize)
     GL.glVertexArrayElementBuffer(handle, gl.static_buffer(geometry.indices))
     for place, (name, count, kind) in enumerate(
         (("position_m", 3, GL.GL_FLOAT), ("normal", 3, GL.GL_SHORT), ("texcoord", 2, GL.GL_FLOAT))
@@ -217,10 +224,14 @@ def _vertex_array(geometry: Geometry) -> int:
         _, offset = VERTEX.fields[name][:2]  # type: ignore[index]
         GL.glEnableVertexArrayAttrib(handle, place)
         GL.glVertexArrayAttribFormat(handle, place, count, kind, kind == GL.GL_SHORT, offset)
-        GL.glVertexArrayAttribBinding(handle, place, 0)
-    for place, offset in ((3, 0), (4, 4)):
-        GL.glEnableVertexArrayAttrib(handle, place)
-        GL.glVertexArrayAttribIFormat(handle, place, 1, GL.GL_UNSIGNED_INT, offset)
-        GL.glVertexArrayAttribBinding(handle, place, 1)
-    GL.glVertexArrayBindingDivisor(handle, 1, 1)
+        GL.glVertexArrayAttribBinding(handle, place, _VERTICES)
+    GL.glEnableVertexArrayAttrib(handle, 3)
+    GL.glVertexArrayAttribIFormat(handle, 3, 1, GL.GL_UNSIGNED_INT, 0)
+    GL.glVertexArrayAttribBinding(handle, 3, _NUMBERS)
+    for place in range(_PIECE.itemsize // 16):
+        GL.glEnableVertexArrayAttrib(handle, 4 + place)
+        GL.glVertexArrayAttribFormat(handle, 4 + place, 4, GL.GL_FLOAT, False, 16 * place)
+        GL.glVertexArrayAttribBinding(handle, 4 + place, _PIECES)
+    for binding in (_NUMBERS, _PIECES):
+        GL.glVertexArrayBindingDivisor(handle, binding, 1)
     return handle

@@ -31,11 +31,13 @@ class Cascade:
         centre_m: (3,) its middle in the world.
         axes: (3, 3) rows: two unit vectors across the sun's rays, and one towards the sun.
         half_side_m: half the length of its sides.
+        receivers_m: (N, 3) corners of the convex part of the world on which the map's shadows are seen; None for all.
     """
 
     centre_m: Array
     axes: Array
     half_side_m: float
+    receivers_m: Array | None = None
 
     @property
     def scale(self) -> Array:
@@ -50,6 +52,19 @@ class Cascade:
         """
         towards_sun = -self.scale[2] * (TOWARDS_SUN_RANGE_M + self.half_side_m)
         return np.asarray((0.0, 0.0, towards_sun) - self.scale * (self.axes @ (self.centre_m - origin_m)))
+
+    def seen_part(self, margin_m: float) -> tuple[Array, Array]:
+        """(2,) and (2,) least and largest coordinates, -1..1 across the map, of the shadows that are seen.
+
+        Args:
+            margin_m: distance by which the part is enlarged.
+        """
+        if self.receivers_m is None:
+            return np.full(2, -1.0), np.full(2, 1.0)
+        across = ((self.receivers_m - self.centre_m) @ self.axes.T)[:, :2]
+        ends = (across.min(axis=0) - margin_m) / self.half_side_m, (across.max(axis=0) + margin_m) / self.half_side_m
+        low, high = (np.clip(end, -1.0, 1.0) for end in ends)
+        return low, high
 
     def matrix(self, origin_m: Array) -> Array:
         """(4, 4) from positions relative to an origin to coordinates of the map.
@@ -100,7 +115,8 @@ def view_cascades(frustum: Frustum, towards_sun: Array) -> tuple[Cascade, ...]:
         # The smallest sphere about the part of the view between its two distances.
         middle_m = min((begin_m + end_m) / 2 * (1 + slope2), end_m)
         half_side_m = _MARGIN * math.sqrt((end_m - middle_m) ** 2 + slope2 * end_m**2)
-        made.append(Cascade(frustum.position_world_m + frustum.forward_world * middle_m, axes, half_side_m))
+        centre_m = frustum.position_world_m + frustum.forward_world * middle_m
+        made.append(Cascade(centre_m, axes, half_side_m, frustum.slice_corners(begin_m, end_m)))
         begin_m = end_m
     return tuple(made)
 

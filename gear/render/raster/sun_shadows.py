@@ -11,7 +11,7 @@ import numpy as np
 from OpenGL import GL  # type: ignore[import-untyped]
 
 from gear.contracts.rendering import Stage
-from gear.render.culling import Mask, bounding_radii, in_beam, near_to_far
+from gear.render.culling import Mask, bounding_radii, may_shadow, near_to_far
 from gear.render.pinhole import Frustum
 from gear.render.raster import gl
 from gear.render.raster.scene import Scene
@@ -27,6 +27,9 @@ _UNIT = 4
 _SLOPE_BIAS, _UNIT_BIAS = 1.5, 2.0
 _SEEN_TEXELS = 2
 """Geoms smaller than this many texels of a map cast no shadow in it."""
+
+_READ_TEXELS = 4
+"""Texels beside a surface that its shader may read: 1.5 along the normal, 0.75 aside, and one for the filter."""
 
 
 class SunShadows:
@@ -59,16 +62,16 @@ class SunShadows:
         Returns:
             The maps in the form that shaders read.
         """
-        centres_m, radii_m = spheres
+        centres_m, _ = spheres
         if self._town is None or not np.array_equal(self._town[0], towards_sun):
             self._town = towards_sun, self._draw_town(towards_sun)
             self._scene.set_poses(stage, frustum.position_world_m)
         cascades = (*view_cascades(frustum, towards_sun), self._town[1])
-        for part, cascade, chosen in zip(
-            _PARTS_PX[:2], cascades[:2], (np.ones_like(self._can_move), self._can_move), strict=True
-        ):
-            in_light = in_beam(cascade.centre_m, towards_sun, cascade.half_side_m, centres_m, radii_m)
-            self._draw(part, cascade, frustum.position_world_m, chosen & in_light, centres_m)
+        present = self._scene.present(stage)
+        for part, cascade, chosen in zip(_PARTS_PX[:2], cascades[:2], (present, present & self._can_move), strict=True):
+            assert cascade.receivers_m is not None
+            casts = may_shadow(cascade.receivers_m, cascade.axes, _margin_m(cascade, part[2]), *spheres)
+            self._draw(part, cascade, frustum.position_world_m, chosen & casts, centres_m)
         GL.glBindTextureUnit(_UNIT, self._texture)
         return _maps(cascades, frustum.position_world_m)
 
@@ -89,6 +92,7 @@ class SunShadows:
         """Draws one map; the scene must be posed relative to `origin_m`."""
         left, top, side = part
         self._target.bind((left, top, side, side))
+        GL.glScissor(*_rectangle(cascade, part))
         GL.glDepthFunc(GL.GL_LESS)
         GL.glDepthMask(True)
         GL.glDisable(GL.GL_CULL_FACE)
@@ -121,6 +125,21 @@ def _maps(cascades: tuple[Cascade, ...], camera_m: Array) -> ShadowMaps:
         # One texel earlier, since filtered reads include the next one.
         town_ends=(_PARTS_PX[2][1] + _TOWN_PX - 1) / _SIZE_PX[1],
     )
+
+
+def _margin_m(cascade: Cascade, side_px: int) -> float:
+    """Distance in metres from a surface at which its shader may read a map of this side in pixels."""
+    return _READ_TEXELS * 2 * cascade.half_side_m / side_px
+
+
+def _rectangle(cascade: Cascade, part: tuple[int, int, int]) -> tuple[int, int, int, int]:
+    """Left, top, width and height in pixels of the part of a map that shaders read."""
+    left, top, side = part
+    low, high = cascade.seen_part(_margin_m(cascade, side))
+    # The first row is on top, where the second coordinate is 1.
+    begin = np.floor(np.array((low[0] + 1, 1 - high[1])) * side / 2).astype(int)
+    end = np.ceil(np.array((high[0] + 1, 1 - low[1])) * side / 2).astype(int)
+    return left + int(begin[0]), top + int(begin[1]), int(end[0] - begin[0]), int(end[1] - begin[1])
 
 
 def _can_move(model: mujoco.MjModel) -> Mask:

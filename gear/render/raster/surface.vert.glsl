@@ -4,7 +4,8 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec2 texcoord;
 layout(location = 3) in uint piece;
-layout(location = 4) in uint geom;
+layout(location = 7) in vec4 colour; // linear albedo
+layout(location = 8) in vec4 material; // perceptual roughness, metallic, emission, reflectance at normal incidence (f0)
 
 uniform mat4 clip_from_relative;
 out vec3 position_m;
@@ -18,7 +19,7 @@ out vec3 town_at;
 #endif
 flat out int id;
 flat out vec3 albedo; // looked up once per triangle instead of once per sample
-flat out vec4 surface; // see struct Geom
+flat out vec4 surface; // see material
 invariant gl_Position;
 
 // Coordinates in a shadow map, moved by 1.5 texels along the normal so that a surface does not shadow itself.
@@ -29,16 +30,16 @@ vec3 shadow_coordinates(int map, vec3 position_by_sun, vec3 facing_by_sun) {
 
 void main() {
     id = int(piece);
-    albedo = geoms[geom].colour.rgb;
-    surface = geoms[geom].surface;
+    albedo = colour.rgb;
+    surface = material;
     uv = texcoord;
-    position_m = relative_position(geom, position);
-    smooth_normal = rotate_to_world(geom, normal);
+    position_m = relative_position(position);
+    smooth_normal = rotate_to_world(normal);
 #ifdef HAS_NORMAL
     // Filament derives the tangent from the normal alone; gear.world.compilation.normal_maps prepares meshes for that.
     float share = 1.0 / max(1.0 + normal.y, 1e-6);
     vec3 red = vec3(-normal.x * normal.z * share, -normal.z, 1.0 - normal.z * normal.z * share);
-    tangent = rotate_to_world(geom, 1.0 + normal.y < 1e-6 ? vec3(-1.0, 0.0, 0.0) : red);
+    tangent = rotate_to_world(1.0 + normal.y < 1e-6 ? vec3(-1.0, 0.0, 0.0) : red);
 #endif
 #ifdef SHADOWS
     mat3 to_sun = transpose(mat3(sun_axes[0].xyz, sun_axes[1].xyz, sun_axes[2].xyz));

@@ -236,3 +236,38 @@ def test_it_starts_in_a_process_that_says_nothing_of_opengl(names: tuple[str, ..
     environment = {key: value for key, value in os.environ.items() if key not in ("MUJOCO_GL", "PYOPENGL_PLATFORM")}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["egl"] * len(names)
+
+
+@pytest.mark.parametrize("quality", ["film", "fast"])
+def test_shadows_do_not_depend_on_earlier_pictures(quality: Quality) -> None:
+    """Maps are drawn where they are seen only; beside that part lies what an earlier picture left."""
+    model = street("ClearSunset")
+    stage = Stage(model=model, data=posed(model))
+    records = [camera(yaw_deg=yaw) for yaw in (90, 4, 250)]
+    one = open_renderer("raster", model, quality=quality)
+    try:
+        together = [rendered(one, stage, record) for record in (*records, *records)]
+    finally:
+        one.close()
+    for record, first, second in zip(records, together[:3], together[3:], strict=True):
+        other = open_renderer("raster", model, quality=quality)
+        try:
+            assert np.array_equal(rendered(other, stage, record), first) and np.array_equal(first, second)
+        finally:
+            other.close()
+
+
+def test_geoms_that_a_stage_leaves_out_are_drawn_nowhere() -> None:
+    model = street("ClearNoon")
+    data = posed(model)
+    is_absent = np.arange(model.ngeom) == model.geom("car").id
+    shown, left_out = Stage(model=model, data=data), Stage(model=model, data=data, is_absent=is_absent)
+    with_car = posed(model)
+    with_car.geom_xpos[is_absent, 2] = -500.0
+    gone = Stage(model=model, data=with_car)
+    renderer = open_renderer("raster", model, quality="fast")
+    try:
+        frames = [rendered(renderer, stage, camera()) for stage in (shown, left_out, gone)]
+    finally:
+        renderer.close()
+    assert np.array_equal(frames[1], frames[2]) and not np.array_equal(frames[0], frames[1])
