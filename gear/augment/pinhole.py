@@ -17,14 +17,14 @@ def mirrored_pinhole(pinhole: Intrinsics) -> Intrinsics:
 
 
 def windowed_pinhole(pinhole: Intrinsics, window: Window) -> Intrinsics:
-    """The pinhole of a window's picture."""
-    focal_y_px = None if pinhole.focal_y_px is None else pinhole.focal_y_px * window.scale_y
+    """The pinhole of a window's picture. Its focal lengths differ where the window is stretched by rounded sizes."""
+    focal_px, focal_y_px = pinhole.fx_px * window.scale_x, pinhole.fy_px * window.scale_y
     principal_px = None
     if pinhole.principal_px is not None:
         left, top, _, _ = cut_index_box((pinhole.cx_px, pinhole.cy_px, pinhole.cx_px, pinhole.cy_px), window)
         principal_px = (left, top)
-    focal_px = pinhole.focal_px * window.scale_x
-    return Intrinsics(window.out_width_px, window.out_height_px, focal_px, focal_y_px, principal_px)
+    own_focal_y_px = None if focal_y_px == focal_px else focal_y_px
+    return Intrinsics(window.out_width_px, window.out_height_px, focal_px, own_focal_y_px, principal_px)
 
 
 def cut_index_box(box_px: BoxPx, window: Window) -> BoxPx:
