@@ -24,19 +24,23 @@ ROOMS: dict[str, tuple[float, str, str]] = {
     "cli": (0.5, "command line", "one small file per command: reads arguments, calls the verb, prints"),
     "verbs": (0.5, "what a user does", "`collect`, `train`, `attack`, `evaluate`, `gap`, `bench` and the other verbs"),
     "view": (0.9, "HTML page", "the page that `gear view` writes"),
-    "measuring": (0.34, "models over data", "what verbs share when they measure: guarded models, statistics, twins"),
+    "measuring": (
+        0.34,
+        "models over data",
+        "what verbs share when they measure: a guarded model, statistics, twins, the gap",
+    ),
     "collecting": (
         0.71,
         "making samples",
-        "what verbs share when they collect: jobs, sessions, workers, patches, probes",
+        "what verbs share when they collect: jobs, what each worker does, patches, probes",
     ),
     "readers": (0.11, "torch datasets", "datasets of any task as torch reads them: batches, order, prefetching"),
-    "testing": (0.9, "contracts", "contract tests and small worlds that plugin authors use"),
+    "testing": (0.9, "for plugin authors", "contract tests and small worlds that plugin authors use"),
     "augment": (0.34, "augmentation", "changes of pictures that keep their ground truth exact"),
     "plugins": (
         0.27,
         "built-in plugins",
-        "discovery, and the built-in tasks, models, attacks and defenses, one file each",
+        "discovery, datasets with their tasks, and the built-in plugins, one file each",
     ),
     "compositor": (0.55, "patch into picture", "puts patches into pictures, exactly and differentiably"),
     "networks": (0.2, "graphs, losses", "network graphs, losses, weights, by task"),
@@ -45,16 +49,34 @@ ROOMS: dict[str, tuple[float, str, str]] = {
     "formats": (0.33, "file formats", "reads and writes Cityscapes, COCO, KITTI, PNG, probes"),
     "world": (0.84, "towns, traffic", "towns, roads, traffic, weather and surfaces as MuJoCo models"),
     "render": (0.66, "renderers", "`raster`, `filament` and `classic` behind one protocol"),
-    "dataset": (0.27, "files on disk", "files that appear whole or not at all, plans, sidecars, manifests, locks"),
+    "dataset": (
+        0.27,
+        "files on disk",
+        "whole files, plans, sidecars, manifests, locks, worker processes",
+    ),
     "camera": (0.55, "light to bytes", "air, rain, night, lens, noise and response of the camera"),
     "config": (0.9, "YAML", "YAML files to typed configs; errors with file, line and column"),
     "contracts": (0.5, "protocols", "protocols and specs that rooms and plugins agree on"),
     "values": (0.5, "plain data", "scene records, frames, geometry, labels, errors; NumPy only"),
-    "reporting": (0.82, "progress", "bars on a terminal and in notebooks, plain lines in logs"),
-    "executors": (0.3, "processes", "where samples are made: processes, ray, slurm"),
-    "driving": (0.1, "closed loop", "vehicle dynamics, the closed loop, scenarios"),
+    "reporting": (
+        0.82,
+        "progress, legends",
+        "progress bars and plain lines, legends of colours",
+    ),
 }
 """Every room: its place from left (0) to right (1), two words for the picture, a line for the table."""
+
+GROUPS = (
+    ("what users run", 2),
+    ("what verbs share", 3),
+    ("plugins and their parts", 2),
+    ("worlds, labels, files", 2),
+    ("basics", 4),
+)
+"""Groups of floors, from the top: a name for the picture, and the number of floors."""
+
+GROUP_PX = 170
+"""Width of the column with the names of the groups, left of the rooms."""
 
 WIDTH_PX, FLOOR_PX, BOX_PX, BOX_HEIGHT_PX, MARGIN_PX = 920, 74, 150, 44, 20
 
@@ -98,20 +120,28 @@ def picture() -> str:
     """The map as SVG."""
     rows = floors()
     centres = {
-        room: (ROOMS[room][0] * WIDTH_PX, MARGIN_PX + at * FLOOR_PX + BOX_HEIGHT_PX / 2)
+        room: (GROUP_PX + ROOMS[room][0] * WIDTH_PX, MARGIN_PX + at * FLOOR_PX + BOX_HEIGHT_PX / 2)
         for at, row in enumerate(rows)
         for room in row
     }
     height = 2 * MARGIN_PX + (len(rows) - 1) * FLOOR_PX + BOX_HEIGHT_PX
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH_PX} {height}" font-family="sans-serif">',
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {GROUP_PX + WIDTH_PX} {height}" '
+        'font-family="sans-serif">',
         '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" orient="auto">'
         '<path d="M0 0 8 4 0 8z" fill="#456"/></marker></defs>',
-        f'<rect width="{WIDTH_PX}" height="{height}" fill="#fff"/>',
+        f'<rect width="{GROUP_PX + WIDTH_PX}" height="{height}" fill="#fff"/>',
     ]
-    for at in range(0, len(rows), 2):
-        top = MARGIN_PX + at * FLOOR_PX - (FLOOR_PX - BOX_HEIGHT_PX) / 2
-        parts.append(f'<rect y="{top:.0f}" width="{WIDTH_PX}" height="{FLOOR_PX}" fill="#f2f5f8"/>')
+    assert sum(count for _, count in GROUPS) == len(rows)
+    first = 0
+    for number, (name, count) in enumerate(GROUPS):
+        top, tall = MARGIN_PX + first * FLOOR_PX - (FLOOR_PX - BOX_HEIGHT_PX) / 2, count * FLOOR_PX
+        fill = "#f2f5f8" if number % 2 == 0 else "#fff"
+        parts += [
+            f'<rect y="{top:.0f}" width="{GROUP_PX + WIDTH_PX}" height="{tall}" fill="{fill}"/>',
+            f'<text x="12" y="{top + tall / 2:.0f}" font-size="14" font-style="italic" fill="#345">{name}</text>',
+        ]
+        first += count
     for room, targets in sorted(without_shortcuts(imports()).items()):
         parts += [_arrow(centres[room], centres[target]) for target in sorted(targets)]
     for room, (x, y) in centres.items():

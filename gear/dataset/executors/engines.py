@@ -1,4 +1,4 @@
-"""The installed engines: every other module of this room is one, and is called by its name."""
+"""The installed engines: every other module of this folder is one, and is called by its name."""
 
 from __future__ import annotations
 
