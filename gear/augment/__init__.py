@@ -1,5 +1,7 @@
-"""Augmentation of training samples: pure functions from a sample and a random generator to a sample. No torch.
+"""Augmentation of training samples: pure functions from a sample and a random generator to a new sample. Does not
+import torch.
 
-A task registers how its samples are mirrored and cropped (`gear.augment.registry.register`); its ground truth moves
-with the pixels. Colours change for every task. Samples of a class without a registered geometry are only recoloured.
+A task registers functions that mirror and crop its samples together with their ground truth
+(`gear.augment.registry.register`). Colours are changed for the samples of all tasks. Samples of a class without
+registered functions are only recoloured.
 """

@@ -1,4 +1,4 @@
-"""One sample in, one augmented sample out."""
+"""Augments one sample: mirrors, crops, resizes and recolours it."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from gear.values.errors import FieldError, GearError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Augmentation:
-    """What is done to training samples.
+    """Probabilities and strengths of the changes to training samples.
 
     Attributes:
-        flip: how often a sample is mirrored.
-        colour: how often colours are changed.
-        colours: how far.
-        cut_depth: how often depth is pasted into a picture (monocular depth only).
+        flip: probability that a sample is mirrored.
+        colour: probability that its colours are changed.
+        colours: strengths of the colour changes.
+        cut_depth: probability that depth is pasted into a picture (monocular depth only).
     """
 
     flip: float = 0.5
@@ -39,11 +39,11 @@ class Augmentation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Framing:
-    """Which part of a picture training sees, and how large.
+    """The part of a picture that training uses, and its size.
 
     Attributes:
-        crop_px: height and width of what the network sees; None for the whole picture's.
-        scales: range of the size at which things are shown; 1 is the picture's own.
+        crop_px: height and width of the network's input; None for those of the whole picture.
+        scales: range of the factor by which a picture is resized.
     """
 
     crop_px: tuple[int, int] | None = None
@@ -51,10 +51,10 @@ class Framing:
 
 
 def shrunk(sample: SampleT, share: float) -> SampleT:
-    """The sample as a camera with fewer pixels would have taken it: its whole view at a share of its size.
+    """The sample of a camera with the same view and fewer pixels: the whole picture at a share of its size.
 
     Raises:
-        GearError: a third party's samples that nobody can move.
+        GearError: the sample is of a class without registered functions.
     """
     if share == 1:
         return sample
@@ -67,13 +67,13 @@ def shrunk(sample: SampleT, share: float) -> SampleT:
 
 
 def augment(sample: SampleT, how: Augmentation, framing: Framing, rng: np.random.Generator) -> SampleT:
-    """A new sample whose ground truth is as exact as the given one's.
+    """Returns a changed copy of a sample, whose ground truth is changed with its pixels.
 
-    Sizes are drawn evenly in their logarithm. Moved samples have no `surfaces`, and their `record` still tells the
-    scene as it was rendered.
+    Scale factors are drawn uniformly in their logarithm. Mirrored, cropped or resized samples have no `surfaces`, and
+    their `record` still describes the rendered scene.
 
     Raises:
-        GearError: crops or scales are wanted of a third party's samples that nobody can move.
+        GearError: crops or scales are requested for a sample of a class without registered functions.
     """
     moved: Any = _moved(sample, how, framing, rng)
     geometry = geometry_of(sample)

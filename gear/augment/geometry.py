@@ -1,4 +1,4 @@
-"""Moving pixels: mirrored samples, and windows of samples at another size."""
+"""Geometric changes of pictures, maps and boxes: mirroring, and cropping to a window that is resized."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from gear.values.ground_truth import BoxPx
 
 SampleT = TypeVar("SampleT", bound=Sample)
 PADDING_LEVEL = 114
-"""Grey of what a window shows beyond the picture."""
+"""Grey level with which a window is padded beyond the picture."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """Part of a picture, shown at a size of its own.
+    """A part of a picture that is resized to another size.
 
     Attributes:
-        left_px, top_px, width_px, height_px: of the part, in whole edge pixels of the picture; it may exceed the
-            picture, and what lies beyond is padding.
-        out_width_px, out_height_px: size that it is shown at.
+        left_px, top_px, width_px, height_px: position and size of the part in whole edge pixels of the picture; the
+            part may exceed the picture and is padded there.
+        out_width_px, out_height_px: size after resizing.
     """
 
     left_px: int
@@ -39,32 +39,32 @@ class Window:
 
     @property
     def scale_x(self) -> float:
-        """Pixels shown for each of the picture's, along a row."""
+        """Horizontal scale: output pixels per pixel of the picture."""
         return self.out_width_px / self.width_px
 
     @property
     def scale_y(self) -> float:
-        """The same along a column."""
+        """Vertical scale: output pixels per pixel of the picture."""
         return self.out_height_px / self.height_px
 
     @property
     def scale(self) -> float:
-        """Their geometric mean."""
+        """Geometric mean of the horizontal and the vertical scale."""
         return math.sqrt(self.scale_x * self.scale_y)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Geometry(Generic[SampleT]):
-    """How one task's samples are moved. No function changes the sample that it is given.
+    """Functions that mirror, crop and resize the samples of one task. None of them changes its argument.
 
     Attributes:
-        flip: gives the sample mirrored, left to right.
-        cut: gives the part of the sample that a window shows.
-        is_centred: whether a window must share the picture's centre, because the ground truth needs its principal point
+        flip: mirrors a sample, left to right.
+        cut: crops a sample to a window.
+        is_centred: whether a window must have the picture's centre, because the ground truth needs the principal point
             there.
-        shrink: gives the sample that a camera with fewer pixels would take; its window is the whole picture. None where
-            `cut` does that.
-        cut_depth: gives the sample with its depth pasted into the picture (CutDepth); None for tasks without depth.
+        shrink: resizes a sample to that of a camera with the same view and fewer pixels; the window is the whole
+            picture. None if `cut` does the same.
+        cut_depth: pastes a sample's depth into its picture (CutDepth); None for tasks without depth.
     """
 
     flip: Callable[[SampleT], SampleT]
@@ -75,7 +75,7 @@ class Geometry(Generic[SampleT]):
 
 
 def whole_window(size_px: tuple[int, int], share: float) -> Window:
-    """The whole of a picture of that height and width, shown at a share of its size."""
+    """A window of a whole picture of the given height and width, resized to a share of its size."""
     height, width = size_px
     return Window(
         left_px=0,
@@ -95,14 +95,14 @@ def draw_window(
     *,
     is_centred: bool = False,
 ) -> Window:
-    """A window somewhere in (or, where it is larger, around) a picture.
+    """Draws a window inside a picture, or around it if the window is larger.
 
     Args:
         size_px: height and width of the picture.
-        out_px: height and width to show the window at.
-        scale: shown pixels for each of the picture's.
-        rng: draws the place.
-        is_centred: whether it must share the picture's middle.
+        out_px: height and width of the window after resizing.
+        scale: output pixels per pixel of the picture.
+        rng: generator of the window's position.
+        is_centred: whether the window must have the picture's centre.
     """
     (height, width), (out_height, out_width) = size_px, out_px
     h, w = max(1, round(out_height / scale)), max(1, round(out_width / scale))
@@ -116,7 +116,7 @@ def draw_window(
 
 
 def _of_parity(value: float, like: int) -> int:
-    """The nearest whole number above 0 that is as even as another one."""
+    """The nearest positive integer with the same parity as another integer."""
     return max(2 * round((value - like % 2) / 2) + like % 2, 2 - like % 2)
 
 
@@ -125,24 +125,24 @@ def _between(room_px: int, rng: np.random.Generator) -> int:
 
 
 def flip_array(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """(H, W, ...) with its columns the other way round."""
+    """Mirrors an (H, W, ...) array, left to right."""
     return np.ascontiguousarray(array[:, ::-1])
 
 
 def cut_picture(picture: UInt8Image, window: Window) -> UInt8Image:
-    """What the window shows of an (H, W, 3) picture: averaged where it shrinks, bilinear where it grows."""
+    """Crops and resizes an (H, W, 3) picture: by area averages if it gets smaller, bilinearly if it gets larger."""
     part = _part(picture, window, PADDING_LEVEL)
     method = cv2.INTER_AREA if window.scale < 1 else cv2.INTER_LINEAR
     return np.asarray(_resized(part, window, method), dtype=np.uint8)
 
 
 def cut_map(values: npt.NDArray[Any], window: Window, fill: float) -> npt.NDArray[Any]:
-    """What the window shows of an (H, W) map, each pixel one of the map's own; `fill` beyond it."""
+    """Crops and resizes an (H, W) map by nearest neighbour, padded with `fill`."""
     return _resized(_part(values, window, fill), window, cv2.INTER_NEAREST_EXACT)
 
 
 def cut_box(box_px: BoxPx, window: Window) -> BoxPx:
-    """A box in edge pixels of the picture, in edge pixels of what the window shows; not clipped."""
+    """Converts a box from edge pixels of the picture to edge pixels of the window's output; not clipped."""
     left, top, right, bottom = box_px
     return (
         (left - window.left_px) * window.scale_x,
@@ -153,14 +153,15 @@ def cut_box(box_px: BoxPx, window: Window) -> BoxPx:
 
 
 def flip_box(box_px: BoxPx, width_px: int) -> BoxPx:
-    """A box in edge pixels, mirrored."""
+    """Mirrors a box in edge pixels."""
     left, top, right, bottom = box_px
     return (width_px - right, top, width_px - left, bottom)
 
 
 def clipped(box_px: BoxPx, frame_px: BoxPx) -> BoxPx:
-    """The part of a box inside another one; where they do not meet, its right side lies left of its left one, or its
-    bottom above its top."""
+    """Intersection of two boxes; if they do not intersect, its right is left of its left, or its bottom
+    above its top.
+    """
     return (
         max(box_px[0], frame_px[0]),
         max(box_px[1], frame_px[1]),
@@ -170,7 +171,7 @@ def clipped(box_px: BoxPx, frame_px: BoxPx) -> BoxPx:
 
 
 def box_area(box_px: BoxPx) -> float:
-    """Square pixels of a box; 0 for one whose sides are in the wrong order."""
+    """Area of a box in square pixels; 0 if its sides are in the wrong order."""
     left, top, right, bottom = box_px
     return max(0.0, right - left) * max(0.0, bottom - top)
 

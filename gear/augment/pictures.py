@@ -1,4 +1,4 @@
-"""Changing colours: what a camera, an encoder or dirt does to pictures, while the scene stays where it is."""
+"""Random changes of pixel values as by a camera, an encoder or dirt; the geometry does not change."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from gear.values.frames import UInt8Image
 
 LEVELS = np.arange(256, dtype=np.float32) / 255
 MOST_BLUR_PX = 100.0
-"""Nothing is left of a picture long before, and the time of a blur grows with it."""
+"""Largest standard deviation of the blur in pixels; the time of a blur grows with it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Colours:
-    """How far colours are changed. Every change is drawn evenly from its range.
+    """Strengths of the colour changes. Every change is drawn uniformly from its range.
 
     Attributes:
         brightness: light is scaled by 1 ± this.
@@ -26,14 +26,14 @@ class Colours:
         saturation: distance from grey is scaled by 1 ± this.
         balance: each of red, green, blue is scaled by 1 ± this.
         gamma: exponent between 1 / (1 + this) and 1 + this.
-        noise: how often noise is added.
-        noise_levels: its standard deviation at most, in levels of 0..255.
-        blur: how often the picture is blurred.
-        blur_px: standard deviation of the blur at most.
-        jpeg: how often the picture goes through JPEG.
-        jpeg_quality: its quality at least, 1 to 100.
-        erase: how often a rectangle is painted over with noise; ground truth stays as it is.
-        erase_share: its sides at most, as a share of the picture's.
+        noise: probability that noise is added.
+        noise_levels: largest standard deviation of the noise, in levels of 0..255.
+        blur: probability that the picture is blurred.
+        blur_px: largest standard deviation of the blur.
+        jpeg: probability that the picture is compressed by JPEG.
+        jpeg_quality: lowest quality of JPEG, 1 to 100.
+        erase: probability that a rectangle is filled with noise; ground truth does not change.
+        erase_share: largest sides of the rectangle, as a share of the picture's sides.
     """
 
     brightness: float = 0.3
@@ -67,8 +67,7 @@ class Colours:
 
 
 def recolour(images: Mapping[str, UInt8Image], colours: Colours, rng: np.random.Generator) -> dict[str, UInt8Image]:
-    """New pictures of one sample. All its views are changed alike, as one make of camera would; noise is each one's
-    own."""
+    """Recoloured pictures of one sample. All views are changed in the same way, except that each has its own noise."""
     table, saturation = _table(colours, rng), 1 + rng.uniform(-colours.saturation, colours.saturation)
     blur_px = rng.uniform(min(0.3, colours.blur_px), colours.blur_px) if rng.random() < colours.blur else 0.0
     noise_levels = rng.uniform(0, colours.noise_levels) if rng.random() < colours.noise else 0.0
@@ -99,7 +98,7 @@ def _through_jpeg(picture: UInt8Image, quality: int) -> UInt8Image:
 
 
 def _table(colours: Colours, rng: np.random.Generator) -> UInt8Image:
-    """(1, 256, 3): gamma, then brightness and balance, then contrast."""
+    """(1, 256, 3) table of levels: gamma, then brightness and balance, then contrast."""
     reach = np.log1p(colours.gamma)
     shaped = LEVELS ** np.exp(rng.uniform(-reach, reach))
     gain = (1 + rng.uniform(-colours.brightness, colours.brightness)) * (
@@ -111,7 +110,7 @@ def _table(colours: Colours, rng: np.random.Generator) -> UInt8Image:
 
 
 def _erase(picture: UInt8Image, unit: np.ndarray, share: float, rng: np.random.Generator) -> UInt8Image:
-    """Noise over a rectangle that four numbers in 0..1 place (Zhong et al., "Random Erasing", 2020)."""
+    """Fills a rectangle, given by four numbers in 0..1, with noise (Zhong et al., "Random Erasing", 2020)."""
     height, width = picture.shape[:2]
     h, w = max(1, int(height * share * unit[0])), max(1, int(width * share * unit[1]))
     top, left = int((height - h) * unit[2]), int((width - w) * unit[3])

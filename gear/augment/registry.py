@@ -1,4 +1,4 @@
-"""How samples of each class are moved; every task registers its own, in its own file."""
+"""The functions that mirror, crop and resize samples, by class of sample. Every task registers its own."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ _GEOMETRIES: dict[type[Sample], Geometry[Any]] = {}
 
 
 def register(kind: type[SampleT], geometry: Geometry[SampleT]) -> None:
-    """Registers how samples of a class are moved. Call it in the module that defines the class, so that it holds
-    wherever there are such samples.
+    """Registers the functions that mirror, crop and resize samples of a class. Call it in the module that defines the
+    class, so that it is registered wherever such samples exist.
 
     Raises:
-        ValueError: the class has another geometry already.
+        ValueError: another geometry is registered for the class.
     """
     if _GEOMETRIES.setdefault(kind, geometry) != geometry:
         raise ValueError(f"{kind.__name__} has a geometry already")
 
 
 def geometry_of(sample: Sample) -> Geometry[Any] | None:
-    """How a sample is moved; None where no geometry is registered for its class.
+    """The functions registered for a sample's class; None if there are none.
 
-    A subclass does not inherit the geometry of its parent: it may have fields that the parent's geometry does not move.
+    A subclass does not inherit the functions of its parent, because it may have fields that they do not change.
     """
     return _GEOMETRIES.get(type(sample))

@@ -1,4 +1,4 @@
-"""The loop of one worker: the next scene is rendered while the last one is measured, encoded and written."""
+"""The loop of one worker: a scene is rendered while the previous one is measured, encoded and written."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from gear.collecting.session import Session, Shot
 from gear.dataset.store import Store
 
 IN_FLIGHT = 2
-"""Frames that may wait for the writer; more would cost memory and save no time."""
+"""Number of frames that may wait for the writer; more would need memory and save no time."""
 
 
 def collect_samples(session: Session, store: Store, indices: Iterable[int], done: Callable[[int], None]) -> None:
-    """Makes and writes samples; `done` is called when the last file of a sample is in place.
+    """Makes and writes samples; `done` is called when all files of a sample are written.
 
     Raises:
-        GearError: the first error; finished samples stay. Of two errors at once, that of the earlier sample.
+        GearError: a sample cannot be made or written; finished samples are kept. If two samples fail at once, the error
+            of the earlier one.
     """
     waiting: deque[tuple[int, Future[None]]] = deque()
 

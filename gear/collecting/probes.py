@@ -21,10 +21,12 @@ from gear.values.scene import SceneRecord
 from gear.world.world import PlacedStage, World
 
 Raws = tuple[RawView, ...]
-"""One a camera."""
+"""One raw view per camera."""
 
 UNSURE = 8
-"""Steps of a frame by which white that was worked out may miss white that was seen, for rounding alone."""
+"""Largest difference, in quantisation steps of a frame, between extrapolated and rendered white that rounding alone can
+cause.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -76,7 +76,9 @@ class Session:
         return Shot(record=record, raw=raw, below=below, geoms=placed.geoms, objects=placed.objects, probes=probes)
 
     def to_frame(self, shot: Shot) -> Frame:
-        """Turns renders into pictures. Needs neither world nor renderer, so that it can run beside them."""
+        """Turns renders into pictures. It needs neither world nor renderer, so that it can run in parallel
+        with them.
+        """
         return self._frame(shot, self._reflections(shot))
 
     def _reflections(self, shot: Shot) -> list[Reflection | None]:

@@ -1,4 +1,4 @@
-"""The base of compositors: they replace some pixels of stored pictures by pixels that depend on patches."""
+"""The base class of compositors, which replace some pixels of stored pictures by pixels that depend on patches."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Prepared:
 
     @property
     def nbytes(self) -> int:
-        """Memory of the whole in bytes."""
+        """Memory of picture, indices and inner data in bytes."""
         return self.picture.nbytes + self.where.nbytes + self.inner_bytes
 
 

@@ -31,7 +31,7 @@ class Cache(Generic[ThingT]):
         return len(self._things)
 
     def get(self, key: Hashable, make: Callable[[], ThingT]) -> ThingT:
-        """The object of a key; `make` creates it if it is missing. An object larger than the cache is not kept."""
+        """The object with a key; `make` creates it if it is missing. An object larger than the cache is not stored."""
         if key in self._things:
             self._things.move_to_end(key)
             return self._things[key]

@@ -1,7 +1,7 @@
 """Texture samples of the pixels that show a surface.
 
 Every pixel has a few samples: a position on the face, a mip level and a weight; its colour is their weighted mean.
-Samples beside the face have weight 0: probes already hold which share of a pixel the face covers.
+Samples outside the face have weight 0, because probes already contain the share of a pixel that the face covers.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Samples:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SampleScheme:
-    """How a renderer and a camera take samples.
+    """The positions of samples in a pixel, as a renderer and a camera take them.
 
     Attributes:
         supersampled: whether a pixel has 2 x 2 samples (`film` of all renderers but `classic`).

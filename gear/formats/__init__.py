@@ -1,2 +1,1 @@
-"""Formats: bytes and text of the file formats that the field uses, and back. Pure functions; nothing here touches a
-disk."""
+"""File formats: pure functions that encode and decode the bytes and text of datasets. Nothing here touches a disk."""

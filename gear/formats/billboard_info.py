@@ -1,9 +1,9 @@
-"""`camera_billboard_info.json`: poses of cameras and boards as the original's public loaders want them.
+"""`camera_billboard_info.json`: poses of cameras and billboards for the loaders of CARLA-GeAR.
 
-World: x forward, y left, z up, metres and radians. A board's origin lies on the face at half height, 0.1 m to the
-left of the middle, its x axis points into the board, y to the viewer's left, z up: the loaders' own offset of the
-patch starts from there. They ignore roll and pitch of everything, so records of tilted cameras or boards are marked
-by `level: false`.
+World frame: x forward, y left, z up, in metres and radians. The origin of a billboard lies on its face at half height,
+0.1 m to the left of the middle; its x axis points into the board, y to the viewer's left, z up. The loaders compute the
+place of the patch from this origin. They ignore roll and pitch, so records of tilted cameras or billboards have `level:
+false`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from gear.values.serial import Json
 
 LEFT_OF_MIDDLE_M = 0.1
 FLU_FROM_SURFACE = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""From a surface's axes (x right, y down, z in) to the board's (x in, y left, z up)."""
+"""Rotation from a surface's axes (x right, y down, z into the board) to the billboard's (x into the board, y left, z
+up).
+"""
 
 LEVEL_RAD = 1e-4
 
@@ -30,11 +32,11 @@ def billboard_info(
     """The content of the file for one split.
 
     Args:
-        records: of the samples, in the loader's order.
-        task: the original's name of it: `ss`, `2dod`, `3dod`, `depth`.
+        records: scene records of the samples, in the loader's order.
+        task: CARLA-GeAR's name of the task: `ss`, `2dod`, `3dod`, `depth`.
         patch_label: `none`, `random`, or the patch's name and hash.
         reference: name of the camera whose pictures the loader reads.
-        second: name of the second camera; the first again if there is none.
+        second: name of the second camera; `reference` again if there is none.
     """
     second = second or reference
     is_patched = patch_label != "none"
@@ -73,7 +75,7 @@ def xyzrpy(world_from_frame: RigidTransform) -> list[float]:
 
 
 def world_from_board(record: SceneRecord, index: int) -> RigidTransform:
-    """The board's frame of the module's text, for one surface of a record."""
+    """Pose of a billboard in the world, in the frame that the module's docstring describes."""
     world_from_surface = record.world_from_surface(record.surfaces[index])
     rotation: Array = world_from_surface.rotation @ FLU_FROM_SURFACE.T
     origin = world_from_surface.apply([-LEFT_OF_MIDDLE_M, 0.0, 0.0])
@@ -81,7 +83,7 @@ def world_from_board(record: SceneRecord, index: int) -> RigidTransform:
 
 
 def world_from_flu_camera(camera: CameraRecord) -> RigidTransform:
-    """The camera with x forward, y left, z up."""
+    """Pose of a camera in the world, with x forward, y left, z up."""
     placed = camera.world_from_camera_transform
     rotation: Array = placed.rotation @ CAMERA_FROM_ACTOR_AXES
     return RigidTransform.from_parts("world", "camera", rotation, placed.translation_m)

@@ -1,4 +1,4 @@
-"""Cityscapes: label ids, file names, label pictures and cameras."""
+"""Cityscapes: label ids, file names, label pictures and camera files."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ from gear.values.serial import Json
 IGNORED_TRAIN_ID = 255
 
 INSTANCE_FACTOR = 1000
-"""An instance picture holds id * 1000 + number for single instances, the id alone for everything else."""
+"""An instance picture holds label id * 1000 + instance number for single instances, and the label id for all other
+pixels.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class CityscapesLabel:
-    """One line of the benchmark's label table.
+    """One row of Cityscapes' label table.
 
     Attributes:
-        id: what the label pictures hold.
-        name: as in the polygon files.
-        train_id: 0..18, or 255 for what is not evaluated.
-        category: of the eight coarse ones.
-        has_instances: whether single instances are told apart.
-        rgb: colour of the pictures for people.
+        id: label id, the value in label pictures.
+        name: name in polygon files.
+        train_id: 0..18, or 255 for labels that are not evaluated.
+        category: one of Cityscapes' eight categories.
+        has_instances: whether instance pictures number the instances of this label.
+        rgb: colour in colour pictures.
     """
 
     id: int
@@ -42,7 +44,7 @@ class CityscapesLabel:
 
     @property
     def is_evaluated(self) -> bool:
-        """Whether the benchmark counts it."""
+        """Whether the benchmark evaluates the label."""
         return self.train_id != IGNORED_TRAIN_ID
 
 
@@ -82,7 +84,7 @@ LABELS: tuple[CityscapesLabel, ...] = (
     CityscapesLabel(32, "motorcycle", 17, "vehicle", True, (0, 0, 230)),
     CityscapesLabel(33, "bicycle", 18, "vehicle", True, (119, 11, 32)),
 )
-"""All labels in the order of their ids."""
+"""All labels, by label id."""
 
 COLOURS: UInt8Image = np.array([label.rgb for label in LABELS], dtype=np.uint8)
 """(34, 3) RGB by label id."""
@@ -92,23 +94,23 @@ COLOURS_RGBA: UInt8Image = np.concatenate([COLOURS, np.full((len(COLOURS), 1), 2
 
 
 def city_name(town: str) -> str:
-    """The town as a city's name: no underscore in it (the official tools split names there), and `aachen` at its end.
+    """The city name of a town: without underscores, at which the official tools split names, and ending in `aachen`.
 
-    The original's public loader knows a Cityscapes tree only by one of three real cities' names; ending in one makes a
-    single tree fit that loader, torchvision and the official tools.
+    CARLA-GeAR's loader recognises a Cityscapes tree by one of three names of real cities. With this ending the same
+    tree works with that loader, with torchvision and with the official tools.
     """
     letters = re.sub(r"[^a-z0-9]", "", town.lower())
     return f"gear{letters}aachen"
 
 
 def stem(town: str, sequence: int, frame: int) -> str:
-    """`<city>_<sequence>_<frame>`, what all files of one picture start with."""
+    """`<city>_<sequence>_<frame>`, the beginning of the names of all files of one picture."""
     return f"{city_name(town)}_{sequence:06d}_{frame:06d}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paths:
-    """Where the files of one picture lie, relative to the root."""
+    """Paths of the files of one picture, relative to the dataset's root."""
 
     image: str
     label_ids: str
@@ -119,7 +121,7 @@ class Paths:
 
 
 def paths(town: str, split: str, sequence: int, frame: int) -> Paths:
-    """The files of one picture."""
+    """Paths of the files of one picture."""
     city, name = city_name(town), stem(town, sequence, frame)
     fine = f"gtFine/{split}/{city}/{name}_gtFine"
     return Paths(
@@ -133,19 +135,20 @@ def paths(town: str, split: str, sequence: int, frame: int) -> Paths:
 
 
 def colour_map(label_ids: npt.NDArray[np.uint8]) -> UInt8Image:
-    """(H, W, 4) RGBA picture of a label map, opaque."""
+    """Colours an (H, W) label map; returns (H, W, 4) uint8 RGBA, opaque."""
     # One gather of 32-bit pixels is five times as quick as one of four bytes each.
     packed = COLOURS_RGBA.view(np.uint32)[:, 0]
     return np.take(packed, label_ids).view(np.uint8).reshape(*label_ids.shape, 4)
 
 
 def camera_json(camera: CameraRecord, world_from_vehicle: RigidTransform, baseline_m: float) -> Json:
-    """The content of a camera file: pinhole in index pixels, pose in the vehicle's frame (x forward, y left, z up).
+    """The content of a camera file: intrinsics in index pixels, and pose in the vehicle's frame (x forward, y left, z
+    up).
 
     Args:
         camera: the left camera.
-        world_from_vehicle: the ego car; its origin is on the ground in the middle of the footprint.
-        baseline_m: of a stereo pair; 0 for a single camera.
+        world_from_vehicle: pose of the ego car; its origin is on the ground in the middle of the footprint.
+        baseline_m: baseline of a stereo pair; 0 for a single camera.
     """
     vehicle_from_camera = world_from_vehicle.inverse().matrix @ camera.world_from_camera_transform.matrix
     # The benchmark's camera frame has the vehicle's axes.

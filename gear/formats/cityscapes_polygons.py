@@ -1,9 +1,9 @@
 """Cityscapes polygon files from instance maps.
 
-Every connected piece of the map becomes its outline, and outlines are listed by the area that they enclose, largest
-first: what lies in a hole of a piece encloses less than the piece and is painted over it, so painting in order gives
-the map back. Where a line one pixel thin runs aslant, what is behind it holds together from one side to the other, and
-the line's own outline would close over one of them: what painting loses gets outlines of its own.
+Each connected piece of the map is described by its outline. Polygons are sorted by the area that they enclose, largest
+first, and painted in this order they reproduce the map: a piece inside a hole of another one encloses less, so it is
+painted later. Around a diagonal line one pixel wide, the pieces on both sides are one 8-connected piece, so that a
+later outline can cover parts of an earlier one; the pixels that painting loses are described by additional polygons.
 """
 
 from __future__ import annotations
@@ -20,10 +20,12 @@ from gear.formats.pixel_runs import Runs
 from gear.values.serial import Json
 
 MIN_PIECE_PX = 4
-"""Smaller pieces go to what surrounds them."""
+"""Pieces with fewer pixels are merged into their surroundings."""
 
 MOST_REPAIRS = 8
-"""What is lost is looked for so often: thin lines may lie behind thin lines."""
+"""Largest number of passes that add polygons for lost pixels; one is not enough where thin lines lie behind
+thin lines.
+"""
 
 
 def polygons_json(instances: npt.NDArray[np.uint16]) -> Json:
@@ -33,8 +35,9 @@ def polygons_json(instances: npt.NDArray[np.uint16]) -> Json:
         instances: (H, W) uint16 instance map.
 
     Returns:
-        Painted in order, it gives the label map back but for pieces under `MIN_PIECE_PX` pixels and single pixels along
-        borders. An instance that something cuts into pieces is one polygon a piece.
+        Polygons that, painted in order, give the label map except for pieces of fewer than `MIN_PIECE_PX` pixels and
+        single pixels along borders. An instance that is cut into pieces by something in front of it has one polygon per
+        piece.
     """
     height, width = instances.shape
     pieces = _outlines(instances)
@@ -49,7 +52,7 @@ def polygons_json(instances: npt.NDArray[np.uint16]) -> Json:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Piece:
-    """A connected piece of the map: what it holds, its outline through pixel centres, and what that encloses."""
+    """A connected piece of the map: its value, its outline through pixel centres, and the enclosed area in pixels."""
 
     value: int
     outline: npt.NDArray[np.int32]
@@ -57,11 +60,11 @@ class _Piece:
 
 
 def _outlines(instances: npt.NDArray[np.uint16], x: int = 0, y: int = 0) -> list[_Piece]:
-    """Pieces of a map in the order of painting; those that are too small are left out, and value 0, unlabelled.
+    """Pieces of a map in the order of painting, without pieces that are too small and without value 0 (unlabelled).
 
     Args:
-        instances: the map, or what is looked at of it.
-        x, y: where that lies.
+        instances: an instance map, or a part of one.
+        x, y: column and row of that part in the whole map.
     """
     pieces: list[_Piece] = []
     runs = Runs.of(instances)
@@ -78,7 +81,7 @@ def _outlines(instances: npt.NDArray[np.uint16], x: int = 0, y: int = 0) -> list
 
 
 def _outlines_of_lost(instances: npt.NDArray[np.uint16], painted: npt.NDArray[np.uint16]) -> list[_Piece]:
-    """Pieces of what painting loses."""
+    """Pieces of the pixels that painting the given pieces loses."""
     wrong = (painted != instances).view(np.uint8)
     found: list[_Piece] = []
     for outline in cv2.findContours(wrong, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)[0]:
@@ -100,7 +103,7 @@ def _label_id(value: int) -> int:
 
 
 def _painted(pieces: Sequence[_Piece], shape: tuple[int, ...]) -> npt.NDArray[np.uint16]:
-    """The map that pieces give when they are painted in order."""
+    """Paints pieces in order and returns the map."""
     canvas = np.zeros(shape, np.uint16)
     for piece in pieces:
         cv2.fillPoly(canvas, [piece.outline], piece.value)
@@ -108,7 +111,7 @@ def _painted(pieces: Sequence[_Piece], shape: tuple[int, ...]) -> npt.NDArray[np
 
 
 def _enclosed_px(outline: npt.NDArray[np.int32]) -> float:
-    """Pixels inside and on the outline, which runs through pixel centres (half a pixel inside the border)."""
+    """Number of pixels inside and on an outline through pixel centres (half a pixel inside the border)."""
     return float(cv2.contourArea(outline) + cv2.arcLength(outline, True) / 2 + 1)
 
 

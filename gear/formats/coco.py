@@ -1,4 +1,4 @@
-"""COCO: categories, annotations from masks, and the one file of a split."""
+"""COCO: categories, annotations from masks, and the annotation file of a split."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _categories() -> tuple[Json, ...]:
 
 
 CATEGORIES: tuple[Json, ...] = _categories()
-"""All 80 categories, so that what a COCO network finds has a place even where nothing of it occurs."""
+"""All 80 categories, so that detections of every COCO category can be written, whether or not objects of it occur."""
 
 CATEGORY_NAMES: dict[int, str] = {category["id"]: category["name"] for category in CATEGORIES}
 """Names by category id."""
@@ -58,13 +58,13 @@ class Annotation:
     """One object in one picture.
 
     Attributes:
-        category_id: of the 91-id space.
+        category_id: COCO's category id, 1..90.
         box_xywh: left, top, width, height in edge pixels.
-        area_px: pixels of the mask.
+        area_px: number of pixels of the mask.
         rle: compressed run lengths of the visible mask.
-        is_crowd: whether evaluations ignore it.
-        extras: what gear knows beyond COCO, under the key `gear`.
-        polygons: `x, y, x, y, ...` of each polygon of the mask in edge pixels; empty for run lengths in their place.
+        is_crowd: whether evaluations ignore the object.
+        extras: facts that COCO has no field for, written under the key `gear`.
+        polygons: `x, y, x, y, ...` of each polygon of the mask in edge pixels; if empty, `rle` is written instead.
     """
 
     category_id: int
@@ -81,12 +81,10 @@ class Picture:
     """One picture of a split with its annotations.
 
     Attributes:
-        id: from 1.
-        file_name: relative to the folder of the split's pictures.
-        height_px, width_px: its size.
-        annotations: of its objects.
-        ignored_px: boxes in which a detection of any category that finds no object counts neither way. They are for
-            evaluations; annotation files do not have them.
+        id: picture id, from 1.
+        file_name: path relative to the folder of the split's pictures.
+        height_px, width_px: size of the picture.
+        annotations: annotations of its objects.
     """
 
     id: int
@@ -101,9 +99,9 @@ def dataset_json(pictures: Sequence[Picture], *, description: str, created: str)
     """The content of an annotation file.
 
     Args:
-        pictures: in order of id. Annotations are numbered from 1 through all of them: pycocotools takes the id 0 for
-            "no match".
-        description: what the split is.
+        pictures: pictures in order of id. Annotation ids count from 1 over all pictures, because pycocotools takes the
+            id 0 for "no match".
+        description: one line on the split.
         created: ISO date.
     """
     annotations: list[Json] = []
@@ -150,7 +148,7 @@ def dataset_json(pictures: Sequence[Picture], *, description: str, created: str)
 
 
 def _segmentation(item: Annotation, picture: Picture) -> Json:
-    """The mask as COCO has it: polygons of single objects, run lengths of crowds."""
+    """The mask in COCO's form: polygons for single objects, run lengths for crowds."""
     if item.polygons and not item.is_crowd:
         return [list(polygon) for polygon in item.polygons]
     return {"size": [picture.height_px, picture.width_px], "counts": item.rle}
@@ -158,12 +156,12 @@ def _segmentation(item: Annotation, picture: Picture) -> Json:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detection:
-    """One found object.
+    """One detected object.
 
     Attributes:
-        category_id: of the 91-id space.
+        category_id: COCO's category id, 1..90.
         box_px: left, top, right, bottom in edge pixels.
-        score: confidence; higher is surer.
+        score: confidence; higher is more certain.
     """
 
     category_id: int
@@ -172,7 +170,7 @@ class Detection:
 
 
 def results_json(image_id: int, detections: Sequence[Detection]) -> list[Json]:
-    """Detections of one picture as a results file lists them."""
+    """Detections of one picture in the form of COCO's results file."""
     return [
         {
             "image_id": image_id,

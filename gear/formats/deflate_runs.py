@@ -1,8 +1,8 @@
-"""Zlib streams of bytes that come as runs of equal ones.
+"""Zlib streams of bytes that are given as runs of equal bytes.
 
-A general compressor looks at every byte. Here a run is its byte and DEFLATE's copies of the byte before, and one
-Huffman code, fitted to the stream, serves all of it. Work grows with the runs, not with the stream, and nothing
-depends on the processor.
+A general compressor looks at every byte. Here each run is encoded as one literal and DEFLATE copies of it, with one
+Huffman code for the whole stream. The time depends on the number of runs instead of the number of bytes, and the result
+does not depend on the processor.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ _END, _FIRST_COPY, _SYMBOLS = 256, 257, 286
 _MAX_CODE_BITS = 15
 _ADLER = 65521
 _LENGTH_ORDER = (16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15)
-"""The order in which a block says how long the codes of code lengths are."""
+"""Order in which a dynamic block stores the lengths of the code length codes (RFC 1951, section 3.2.7)."""
 
 
 def _copy_symbols() -> tuple[Ints, Ints, Ints]:
-    """For copies of 0..258 bytes: the symbol, how many bits follow it, and their value."""
+    """For copies of 0..258 bytes: the symbol, the number of its extra bits, and their value."""
     symbol, bits, value = (np.zeros(_LONGEST_COPY + 1, np.int64) for _ in range(3))
     length = _SHORTEST_COPY
     for number in range(_FIRST_COPY, _SYMBOLS - 1):
@@ -40,11 +40,11 @@ _COPY_SYMBOL, _COPY_BITS, _COPY_VALUE = _copy_symbols()
 
 
 def compress(values: npt.NDArray[np.uint8], lengths: Ints) -> bytes:
-    """The zlib stream of runs.
+    """Compresses runs to a zlib stream.
 
     Args:
         values: (N,) byte of each run.
-        lengths: (N,) how often it comes, at least once.
+        lengths: (N,) number of bytes in each run, at least 1.
     """
     wide = values.astype(np.int64)
     ends = np.cumsum(lengths)
@@ -57,7 +57,7 @@ def compress(values: npt.NDArray[np.uint8], lengths: Ints) -> bytes:
 
 
 def _block(values: Ints, lengths: Ints) -> bytes:
-    """One last block of DEFLATE with a code of its own."""
+    """A single, final DEFLATE block with a dynamic Huffman code."""
     symbols, extra_bits, extra = _tokens(values, lengths)
     code_bits = _code_lengths(np.bincount(symbols, minlength=_SYMBOLS))
     # Head: last block, own codes, 286 symbols, one distance, 19 lengths of lengths: four bits each for 0..15.
@@ -73,7 +73,9 @@ def _block(values: Ints, lengths: Ints) -> bytes:
 
 
 def _tokens(values: Ints, lengths: Ints) -> tuple[Ints, Ints, Ints]:
-    """Symbols, and how many bits follow each and which: the byte of each run, then its copies; at last the end."""
+    """Symbols with the number and the value of their extra bits: for each run its literal, then its copies; the end
+    symbol is last.
+    """
     whole, rest = np.divmod(lengths - 1, _LONGEST_COPY)
     is_copy = rest >= _SHORTEST_COPY
     last = np.cumsum(1 + whole + np.where(is_copy, 1, rest)) - 1
@@ -91,7 +93,7 @@ def _tokens(values: Ints, lengths: Ints) -> tuple[Ints, Ints, Ints]:
 
 
 def _code_lengths(counts: Ints) -> Ints:
-    """Huffman's bits a symbol, none above DEFLATE's limit; 0 for symbols that do not occur."""
+    """Huffman code length of each symbol in bits, up to DEFLATE's limit; 0 for symbols that do not occur."""
     used = np.flatnonzero(counts)
     while True:
         # Nodes are numbered as they are made: the leaves, what joins them, the root last.
@@ -115,7 +117,7 @@ def _code_lengths(counts: Ints) -> Ints:
 
 
 def _canonical(lengths: Ints) -> Ints:
-    """DEFLATE's code of each symbol, its first bit lowest."""
+    """DEFLATE's canonical code of each symbol, with the first bit as the least significant."""
     codes = np.zeros_like(lengths)
     code = 0
     for bits in range(1, _MAX_CODE_BITS + 1):
@@ -131,7 +133,7 @@ def _reversed(code: int, bits: int) -> int:
 
 
 def _packed(values: Ints, bits: Ints) -> bytes:
-    """Values one after another, each with its number of bits (1 to 32), lowest bits first."""
+    """Packs values, each with its number of bits (1 to 32), into bytes, least significant bits first."""
     ends = np.cumsum(bits)
     starts = ends - bits
     word = starts >> 5

@@ -1,4 +1,4 @@
-"""JSON as bytes, the same each time."""
+"""JSON as bytes; the same value always gives the same bytes."""
 
 from __future__ import annotations
 
@@ -8,5 +8,7 @@ from gear.values.serial import Json
 
 
 def dump(content: Json) -> bytes:
-    """No spaces, keys in the order given, a last newline. NaN is refused, as JSON has none."""
+    """Encodes a value without spaces, with keys in the given order and a final newline. NaN is refused, because JSON
+    lacks it.
+    """
     return (json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False) + "\n").encode()

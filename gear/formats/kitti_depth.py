@@ -1,4 +1,4 @@
-"""KITTI depth: 16-bit pictures of 1/256 m, exact depth in metres beside them, and the lists that loaders read."""
+"""KITTI depth: 16-bit pictures in units of 1/256 m, exact depth files in metres, and the file lists of loaders."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from gear.values.geometry import Array
 
 UNITS_PER_M = 256
 MAX_PNG_DEPTH_M = 65535 / UNITS_PER_M
-"""Depth beyond it cannot be said in 16 bits and is left out."""
+"""Largest depth that 16 bits of 1/256 m can hold; larger ground truth is written as 0."""
 
 
 def to_units(depth_m: FloatImage) -> npt.NDArray[np.uint16]:
-    """(H, W) metres, NaN for nothing, to 1/256 m; 0 stands for no ground truth (sky, beyond range)."""
+    """Converts (H, W) metres, NaN without ground truth (sky, beyond range), to 1/256 m with 0 for NaN."""
     units = depth_m * np.float32(UNITS_PER_M)
     np.rint(units, out=units)
     np.copyto(units, 0, where=~((units >= 1) & (units <= 65535)))  # what is not finite is neither
@@ -24,35 +24,37 @@ def to_units(depth_m: FloatImage) -> npt.NDArray[np.uint16]:
 
 
 def to_predicted_units(depth_m: FloatImage) -> npt.NDArray[np.uint16]:
-    """(H, W) predicted metres to 1/256 m, the nearest that 16 bits can say; 0 only for NaN.
+    """Converts (H, W) predicted metres to 1/256 m, clipped to 1..65535; only NaN becomes 0.
 
-    In a prediction 0 stands for none, and the devkit fills such pixels from their neighbours before it measures.
+    The devkit takes 0 for a missing prediction and interpolates such pixels before it computes metrics.
     """
     return to_units(np.clip(depth_m, np.float32(1 / UNITS_PER_M), np.float32(MAX_PNG_DEPTH_M)))
 
 
 def from_units(units: npt.NDArray[np.uint16]) -> FloatImage:
-    """(H, W) 1/256 m to metres, NaN for 0."""
+    """Converts (H, W) 1/256 m to metres, with NaN for 0."""
     return np.where(units > 0, units / np.float32(UNITS_PER_M), np.nan).astype(np.float32)
 
 
 def to_metres_file(depth_m: FloatImage) -> FloatImage:
-    """(H, W) metres as the original's public loader wants them: 0 for nothing."""
+    """Converts (H, W) metres to the form of CARLA-GeAR's loader: 0 instead of NaN."""
     return np.nan_to_num(depth_m, nan=0.0, posinf=0.0, neginf=0.0).astype(np.float32)
 
 
 def from_metres_file(stored: FloatImage) -> FloatImage:
-    """(H, W) metres with NaN for nothing."""
+    """Converts (H, W) metres of such a file back: NaN instead of 0."""
     depth_m = stored.astype(np.float32)
     np.copyto(depth_m, np.nan, where=~(stored > 0))
     return depth_m
 
 
 def file_list(pairs: Sequence[tuple[str, str]]) -> bytes:
-    """`/picture /depth` a line, without a last newline: loaders append the paths to the root as strings."""
+    """A file list with one line `/picture /depth` per sample and no final newline; loaders append the paths to the root
+    as strings.
+    """
     return "\n".join(f"/{image} /{depth}" for image, depth in pairs).encode()
 
 
 def intrinsics_text(matrix: Array) -> bytes:
-    """The nine numbers of a (3, 3) K, row by row, as the benchmark's selection has them."""
+    """The nine numbers of a (3, 3) camera matrix K, row by row, as in the benchmark's cropped selection."""
     return (" ".join(f"{v:.6f}" for v in matrix.reshape(-1)) + "\n").encode()

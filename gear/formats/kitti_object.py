@@ -1,7 +1,8 @@
-"""KITTI object detection: label lines and calibration, by the benchmark's own definitions.
+"""KITTI object detection: label files and calibration files, by the benchmark's definitions.
 
-Boxes are in index pixels (the first pixel's centre is 0) and clipped to them; the location is the middle of the
-bottom face in the rectified frame of camera 0, which is the left camera; `rotation_y` is 0 for a front along +x.
+Boxes are in index pixels (the first pixel's centre is 0) and clipped to the picture. The location is the middle of the
+bottom face in the rectified frame of camera 0, the left camera. `rotation_y` is 0 if the object's front points along
++x.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ class KittiLabel:
         truncated: share of the object outside the picture, 0..1.
         occluded: 0 fully visible, 1 partly, 2 largely hidden, 3 unknown; -1 in DontCare lines.
         alpha_rad: observation angle.
-        box_px: left, top, right, bottom in index pixels.
-        height_m, width_m, length_m: size.
+        box_px: 2D box: left, top, right, bottom in index pixels.
+        height_m, width_m, length_m: size of the 3D box.
         location_m: middle of the bottom face in camera 0.
-        rotation_y_rad: turn about the camera's y.
-        score: confidence, in results only.
+        rotation_y_rad: rotation about the camera's y axis.
+        score: confidence; in result files only.
     """
 
     type: str
@@ -48,7 +49,7 @@ class KittiLabel:
 
 
 def dont_care(box_px: BoxPx) -> KittiLabel:
-    """A region where detections count for nothing."""
+    """A label line of a `DontCare` region, in which detections are not evaluated."""
     return KittiLabel(
         type="DontCare",
         truncated=-1,
@@ -64,7 +65,7 @@ def dont_care(box_px: BoxPx) -> KittiLabel:
 
 
 def format_label(label: KittiLabel) -> str:
-    """15 fields (16 with a score), one space between, two decimals, no newline."""
+    """Formats a label line: 15 fields (16 with a score), separated by one space, two decimals, no newline."""
     if label.type == "DontCare":
         box = " ".join(f"{v:.2f}" for v in label.box_px)
         return f"DontCare -1 -1 -10 {box} -1 -1 -1 -1000 -1000 -1000 -10"
@@ -82,21 +83,21 @@ def format_label(label: KittiLabel) -> str:
 
 
 def _two(value: float) -> str:
-    """Two decimals, never a negative zero."""
+    """Formats a number with two decimals; never as negative zero."""
     text = f"{value:.2f}"
     return "0.00" if text == "-0.00" else text
 
 
 def format_labels(labels: Iterable[KittiLabel]) -> bytes:
-    """A label file; empty for a picture without objects."""
+    """Formats a label file; empty for a picture without objects."""
     return "".join(format_label(label) + "\n" for label in labels).encode()
 
 
 def parse_label(line: str) -> KittiLabel:
-    """One line of a label or result file.
+    """Parses one line of a label or result file.
 
     Raises:
-        ValueError: it has not 15 or 16 fields, an unknown type, or a field that is no number.
+        ValueError: the line has neither 15 nor 16 fields, an unknown type, or a field that is not a number.
     """
     fields = line.split()
     if len(fields) not in (15, 16):
@@ -120,12 +121,12 @@ def parse_label(line: str) -> KittiLabel:
 
 
 def parse_labels(text: str) -> tuple[KittiLabel, ...]:
-    """A label file."""
+    """Parses a label file."""
     return tuple(parse_label(line) for line in text.splitlines() if line.strip())
 
 
 def clip_box(box_px: BoxPx, intrinsics: Intrinsics) -> BoxPx | None:
-    """The box inside the picture, in index pixels; None if nothing of it is."""
+    """Clips a box to the picture, in index pixels; None if it lies outside."""
     left, top = max(0.0, box_px[0]), max(0.0, box_px[1])
     right, bottom = min(intrinsics.width_px - 1.0, box_px[2]), min(intrinsics.height_px - 1.0, box_px[3])
     return (left, top, right, bottom) if right > left and bottom > top else None
@@ -145,18 +146,18 @@ def to_edge_pixels(box_px: BoxPx) -> BoxPx:
 
 
 def truncation(box_px: BoxPx, clipped_px: BoxPx) -> float:
-    """Share of a projected box that lies outside the picture, 0..1."""
+    """Share, 0..1, of a projected box that lies outside the picture."""
     whole = (box_px[2] - box_px[0]) * (box_px[3] - box_px[1])
     inside = (clipped_px[2] - clipped_px[0]) * (clipped_px[3] - clipped_px[1])
     return min(1.0, max(0.0, 1.0 - inside / whole)) if whole > 0 else 0.0
 
 
 OCCLUSION_LEVELS = (0.8, 0.5, 0.1)
-"""Least visible share of KITTI's levels 0, 1 and 2; the benchmark gives no numbers."""
+"""Smallest visible share of KITTI's occlusion levels 0, 1 and 2. The benchmark states no numbers; these are gear's."""
 
 
 def occlusion_level(visible_fraction: float) -> int:
-    """KITTI's level of occlusion of an object.
+    """KITTI's occlusion level of an object.
 
     Args:
         visible_fraction: visible share of the silhouette inside the picture, 0..1.
@@ -171,11 +172,11 @@ def occlusion_level(visible_fraction: float) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
-    """What a calibration file says of a rectified pair whose left camera is camera 0.
+    """The calibration of a rectified stereo pair whose left camera is camera 0.
 
     Attributes:
-        intrinsics: of both cameras.
-        baseline_m: left to right, > 0.
+        intrinsics: intrinsics of both cameras.
+        baseline_m: distance from the left to the right camera, > 0.
     """
 
     intrinsics: Intrinsics
@@ -191,11 +192,13 @@ class Calibration:
 
 
 VELODYNE_TO_CAMERA = ((0.0, -1.0, 0.0, 0.0), (0.0, 0.0, -1.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-"""A laser scanner (x forward, y left, z up) in the place of camera 0."""
+"""(3, 4) transform from the laser scanner's axes (x forward, y left, z up) to camera 0; gear's scanner is
+at camera 0.
+"""
 
 
 def format_calibration(calibration: Calibration) -> bytes:
-    """The seven lines in their usual order, one space between numbers, none at a line's end."""
+    """Formats a calibration file: KITTI's seven lines in their usual order."""
     identity = np.eye(3, 4)
     rows: list[tuple[str, Array]] = [(f"P{i}", calibration.projection(i)) for i in range(4)]
     rows += [
@@ -208,7 +211,7 @@ def format_calibration(calibration: Calibration) -> bytes:
 
 
 def parse_calibration(text: str) -> dict[str, Array]:
-    """Matrices by name: `P0` to `P3` (3, 4), `R0_rect` (3, 3), `Tr_…` (3, 4)."""
+    """Parses a calibration file: matrices by name, `P0` to `P3` (3, 4), `R0_rect` (3, 3), `Tr_…` (3, 4)."""
     found: dict[str, Array] = {}
     for line in text.splitlines():
         if ":" in line:
@@ -219,12 +222,12 @@ def parse_calibration(text: str) -> dict[str, Array]:
 
 
 def read_baseline_m(matrices: dict[str, Array]) -> float:
-    """Left to right, from `P2` and `P3`."""
+    """Distance in metres from the left to the right camera, from `P2` and `P3`."""
     return float((matrices["P2"][0, 3] - matrices["P3"][0, 3]) / matrices["P2"][0, 0])
 
 
 def label_corners(label: KittiLabel) -> Array:
-    """(8, 3) corners in camera 0, the four of the bottom face first."""
+    """(8, 3) corners of a label's 3D box in camera 0, the four of the bottom face first."""
     c, s = math.cos(label.rotation_y_rad), math.sin(label.rotation_y_rad)
     along = np.array([1, 1, -1, -1, 1, 1, -1, -1]) * label.length_m / 2
     up = np.array([0, 0, 0, 0, -1, -1, -1, -1]) * label.height_m
@@ -233,7 +236,9 @@ def label_corners(label: KittiLabel) -> Array:
 
 
 def split_lists(split: str, ids: Sequence[str]) -> dict[str, bytes]:
-    """`ImageSets/<split>.txt` with a last newline, and `splits/<split>.txt` without: its reader takes one for an id."""
+    """The lists of a split: `ImageSets/<split>.txt` with a final newline, and `splits/<split>.txt` without, because its
+    reader would take an empty line for an id.
+    """
     return {
         f"ImageSets/{split}.txt": "".join(f"{name}\n" for name in ids).encode(),
         f"splits/{split}.txt": "\n".join(ids).encode(),

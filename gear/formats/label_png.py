@@ -1,7 +1,7 @@
-"""PNG files of label maps, made from the pixels that differ from the one above.
+"""PNG files of label maps, encoded from the pixels that differ from the pixel above.
 
-Labels are areas: of two million pixels some twenty thousand differ. Files are as large as a general encoder's, and
-take a fifth of its time.
+Label maps consist of areas: of two million pixels about twenty thousand differ from the one above. The files are as
+large as a general encoder's and take a fifth of its time.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ Bytes = npt.NDArray[np.uint8]
 _GREY, _RGBA = 0, 6
 _FROM_LEFT, _FROM_ABOVE = 1, 2
 _BUSY_SHARE = 0.2
-"""Where more pixels than this differ from the one above, a general encoder is quicker."""
+"""Share of pixels that differ from the pixel above, beyond which a general encoder is faster."""
 
 
 def encode_label_map(labels: Labels) -> bytes:
-    """(H, W) uint8 or uint16 to a grey PNG of 8 or 16 bits."""
+    """Encodes an (H, W) uint8 or uint16 map as a grey PNG of 8 or 16 bits."""
     if labels.ndim != 2 or labels.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"labels must have shape (H, W) of uint8 or uint16, got {labels.shape} of {labels.dtype}")
     places, own, before = _changes(labels)
@@ -35,7 +35,7 @@ def encode_label_map(labels: Labels) -> bytes:
 
 
 def encode_painted(labels: npt.NDArray[np.uint8], rgba: UInt8Image) -> bytes:
-    """The RGBA PNG of (H, W) uint8 labels in the colours of a (K, 4) table."""
+    """Encodes (H, W) uint8 labels as an RGBA PNG, coloured by a (K, 4) uint8 table."""
     places, own, before = _changes(labels)
     if len(places) > _BUSY_SHARE * labels.size:
         return encode_labels(rgba[labels])
@@ -46,10 +46,11 @@ def encode_painted(labels: npt.NDArray[np.uint8], rgba: UInt8Image) -> bytes:
 
 
 def _changes(labels: Labels) -> tuple[Ints, Labels, Labels]:
-    """Pixels that differ from the one above, in the first row from the one to the left, and the picture's first.
+    """Finds the pixels that differ from the pixel above; in the first row from the pixel to the left, and the first
+    pixel.
 
     Returns:
-        (N,) their places, counted through the rows, what they hold, and what the other one holds.
+        (N,) positions of these pixels in row-major order, their values, and the values from which they differ.
     """
     height, width = labels.shape
     first = np.append(0, np.flatnonzero(labels[0, 1:] != labels[0, :-1]) + 1)
@@ -65,12 +66,12 @@ def _changes(labels: Labels) -> tuple[Ints, Labels, Labels]:
 
 
 def _big_endian(values: Labels) -> Bytes:
-    """(N,) numbers to (N, 1 or 2) bytes, the highest first."""
+    """Converts (N,) numbers to (N, 1 or 2) bytes, most significant byte first."""
     return values.astype(values.dtype.newbyteorder(">")).view(np.uint8).reshape(len(values), -1)
 
 
 def _png(shape: tuple[int, ...], places: Ints, steps: Bytes, colour_type: int) -> bytes:
-    """A file whose filtered bytes are (N, depth) `steps` at pixels and zero elsewhere."""
+    """A PNG file whose filtered bytes are the (N, depth) `steps` at some pixels and zero elsewhere."""
     height, width = shape
     depth = steps.shape[1]
     stride = 1 + width * depth
@@ -87,7 +88,7 @@ def _png(shape: tuple[int, ...], places: Ints, steps: Bytes, colour_type: int) -
 
 
 def _runs(size: int, positions: Ints, values: Bytes) -> tuple[Bytes, Ints]:
-    """Bytes and lengths of the runs of `size` bytes that are zero but at rising positions."""
+    """Bytes and lengths of the runs in `size` bytes that are zero except at given increasing positions."""
     begins = np.flatnonzero((np.diff(positions, prepend=-2) != 1) | (np.diff(values, prepend=0) != 0))
     starts, own = positions[begins], np.diff(begins, append=len(positions))
     # Zeros, a run, zeros, a run, ..., zeros; some zeros are none.

@@ -1,8 +1,8 @@
-"""Masks as polygons along the borders of their pixels, as COCO describes single objects.
+"""Polygons of masks along the borders of their pixels, as COCO describes single objects.
 
-The polygons run through the corners of pixels, in edge pixels: pycocotools, which fills a pixel whose centre lies
-inside, makes the same mask of them again. In COCO no polygon can be a hole, so a piece with a hole is cut in two
-through the hole.
+The polygons run through the corners of pixels, in edge pixels. pycocotools, which fills pixels whose centre lies
+inside, gives the same mask again. A COCO polygon cannot have a hole, so a piece with a hole is cut in two through the
+hole.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def mask_polygons(mask: Mask, left_px: int = 0, top_px: int = 0) -> list[list[in
 
     Args:
         mask: (h, w).
-        left_px, top_px: where its first pixel lies in the picture.
+        left_px, top_px: column and row of the mask's first pixel in the picture.
 
     Returns:
         `x, y, x, y, ...` of each polygon in edge pixels. Together they cover the pixels of the mask and no others; no
@@ -45,7 +45,8 @@ def _rings(mask: Mask) -> tuple[list[Ring], int]:
     """Borders of a mask's 4-connected pieces through the corners of pixels.
 
     Returns:
-        The rings; and 0, or, where a piece has a hole, a column of pixels with a pixel of the hole to its left.
+        The closed borders, and a column at which to cut: 0 if no piece has a hole, otherwise a column with a pixel of a
+        hole to its left.
     """
     padded = np.zeros((mask.shape[0] + 2, mask.shape[1] + 2), dtype=np.int64)
     padded[1:-1, 1:-1] = mask
@@ -77,13 +78,13 @@ def _rings(mask: Mask) -> tuple[list[Ring], int]:
 
 
 def _corners(padded: Ints) -> Ints:
-    """(N, 4) turns of the borders, row by row: x, y in edge pixels of the mask, whether the border leaves to the right
-    (else to the left), and whether it leaves downwards (else upwards).
+    """(N, 4) corners of the borders, row by row: x, y in edge pixels of the mask, whether the border leaves to the
+    right (otherwise to the left), and whether it leaves downwards (otherwise upwards).
 
-    Where two pixels meet at a corner alone, each has a turn of its own.
+    Where two pixels of the mask meet only at a corner, each of them has a corner of its own there.
 
     Args:
-        padded: (h + 2, w + 2) the mask with a margin of zeros, 0 or 1.
+        padded: (h + 2, w + 2) mask of 0 and 1 with a margin of zeros.
     """
     code = padded[:-1, :-1] + 2 * padded[:-1, 1:] + 4 * padded[1:, :-1] + 8 * padded[1:, 1:]
     y, x = np.nonzero(_TURNS[code, 0] >= 0)
@@ -96,8 +97,9 @@ def _corners(padded: Ints) -> Ints:
 
 
 def _turns() -> Ints:
-    """(16, 4) by which of the four pixels around a corner are set (1 top left, 2 top right, 4 bottom left, 8 bottom
-    right): rightwards and downwards of its turn, and of a second one; -1 where there is none.
+    """(16, 4) table by which of the four pixels around a corner are set (1 top left, 2 top right, 4 bottom left, 8
+    bottom right): whether the border leaves to the right and downwards, for the first and for a second corner at this
+    point; -1 if there is none.
     """
     turns = np.full((16, 4), -1)
     # A lone pixel's border, and that around a lone gap, turns towards that pixel.
@@ -113,7 +115,9 @@ _TURNS = _turns()
 
 
 def _partners(order: Ints) -> list[int]:
-    """For each corner the one that it is joined with, where `order` lists corners along their grid lines."""
+    """For each corner the index of the one that it is connected with; `order` lists the corners along their
+    grid lines.
+    """
     partners = np.empty(len(order), dtype=np.int64)
     partners[order[0::2]], partners[order[1::2]] = order[1::2], order[0::2]
     return [int(one) for one in partners]

@@ -1,4 +1,4 @@
-"""The size of a picture, read from its header: a small file may unpack to gigabytes, so the size is checked first."""
+"""Checks the size of a picture by its header before it is decoded, because a small file may unpack to gigabytes."""
 
 from __future__ import annotations
 

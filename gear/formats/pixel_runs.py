@@ -1,4 +1,4 @@
-"""Pictures of areas as runs of equal pixels: some tens of thousands where there are two million pixels."""
+"""Label maps as runs of equal pixels in a row: tens of thousands of runs instead of two million pixels."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import numpy.typing as npt
 
 Ints = npt.NDArray[np.int64]
 Box = tuple[int, int, int, int]
-"""First column, first row, and one past the last column and row."""
+"""First column, first row, one past the last column, and one past the last row."""
 
 STRIP_ROWS = 64
-"""Pictures are compared in strips of so many rows: what is put down in between stays in the processor's cache."""
+"""Number of rows that are compared at a time, few enough for intermediate results to stay in the processor's cache."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """The runs of a picture in reading order; each lies in one row.
+    """The runs of equal pixels of a picture, in row-major order; a run does not continue in the next row.
 
     Attributes:
         shape: height and width of the picture.
-        values: (N,) what each run's pixels hold.
-        starts: (N,) place of its first pixel, counted through the rows.
-        lengths: (N,) its pixels.
+        values: (N,) value of the pixels of each run.
+        starts: (N,) row-major index of each run's first pixel.
+        lengths: (N,) number of pixels of each run.
     """
 
     shape: tuple[int, int]
@@ -34,7 +34,7 @@ class Runs:
 
     @staticmethod
     def of(picture: npt.NDArray[Any]) -> Runs:
-        """The runs of an (H, W) picture."""
+        """Finds the runs of an (H, W) picture."""
         height, width = picture.shape
         found = []
         begins = np.ones((min(STRIP_ROWS, height), width), np.bool_)
@@ -47,18 +47,18 @@ class Runs:
         return Runs((height, width), values, starts, np.diff(starts, append=height * width))
 
     def painted(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """The (H, W) picture of the same runs with other values, (N,)."""
+        """The (H, W) picture of the same runs with other (N,) values."""
         return np.repeat(values, self.lengths).reshape(self.shape)
 
     def counts(self, size: int) -> Ints:
-        """(`size`,) pixels of each value, which must lie in 0..`size` - 1."""
+        """(`size`,) number of pixels of each value; all values must be in 0..`size` - 1."""
         return np.bincount(self.values, weights=self.lengths, minlength=size).astype(np.int64)
 
     def boxes(self, keys: npt.NDArray[Any]) -> dict[int, tuple[Box, int]]:
-        """The smallest box around all runs of a key, and their pixels.
+        """The smallest box around all runs of each key, and the number of their pixels.
 
         Args:
-            keys: (N,) of each run; 0 belongs to none.
+            keys: (N,) key of each run; runs with key 0 are skipped.
         """
         used = np.flatnonzero(keys)
         if not used.size:

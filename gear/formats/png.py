@@ -1,8 +1,8 @@
-"""Pictures as PNG and TIFF bytes, losslessly and the same bytes each time.
+"""Lossless PNG and TIFF encoding of pictures; the same picture always gives the same bytes.
 
-Colour goes through fpng, which is eight times as quick as zlib on rendered pictures (5 ms for 2048x1024 on one core)
-for an eighth more bytes. Maps go through OpenCV with the `up` filter and run lengths, which suit them best; those
-that are areas of equal labels are quicker through `gear.formats.label_png`.
+Colour pictures are encoded by fpng, which is eight times as fast as zlib on rendered pictures (5 ms for 2048x1024 on
+one core) and whose files are an eighth larger. Maps are encoded by OpenCV with the `up` filter and run lengths, which
+suit them best. Maps of large areas with equal labels are encoded faster by `gear.formats.label_png`.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ TIFF_UNCOMPRESSED = [cv2.IMWRITE_TIFF_COMPRESSION, 1]
 
 
 def encode_rgb(rgb: UInt8Image) -> bytes:
-    """(H, W, 3) uint8 RGB to an 8-bit RGB PNG."""
+    """Encodes (H, W, 3) uint8 RGB as an 8-bit RGB PNG."""
     if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8:
         raise ValueError(f"rgb must have shape (H, W, 3) of uint8, got {rgb.shape} of {rgb.dtype}")
     return bytes(fpng.from_ndarray(np.ascontiguousarray(rgb)))
 
 
 def encode_labels(labels: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> bytes:
-    """(H, W) uint8 or uint16 to a grey PNG of 8 or 16 bits; (H, W, 4) uint8 RGBA to an RGBA one."""
+    """Encodes (H, W) uint8 or uint16 as a grey PNG of 8 or 16 bits, and (H, W, 4) uint8 RGBA as an RGBA PNG."""
     if labels.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"labels must be uint8 or uint16, got {labels.dtype}")
     stored = cv2.cvtColor(labels, cv2.COLOR_RGBA2BGRA) if labels.ndim == 3 else labels
@@ -43,17 +43,17 @@ def encode_labels(labels: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> byt
 
 
 def encode_tiff(values: FloatImage) -> bytes:
-    """(H, W) float32 to an uncompressed one-channel TIFF; every bit is kept."""
+    """Encodes (H, W) float32 as an uncompressed one-channel TIFF, without loss."""
     if values.ndim != 2 or values.dtype != np.float32:
         raise ValueError(f"values must have shape (H, W) of float32, got {values.shape} of {values.dtype}")
     return _encode(".tiff", values, TIFF_UNCOMPRESSED)
 
 
 def decode_rgb(data: bytes) -> UInt8Image:
-    """An 8-bit colour PNG to (H, W, 3) uint8 RGB.
+    """Decodes an 8-bit colour PNG to (H, W, 3) uint8 RGB.
 
     Raises:
-        ValueError: the bytes are no picture, or one that is too large.
+        ValueError: the bytes are not a picture, or the picture is too large.
     """
     check_size(data)
     plain = decode_rows(data)
@@ -64,10 +64,10 @@ def decode_rgb(data: bytes) -> UInt8Image:
 
 
 def decode_plain(data: bytes) -> npt.NDArray[Any]:
-    """A grey PNG or a float TIFF to (H, W) of its own dtype.
+    """Decodes a grey PNG or a float TIFF to (H, W) of the file's dtype.
 
     Raises:
-        ValueError: the bytes are no picture.
+        ValueError: the bytes are not a picture.
     """
     check_size(data)
     plain = decode_rows(data)

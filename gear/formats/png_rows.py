@@ -1,7 +1,8 @@
-"""Quick decoding of the plain PNG files that gear writes, and quick encoding of noisy maps; the rest is OpenCV's.
+"""Fast decoding of the simple PNG files that gear writes, and fast encoding of noisy maps; OpenCV handles all other
+files.
 
-Most of the time that libpng takes goes into inflating and deflating, which ISA-L does three times as fast, and into a
-filter that undoes a row at a time.
+libpng spends most of its time on inflating and deflating, which ISA-L does three times as fast, and on undoing the row
+filter, which is done here one whole row at a time.
 """
 
 from __future__ import annotations
@@ -16,19 +17,19 @@ from isal import isal_zlib
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PLAIN_CHUNKS = {b"IHDR", b"IDAT", b"IEND", b"fdEC"}
-"""Those that say nothing of colours; the last is fpng's mark."""
+"""Chunks without information on colours; the last one is the marker of fpng."""
 
 CHANNELS = {(8, 0): 1, (16, 0): 1, (8, 2): 3}
-"""By bits and PNG's colour type: grey and RGB."""
+"""Number of channels by bit depth and PNG colour type: grey and RGB."""
 
 NONE, SUB, UP = 0, 1, 2
 
 
 def decode_rows(data: bytes) -> npt.NDArray[Any] | None:
-    """(H, W) uint8 or uint16 of a grey PNG, (H, W, 3) uint8 RGB of a coloured one.
+    """Decodes a grey PNG to (H, W) uint8 or uint16, and a colour PNG to (H, W, 3) uint8 RGB.
 
-    None where that is not what it is, or where it is broken: palettes, alpha, other depths, interlacing, chunks that
-    change colours, filters that look at more than one neighbour.
+    Returns None for files that it does not handle or that are damaged: palettes, alpha, other bit depths, interlacing,
+    chunks that change colours, and filters that use more than one neighbour.
     """
     chunks = _chunks(data)
     header = chunks.get(b"IHDR", b"")
@@ -56,11 +57,12 @@ def decode_rows(data: bytes) -> npt.NDArray[Any] | None:
 
 
 def encode_deep(values: npt.NDArray[np.uint16]) -> bytes:
-    """(H, W) uint16 to a grey PNG of 16 bits, for values that seldom repeat; processors may differ in its bytes.
+    """Encodes (H, W) uint16 as a grey PNG of 16 bits, for values that seldom repeat. The bytes may depend on the
+    processor.
 
-    A seventh of OpenCV's time for a predicted depth map, and a quarter more bytes. Where rows can be cut into pixels
-    of three or four bytes, fpng takes them for colours: its filter and its deflating know nothing but bytes. What is to
-    be the same file everywhere goes through `gear.formats.png`.
+    It takes a seventh of OpenCV's time for a predicted depth map, and its files are a quarter larger. If rows can be
+    divided into pixels of three or four bytes, fpng encodes them as if they were colours, because its filter and its
+    compression work on bytes. Files that must be the same on every machine are encoded by `gear.formats.png`.
     """
     height, width = values.shape
     rows = values.astype(">u2").view(np.uint8).reshape(height, -1)
@@ -76,7 +78,7 @@ def encode_deep(values: npt.NDArray[np.uint16]) -> bytes:
 
 
 def whole(width: int, height: int, depth_bits: int, colour: int, deflated: bytes) -> bytes:
-    """A PNG file around its filtered, deflated rows; `colour` is PNG's colour type."""
+    """A complete PNG file from its filtered, deflated rows; `colour` is PNG's colour type."""
     header = struct.pack(">IIBBBBB", width, height, depth_bits, colour, 0, 0, 0)
     return SIGNATURE + b"".join(
         struct.pack(">I", len(content)) + name + content + struct.pack(">I", isal_zlib.crc32(name + content))
@@ -85,7 +87,9 @@ def whole(width: int, height: int, depth_bits: int, colour: int, deflated: bytes
 
 
 def _chunks(data: bytes) -> dict[bytes, bytes]:
-    """Content by name, that of equal names joined; empty where a file breaks off or a checksum is wrong."""
+    """Content of the chunks by name, with chunks of equal name joined; empty if the file is cut off or a checksum is
+    wrong.
+    """
     found: dict[bytes, list[bytes]] = {}
     at = len(SIGNATURE)
     if not data.startswith(SIGNATURE):
@@ -102,7 +106,9 @@ def _chunks(data: bytes) -> dict[bytes, bytes]:
 
 
 def _unfiltered(filtered: npt.NDArray[np.uint8], pixel_bytes: int) -> npt.NDArray[np.uint8] | None:
-    """(H, W * bytes) of (H, 1 + W * bytes) rows that begin with the number of their filter."""
+    """Undoes the filters of (H, 1 + W * bytes) rows, whose first byte is the number of the filter; returns (H, W *
+    bytes).
+    """
     filters = filtered[:, 0]
     if filters.max() > UP:
         return None

@@ -1,4 +1,6 @@
-"""Predictions in the result layouts that each benchmark's own script reads. Relative to one folder of predictions."""
+"""Result files of predictions, in the layouts that the benchmarks' own scripts read. Paths are relative to
+one folder.
+"""
 
 from __future__ import annotations
 
@@ -9,22 +11,22 @@ from gear.formats.kitti_object import KittiLabel
 
 
 def cityscapes_path(town: str, sequence: int, frame: int) -> str:
-    """A picture of label ids; the benchmark's script finds it by its stem, anywhere under the folder."""
+    """Path of a picture of label ids; the benchmark's script finds it by its stem, anywhere under the folder."""
     return f"cityscapes/{city_name(town)}/{stem(town, sequence, frame)}_predLabelIds.png"
 
 
 def kitti_depth_paths(index: int) -> tuple[str, str]:
-    """The 16-bit picture that the devkit reads, and metres without loss beside it."""
+    """Paths of the 16-bit picture for the devkit, and of the lossless depth in metres."""
     return f"depth/rgb_{index:04d}.png", f"depth_metres/rgb_{index:04d}.tiff"
 
 
 def kitti_object_path(index: int) -> str:
-    """A result file; the devkit reads `data/%06d.txt`."""
+    """Path of a result file; the devkit reads `data/%06d.txt`."""
     return f"data/{index:06d}.txt"
 
 
 def kitti_result_lines(found: Iterable[KittiLabel]) -> bytes:
-    """16 fields a line with every digit, so that an independent evaluation sees what gear's own does.
+    """Result lines of 16 fields with all digits, so that an independent evaluation gets the same numbers as gear's.
 
     Raises:
         ValueError: a detection has no score.
@@ -50,5 +52,5 @@ def _result_line(label: KittiLabel) -> str:
 
 
 def coco_path(split: str) -> str:
-    """The one results file of a split."""
+    """Path of the results file of a split."""
     return f"coco_results_{split}.json"

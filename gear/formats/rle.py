@@ -1,6 +1,6 @@
-"""COCO run lengths: masks by columns, the first run zeros, as pycocotools' compressed string.
+"""COCO's run-length encoding: masks by columns, starting with a run of zeros, as the compressed string of pycocotools.
 
-Small masks are encoded from their own crop, so that thirty objects do not cost thirty scans of the picture.
+Masks are encoded from crops, so that the time depends on the size of the objects and not on that of the picture.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ Mask = npt.NDArray[np.bool_]
 
 
 def encode_crop(mask: Mask, left: int, top: int, height_px: int, width_px: int) -> str:
-    """Compressed run lengths of a picture that is empty but for `mask`, whose first pixel lies at (left, top)."""
+    """Encodes a picture that is empty except for `mask`, whose first pixel is at (left, top)."""
     rows, columns = mask.shape
     if left < 0 or top < 0 or left + columns > width_px or top + rows > height_px:
         raise ValueError(f"mask of shape {mask.shape} at ({left}, {top}) leaves the picture ({height_px}, {width_px})")
@@ -31,7 +31,7 @@ def encode_crop(mask: Mask, left: int, top: int, height_px: int, width_px: int) 
 
 
 def encode(mask: Mask) -> str:
-    """Compressed run lengths of an (H, W) mask."""
+    """Encodes an (H, W) mask."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not rows.size:
         return encode_crop(np.zeros((0, 0), np.bool_), 0, 0, *mask.shape)
@@ -40,7 +40,7 @@ def encode(mask: Mask) -> str:
 
 
 def check(counts: str, height_px: int, width_px: int) -> None:
-    """Whether `decode` would make a mask of a compressed string, at a fraction of its cost.
+    """Checks that `decode` accepts a compressed string, at a fraction of its cost.
 
     Raises:
         ValueError: it is no such string, or the runs do not fill a picture of this size.
@@ -49,7 +49,7 @@ def check(counts: str, height_px: int, width_px: int) -> None:
 
 
 def decode(counts: str, height_px: int, width_px: int) -> Mask:
-    """The (H, W) mask of a compressed string.
+    """Decodes a compressed string to an (H, W) mask.
 
     Raises:
         ValueError: it is no such string, or the runs do not fill a picture of this size.
@@ -60,7 +60,7 @@ def decode(counts: str, height_px: int, width_px: int) -> Mask:
 
 
 def decode_crop(counts: str, height_px: int, width_px: int, box_px: tuple[int, int, int, int]) -> Mask:
-    """The part of the mask of a compressed string inside a box: left, top, right, bottom, inside the picture.
+    """Decodes the part of a mask inside a box (left, top, right, bottom), which must lie inside the picture.
 
     Raises:
         ValueError: it is no such string, or the runs do not fill a picture of this size.

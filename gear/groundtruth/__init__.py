@@ -1,1 +1,1 @@
-"""Ground truth, measured on the id buffer and on the triangles themselves."""
+"""Ground truth, computed from the id buffer and from the triangles of the objects."""

@@ -1,4 +1,4 @@
-"""3D boxes of objects in a camera's frame, and where they fall in its picture."""
+"""3D boxes of objects in a camera's frame, and their projections."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from gear.values.geometry import Array, Intrinsics, frozen, wrap_angle_rad
 from gear.values.scene import CameraRecord, Vec3
 
 EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-"""Edges of a box whose corner i has the signs of i's bits: 4 is x, 2 is y, 1 is z."""
+"""Pairs of corner numbers, one per edge. The bits of a corner's number give its side: 4 for x, 2 for y, 1 for z."""
 
 _CORNERS = frozen([[(i >> 2 & 1) - 0.5, (i >> 1 & 1) - 0.5, i & 1] for i in range(8)])
-"""(8, 3): how many lengths, widths and heights each corner lies from the middle of the bottom face."""
+"""(8, 3) offsets of the corners from the middle of the bottom face, in lengths, widths and heights."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Box3d:
-    """A box that stands upright in a camera's frame (x right, y down, z forward), as KITTI describes boxes.
+    """A box that is upright in a camera's frame (x right, y down, z forward), as in KITTI.
 
     Attributes:
-        height_m, width_m, length_m: along the camera's y, the object's left, the object's front.
+        height_m, width_m, length_m: size along the camera's y axis, the object's left and the object's front.
         bottom_m: middle of the bottom face.
-        rotation_y_rad: turn about the camera's y in [-pi, pi); 0 is a front along +x, -pi/2 one along +z (driving
-            away).
+        rotation_y_rad: rotation about the camera's y axis in [-pi, pi); 0 if the front points along +x, -pi/2 if it
+            points along +z (driving away).
     """
 
     height_m: float
@@ -38,18 +38,18 @@ class Box3d:
 
     @property
     def alpha_rad(self) -> float:
-        """Observation angle in [-pi, pi): the rotation as seen along the ray to the box."""
+        """Observation angle in [-pi, pi): the rotation relative to the ray from the camera to the box."""
         return wrap_angle_rad(self.rotation_y_rad - math.atan2(self.bottom_m[0], self.bottom_m[2]))
 
     @property
     def distance_m(self) -> float:
-        """From the camera to the middle of the box."""
+        """Distance from the camera to the middle of the box."""
         x, y, z = self.bottom_m
         return math.sqrt(x * x + (y - self.height_m / 2) ** 2 + z * z)
 
     @property
     def corners_m(self) -> Array:
-        """(8, 3) corners in the camera's frame, ordered as `EDGES` wants them."""
+        """(8, 3) corners in the camera's frame, in the order that `EDGES` uses."""
         c, s = math.cos(self.rotation_y_rad), math.sin(self.rotation_y_rad)
         front, left = np.array([c, 0.0, -s]), np.array([s, 0.0, c])
         up = np.array([0.0, -self.height_m, 0.0])
@@ -63,10 +63,10 @@ class Box3d:
 
 
 def box_in_camera(thing: SceneObject, camera: CameraRecord) -> Box3d:
-    """The object's tight box in the camera's frame.
+    """The tight box of an object in the camera's frame.
 
-    The heading is the object's front projected on the camera's x-z plane: exact for level cameras and upright
-    objects, and what a format with one angle can say of all others.
+    The heading is the object's front projected on the camera's x-z plane. It is exact for level cameras and upright
+    objects, and an approximation for others, because the format has a single angle.
     """
     camera_from_object = camera.world_from_camera_transform.inverse().matrix @ thing.world_from_object.matrix
     centre, (length_m, width_m, height_m) = thing.shape.box_centre_m, (float(v) for v in thing.shape.box_size_m)
@@ -82,11 +82,11 @@ def box_in_camera(thing: SceneObject, camera: CameraRecord) -> Box3d:
 
 
 def project_box(corners_m: Array, intrinsics: Intrinsics) -> tuple[float, float, float, float] | None:
-    """Left, top, right, bottom of a projected box in index pixels, not clipped to the picture.
+    """Projects a box: left, top, right, bottom in index pixels, not clipped to the picture.
 
     Args:
         corners_m: (8, 3) camera-frame corners in the order of `EDGES`.
-        intrinsics: the pinhole.
+        intrinsics: intrinsics of the pinhole camera.
 
     Returns:
         None if the whole box lies behind the near plane; edges that cross it are cut there.
@@ -100,7 +100,7 @@ def project_box(corners_m: Array, intrinsics: Intrinsics) -> tuple[float, float,
 
 
 def _in_front(corners_m: Array) -> Array:
-    """(N, 3): the corners in front of the near plane, and where edges cross it."""
+    """(N, 3) corners in front of the near plane, and the points at which edges cross it."""
     points = [corner for corner in corners_m if corner[2] >= NEAR_M]
     for i, j in EDGES:
         a, b = corners_m[i], corners_m[j]

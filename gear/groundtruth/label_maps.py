@@ -1,4 +1,4 @@
-"""Label maps in Cityscapes ids, straight from the id buffer."""
+"""Label maps with Cityscapes ids, from the id buffer."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def instance_map(geom_id: IdImage, geoms: GeomTable, objects: Mapping[int, Scene
 
     Args:
         geom_id: (H, W) int32, -1 for the sky.
-        geoms: what each geom is.
-        objects: by object id; those that are not listed have no instances.
+        geoms: label and object of each geom.
+        objects: objects by id; geoms of other objects get no instance number.
 
     Returns:
-        (H, W) uint16. Instances are numbered from 0 for each class, in order of object id, among those that are seen.
-        The ego car is `ego vehicle`.
+        (H, W) uint16. The visible instances of each class are numbered from 0 in order of object id. The ego car is
+        `ego vehicle`.
     """
     runs = Runs.of(geom_id)
     table = np.zeros(len(geoms.object_id) + 1, dtype=np.uint16)
@@ -65,11 +65,11 @@ def label_map(instances: InstanceImage) -> npt.NDArray[np.uint8]:
 
 
 def coarsen(instances: InstanceImage, window_px: int) -> InstanceImage:
-    """The labels that a person with a polygon tool would draw: each pixel takes the label that fills most of the square
-    around it, and of that label's instances the one that fills most.
+    """Simplifies labels to those that an annotator with a polygon tool would draw.
 
-    Things thinner than about half the window (wires, thin poles, single leaves) and gaps as small (sky between twigs)
-    go to what surrounds them; straight borders stay where they are.
+    Each pixel takes the most frequent label in the square around it, and the most frequent instance of that label.
+    Things that are thinner than about half the window (wires, thin poles, single leaves), and equally small gaps (sky
+    between twigs), take the label of their surroundings. Straight borders do not move.
 
     Args:
         instances: (H, W) uint16 instance map.
@@ -80,7 +80,9 @@ def coarsen(instances: InstanceImage, window_px: int) -> InstanceImage:
 
 
 def _filling(values: InstanceImage, window_px: int, labels: InstanceImage | None = None) -> InstanceImage:
-    """What fills most of the square around each pixel; where (H, W) label ids are given, of what has the pixel's."""
+    """The most frequent value in the square around each pixel; if (H, W) label ids are given, among the values with the
+    pixel's label.
+    """
     height, width = values.shape
     best_count = np.zeros((height, width), dtype=np.int16)
     best: InstanceImage = values.copy()

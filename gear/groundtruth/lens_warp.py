@@ -1,4 +1,4 @@
-"""What a lens makes of silhouettes: the pinhole's, moved the way that pictures, depth and ids are moved."""
+"""Moves silhouettes of the pinhole camera the way that a lens moves pictures, depth and ids."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from gear.values.scene import CameraRecord
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensWarp:
-    """How a camera's effects move pixels, for the silhouettes of the ground truth.
+    """The map by which a camera's lens moves pixels, applied to silhouettes.
 
     Attributes:
-        map: where each pixel of the picture comes from in the pinhole's picture, and the opposite way.
+        map: for each pixel of the distorted picture its position in the pinhole's picture, and the inverse.
     """
 
     map: PixelMap
 
     @staticmethod
     def of(camera: CameraRecord) -> LensWarp | None:
-        """The map that a camera's record holds; None for a pinhole.
+        """The warp of a camera; None for a pinhole camera.
 
         Raises:
             ValueError: the distortion folds the picture over.
@@ -33,7 +33,7 @@ class LensWarp:
         return LensWarp(moving[0].pixel_map(camera)) if moving else None
 
     def points(self, pinhole_px: Array) -> Array:
-        """Where points of the pinhole's picture appear; also for points outside of the picture.
+        """Positions of the pinhole's points in the distorted picture; also for points outside the picture.
 
         Args:
             pinhole_px: (..., 2) index pixels.
@@ -44,7 +44,9 @@ class LensWarp:
         return self.map.forward(pinhole_px)
 
     def window(self, window: Window) -> Window:
-        """Where a window of the pinhole's picture appears in the distorted one, a pixel wider; empty if it is."""
+        """The window of the distorted picture that contains a window of the pinhole's picture, with a margin of one
+        pixel; an empty window stays empty.
+        """
         x0, y0, x1, y1 = window
         if x0 >= x1 or y0 >= y1:
             return window
@@ -55,15 +57,15 @@ class LensWarp:
         return (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
 
     def mask(self, mask: Mask, window: Window, wanted: Window) -> Mask:
-        """A silhouette as the distorted picture shows it, each pixel from the nearest one, as depth and ids are made.
+        """Warps a silhouette by nearest neighbour, as depth and ids are warped.
 
         Args:
-            mask: (h, w) of the pinhole.
-            window: where that lies, inside the picture.
-            wanted: what of the distorted picture is asked for, inside the picture.
+            mask: (h, w) silhouette of the pinhole camera.
+            window: position of the mask in the pinhole's picture, inside of it.
+            wanted: window of the distorted picture to compute, inside of it.
 
         Returns:
-            (rows, columns) of `wanted`.
+            (rows, columns) mask of the window `wanted`.
         """
         (x0, y0, x1, y1), part = window, np.s_[wanted[1] : wanted[3], wanted[0] : wanted[2]]
         column, row = (np.rint(one[part]).astype(np.intp) for one in (self.map.x, self.map.y))
@@ -74,7 +76,7 @@ class LensWarp:
 
 
 def _border(window: Window) -> Array:
-    """(N, 2) points around a window's pixels, half a pixel outside of their centres."""
+    """(N, 2) points on the border of a window, half a pixel outside the centres of its outermost pixels."""
     x0, y0, x1, y1 = window
     x, y = np.arange(x0, x1 + 1) - 0.5, np.arange(y0, y1 + 1) - 0.5
     sides = [(x, np.full_like(x, edge)) for edge in (y0 - 0.5, y1 - 0.5)]

@@ -1,4 +1,4 @@
-"""Objects as one view shows them: visible pixels counted, whole silhouettes drawn from their triangles."""
+"""Measures objects in one view: visible pixels in the id buffer, and whole silhouettes drawn from their triangles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gear.values.ground_truth import BoxPx, ObjectTruth
 from gear.values.scene import CameraRecord
 
 MOST_ROWS = 4096
-"""Of a silhouette that reaches further beyond one side of the picture, so many rows stand for all that lie there."""
+"""Number of rows that are sampled of the part of a silhouette beyond one side of the picture, if it has more rows."""
 
 EMPTY = VisiblePart(left_px=0, top_px=0, mask=np.zeros((0, 0), dtype=np.bool_), count_px=0)
 
@@ -29,22 +29,23 @@ def observe_objects(
     by_label: bool = True,
     include_hidden: bool = False,
 ) -> tuple[ObjectTruth, ...]:
-    """Measures every object but the ego car in one view.
+    """Measures every object except the ego car in one view.
 
-    Silhouettes are exact to the pixel, outside of the picture too; where thousands of rows lie there, to a thousandth.
-    What lies less than 10 cm before the camera is left out. Behind a lens silhouettes are bent as the ids are; outside
-    of the picture edges stay straight between corners.
+    Silhouettes are exact to the pixel, also outside the picture; if thousands of rows lie there, their area is exact to
+    a thousandth. What lies less than 10 cm before the camera is left out. Behind a lens silhouettes are bent as the ids
+    are; outside of the picture edges stay straight between corners.
 
     Args:
-        view: the id buffer and its camera.
-        geoms: what each geom is.
-        objects: by object id.
-        by_label: True measures each label of an object on its own, so that a cyclist gives a bicycle and a rider; False
-            measures the whole object under its own label.
-        include_hidden: also objects that have no visible pixel but would reach into the picture alone.
+        view: id buffer and camera.
+        geoms: label and object of each geom.
+        objects: objects by id.
+        by_label: True measures each label of an object separately, so that a cyclist gives a bicycle and a rider; False
+            measures the object as a whole, with its main label.
+        include_hidden: also measures objects that have no visible pixel but would be in the picture if nothing covered
+            them.
 
     Returns:
-        In order of object id and label code.
+        Measurements in order of object id and label code.
     """
     seen = visible_parts(view.geom_id, geoms, objects, by_label=by_label)
     wanted: dict[PartKey, VisiblePart] = dict(seen)
@@ -127,13 +128,13 @@ def _measure(
 
 
 def _refined(box: Window, triangles_px: Array) -> BoxPx:
-    """A box of whole pixels with each side where the triangles end, to a fraction of a pixel.
+    """A box of whole pixels whose sides are moved to the ends of the triangles, to a fraction of a pixel.
 
-    A side stays between two pixels where the triangles end more than half a pixel away from it: the picture's border
-    cuts them there, or they end in a sliver that covers no pixel's centre.
+    A side is not moved if the triangles end more than half a pixel away from it: either the picture's border cuts them
+    there, or they end in a sliver that covers no pixel centre.
 
     Args:
-        box: the silhouette's, in the picture.
+        box: box of the silhouette in the picture.
         triangles_px: (T, 3, 2) corners in index pixels.
 
     Returns:
@@ -149,7 +150,7 @@ def _refined(box: Window, triangles_px: Array) -> BoxPx:
 
 
 def _count_outside(triangles_px: Array, whole: Window, picture: Window) -> int:
-    """Pixels of the silhouette that are not in the picture."""
+    """Number of pixels of a silhouette outside the picture."""
     (x0, y0, x1, y1), (_, _, width, height) = whole, picture
     left, right = max(x0, 0), min(x1, width)
     beyond = (
@@ -170,7 +171,7 @@ def _tight(mask: npt.NDArray[np.bool_], window: Window) -> Window:
 
 
 def _cover(window: Window, box: BoxPx | None) -> Window:
-    """The smallest window around both."""
+    """The smallest window that contains two windows."""
     if box is None:
         return window
     other = (int(box[0]), int(box[1]), int(box[2]), int(box[3]))
@@ -185,6 +186,6 @@ def _cover(window: Window, box: BoxPx | None) -> Window:
 
 
 def _common(window: Window, picture: Window) -> Window:
-    """What of the window lies in the picture; empty windows keep a place inside it."""
+    """The part of a window in the picture; an empty part is placed inside the picture."""
     x0, y0 = min(max(window[0], 0), picture[2]), min(max(window[1], 0), picture[3])
     return (x0, y0, max(x0, min(window[2], picture[2])), max(y0, min(window[3], picture[3])))

@@ -19,18 +19,19 @@ def part_boxes(mask: npt.NDArray[np.bool_]) -> tuple[BoxPx, ...]:
 
 
 MOSTLY = 0.5
-"""An object with a larger share of its visible pixels in a mask is ignored with the mask."""
+"""Share of an object's visible pixels inside a mask, above which the object is ignored together with the mask."""
 
 
 def least_share_inside(box_px: BoxPx, visible_px: int, mask: npt.NDArray[np.bool_]) -> float:
-    """Least share of an object's visible pixels that lies in a mask, 0..1.
+    """Smallest possible share, 0..1, of an object's visible pixels inside a mask.
 
-    Which pixels of the box are the object's is not known: as many as possible may lie outside the mask.
+    It is not known which pixels of the box belong to the object, so as many as possible are assumed to be outside the
+    mask.
 
     Args:
-        box_px: that holds all visible pixels; edge pixels.
-        visible_px: their number.
-        mask: (H, W) of the picture.
+        box_px: box that holds all visible pixels, in edge pixels.
+        visible_px: number of visible pixels.
+        mask: (H, W) bool, of the size of the picture.
     """
     left, top, right, bottom = (round(side) for side in box_px)
     crop = mask[top:bottom, left:right]

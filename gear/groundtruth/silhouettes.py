@@ -1,7 +1,7 @@
-"""Silhouettes of triangles, by the rule that GPUs draw by: a pixel is covered if its centre is inside.
+"""Rasterises silhouettes of triangles with the rule of GPUs: a pixel is covered if its centre is inside.
 
-Every triangle becomes one span a pixel row; spans are summed as differences along the rows, or counted in their order,
-so a mesh of any size is filled by a handful of array operations.
+Every triangle gives one span per pixel row. Spans are accumulated as differences along the rows, or counted in sorted
+order, so that a mesh of any size is rasterised by a few array operations.
 """
 
 from __future__ import annotations
@@ -15,17 +15,21 @@ from gear.values.geometry import Array, Intrinsics
 
 Mask = npt.NDArray[np.bool_]
 Window = tuple[int, int, int, int]
-"""First column, first row, and one past the last column and row, in index pixels; may lie outside the picture."""
+"""First column, first row, one past the last column, and one past the last row, in index pixels; may lie outside the
+picture.
+"""
 
 NEAR_M = 0.1
-"""Nothing nearer than this along the optical axis is projected: the renderers' own near plane."""
+"""Distance of the near plane along the optical axis, as in the renderers; nothing nearer is projected."""
 
 SPANS_AT_ONCE = 2_000_000
 
 
 def clip_near(triangles_m: Array, near_m: float = NEAR_M) -> Array:
-    """Cuts (T, 3, 3) camera-frame triangles at z = near; what lies before it is dropped, corners cut off leave two
-    triangles."""
+    """Clips (T, 3, 3) camera-frame triangles at z = near.
+
+    The part with smaller z is removed. A triangle of which one corner is removed becomes two.
+    """
     front = triangles_m[..., 2] >= near_m
     count = front.sum(axis=1)
     parts = [triangles_m[count == 3]]
@@ -40,17 +44,17 @@ def clip_near(triangles_m: Array, near_m: float = NEAR_M) -> Array:
 
 
 def project_mesh(vertices_camera_m: Array, faces: npt.NDArray[np.int32], intrinsics: Intrinsics) -> Array:
-    """Projects the triangles that face the camera.
+    """Projects the triangles of a mesh that face the camera.
 
     Args:
-        vertices_camera_m: (N, 3) in the camera's frame.
-        faces: (M, 3), outward by the right hand. Renderers do not show a triangle from behind; a closed shape covers
-            the same pixels without them.
-        intrinsics: the pinhole.
+        vertices_camera_m: (N, 3) vertices in the camera's frame.
+        faces: (M, 3) vertex indices, counter-clockwise seen from outside. Renderers do not show triangles from behind;
+            a closed mesh covers the same pixels without them.
+        intrinsics: intrinsics of the pinhole camera.
 
     Returns:
-        (T, 3, 2) corners in index pixels, cut at the near plane. In memory, all values of one coordinate of one corner
-        lie together, which is how they are used.
+        (T, 3, 2) corners in index pixels, clipped at the near plane. In memory all values of one coordinate of one
+        corner are contiguous, which makes the later operations fast.
     """
     if not len(faces):
         return np.zeros((0, 3, 2))
@@ -67,7 +71,7 @@ def project_mesh(vertices_camera_m: Array, faces: npt.NDArray[np.int32], intrins
 
 
 def bounds(triangles_px: Array) -> Window:
-    """The smallest window that can hold the silhouette; empty at the origin if there are no triangles."""
+    """The smallest window that contains the silhouette; empty and at the origin if there are no triangles."""
     if not len(triangles_px):
         return (0, 0, 0, 0)
     low, high = np.ceil(triangles_px.min(axis=(0, 1))), np.ceil(triangles_px.max(axis=(0, 1)))
@@ -75,14 +79,14 @@ def bounds(triangles_px: Array) -> Window:
 
 
 def fill(triangles_px: Array, window: Window) -> Mask:
-    """The silhouette of (T, 3, 2) triangles inside a window.
+    """Rasterises the silhouette of (T, 3, 2) triangles inside a window.
 
     Args:
         triangles_px: corners in index pixels.
-        window: what to look at.
+        window: window to rasterise.
 
     Returns:
-        (rows, columns) bool; edges that pass through a pixel's centre count on the left and at the top.
+        (rows, columns) bool. A pixel whose centre is on an edge is covered if the edge is a left or a top one.
     """
     x0, y0, x1, y1 = window
     columns, rows = max(0, x1 - x0), max(0, y1 - y0)
@@ -106,15 +110,15 @@ def fill(triangles_px: Array, window: Window) -> Mask:
 
 
 def count(triangles_px: Array, window: Window, most_rows: int) -> int:
-    """Pixels of the silhouette of (T, 3, 2) triangles inside a window of any size: no mask is made of it.
+    """Counts the pixels of the silhouette of (T, 3, 2) triangles inside a window of any size, without a mask.
 
     Args:
         triangles_px: corners in index pixels.
-        window: what to look at.
-        most_rows: where the window has more, so many are looked at, evenly spaced, and stand for the others.
+        window: window to count in.
+        most_rows: if the window has more rows, this many evenly spaced rows are counted and scaled up.
 
     Returns:
-        What `fill` covers, exactly where the window has no more rows than that.
+        The number of pixels that `fill` covers; an estimate if the window has more than `most_rows` rows.
     """
     x0, y0, x1, y1 = window
     if x0 >= x1 or y0 >= y1 or not len(triangles_px):
@@ -126,7 +130,7 @@ def count(triangles_px: Array, window: Window, most_rows: int) -> int:
 
 
 def _covered(x: Array, y: Array, columns: int, rows: int) -> int:
-    """Pixels of a window at the origin that (3, T) triangles cover together."""
+    """Number of pixels of a window at the origin that are covered by (3, T) triangles."""
     shown = _Shown.of(x, y, columns, rows)
     if shown.heights.sum() > SPANS_AT_ONCE and rows > 1:
         half = rows // 2
@@ -144,8 +148,8 @@ class _Shown:
 
     Attributes:
         x, y: (3, T) corners, from top to bottom.
-        first, heights: (T,) the first row of each, and how many there are.
-        columns: of the window.
+        first, heights: (T,) first row and number of rows of each triangle.
+        columns: number of columns of the window.
     """
 
     x: Array
@@ -156,7 +160,7 @@ class _Shown:
 
     @staticmethod
     def of(x: Array, y: Array, columns: int, rows: int) -> _Shown:
-        """Those among (3, T) triangles."""
+        """Selects the triangles with pixels in the window among (3, T) triangles."""
         first = np.clip(np.ceil(y.min(axis=0)), 0, rows).astype(np.int64)
         last = np.clip(np.ceil(y.max(axis=0)), 0, rows).astype(np.int64)
         left, right = np.clip(np.ceil(x.min(axis=0)), 0, columns), np.clip(np.ceil(x.max(axis=0)), 0, columns)
@@ -165,7 +169,9 @@ class _Shown:
         return _Shown(*_by_row(x[:, seen], y[:, seen]), first[seen], (last - first)[seen], columns)
 
     def spans(self, part: slice) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """One span a row and triangle: its first pixel and the one behind its last, in rows of `columns + 1` pixels."""
+        """One span per row and triangle: first pixel and one past the last pixel, as indices into rows of `columns + 1`
+        pixels.
+        """
         x, y, first, heights = self.x[:, part], self.y[:, part], self.first[part], self.heights[part]
         with np.errstate(divide="ignore", invalid="ignore"):
             long_slope = (x[2] - x[0]) / (y[2] - y[0])
@@ -186,7 +192,7 @@ class _Shown:
 
 
 def _by_row(x: Array, y: Array) -> tuple[Array, Array]:
-    """Sorts the corners of (3, T) triangles from top to bottom, by three exchanges."""
+    """Sorts the corners of (3, T) triangles from top to bottom by three compare-exchange steps."""
     for i, j in ((0, 1), (1, 2), (0, 1)):
         below = y[i] > y[j]
         for values in (x, y):
@@ -195,14 +201,16 @@ def _by_row(x: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _odd_corner_first(triangles: Array, odd: Mask) -> Array:
-    """Turns each triangle so that its one odd corner comes first, keeping the winding."""
+    """Rotates the corners of each triangle so that the single corner on one side of the plane is first; the winding is
+    kept.
+    """
     start = np.argmax(odd, axis=1)
     order = (start[:, None] + np.arange(3)) % 3
     return np.take_along_axis(triangles, order[..., None], axis=1)
 
 
 def _cut(a: Array, b: Array, near_m: float) -> Array:
-    """Where the edges from `a` to `b` meet z = near."""
+    """Intersections of the edges from `a` to `b` with z = near."""
     share = (near_m - a[:, 2]) / (b[:, 2] - a[:, 2])
     cut: Array = a + share[:, None] * (b - a)
     cut[:, 2] = near_m

@@ -1,4 +1,4 @@
-"""Stray pixels: small pieces of an object, seen through gaps far from the rest of it."""
+"""Stray pixels: small visible pieces of an object, far from the rest of it."""
 
 from __future__ import annotations
 
@@ -9,25 +9,26 @@ import numpy.typing as npt
 Mask = npt.NDArray[np.bool_]
 
 STRAY_SHARE = 0.05
-"""A piece with at most this share of the visible pixels must not stretch the box."""
+"""Largest share of the visible pixels that a stray piece may have."""
 
 MAIN_SHARE = 0.5
-"""The larger pieces must hold this share of the visible pixels; otherwise the object is scattered, and all of it is
-kept."""
+"""Smallest share of the visible pixels in the larger pieces; an object with less in them is scattered, and all of it is
+kept.
+"""
 
 
 def without_strays(mask: Mask) -> tuple[Mask, int, int]:
-    """Leaves out pieces that would stretch the box of the visible pixels without being a part that one sees.
+    """Removes stray pieces, which would enlarge the box of the visible pixels.
 
-    A piece is 8-connected. It is left out if it has at most `STRAY_SHARE` of the pixels and reaches beyond the box of
-    the larger pieces: a handlebar beyond the rider in front of it, three pixels of a person between the leaves of a
+    A piece is 8-connected. It is removed if it has at most `STRAY_SHARE` of the pixels and extends beyond the box of
+    the larger pieces: a handlebar beyond the rider in front of it, or three pixels of a person between the leaves of a
     hedge.
 
     Args:
         mask: (h, w) visible pixels, tight.
 
     Returns:
-        The mask of what is kept, tight, and the column and the row of the given mask where it begins.
+        The tight mask of the kept pixels, and its first column and row in the given mask.
     """
     count, pieces, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
     if count <= 2:

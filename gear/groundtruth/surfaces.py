@@ -1,4 +1,4 @@
-"""Patch surfaces as one view shows them."""
+"""Measures patch surfaces in one view."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ UNIT_CORNERS = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 """Patch coordinates of the corners: top left, top right, bottom right, bottom left."""
 
 CURVE_STEPS = 32
-"""Straight pieces of an edge that a lens bends."""
+"""Number of straight pieces by which a curved edge is approximated behind a lens."""
 
 
 def observe_surfaces(view: View, geoms: GeomTable, record: SceneRecord) -> tuple[SurfaceTruth, ...]:
-    """Measures each surface of the record, in its order, in one view."""
+    """Measures each surface of the record in one view, in the order of the record."""
     return tuple(_observe(view, geoms, record, index, surface) for index, surface in enumerate(record.surfaces))
 
 
@@ -67,7 +67,7 @@ def _observe(view: View, geoms: GeomTable, record: SceneRecord, index: int, surf
 
 
 def _area_px2(corners_m: Array, view: View) -> float:
-    """Area of the projected face as the picture shows it, cut at the near plane, inside and outside the picture."""
+    """Area in square pixels of the projected face, clipped at the near plane but not to the picture."""
     polygon: list[Array] = []
     for a, b in zip(corners_m, np.roll(corners_m, -1, axis=0), strict=True):
         if a[2] >= NEAR_M:

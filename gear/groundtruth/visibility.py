@@ -13,8 +13,8 @@ Preset = Literal["kitti", "coco", "carla_gear"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VisibilityLimits:
-    """What an object must show to be labelled. An object that shows less is a region to ignore: detecting it is no
-    mistake, and missing it is none either.
+    """Limits that an object must reach to be labelled. An object below them is a region to ignore: neither detecting
+    nor missing it counts as an error.
 
     Attributes:
         max_distance_m: from the camera to the middle of the object's 3D box; None for any distance.
@@ -45,7 +45,7 @@ class VisibilityLimits:
             raise FieldError("min_pixels_px", f"must be at least 1, got {self.min_pixels_px}")
 
     def mentions(self, truth: ObjectTruth) -> bool:
-        """Whether the object is a label or at least a region to ignore."""
+        """Whether the object becomes a label or a region to ignore, instead of being left out."""
         return truth.visible_px >= self.min_pixels_px
 
     def labels(self, truth: ObjectTruth, box_px: BoxPx, distance_m: float) -> bool:
@@ -75,13 +75,14 @@ PRESETS: dict[Preset, VisibilityLimits] = {
         max_distance_m=200.0, min_box_area_px2=900.0, min_visible_fraction=0.1, min_visible_px=100
     ),
 }
-"""`kitti`: everything that a level of KITTI's evaluation counts. `coco`: everything with 100 visible pixels.
-`carla_gear`: the limits of the CARLA-GeAR paper, 200 m and 900 px², and what gear adds to them."""
+"""Presets of limits. `kitti`: objects that some difficulty of KITTI's evaluation counts. `coco`: objects with 100
+visible pixels. `carla_gear`: the limits of the CARLA-GeAR paper, 200 m and 900 px², and further limits by gear.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Visibility:
-    """Option of a task: a preset of limits and what differs from it.
+    """Option of a task: a preset of limits, and limits that replace those of the preset.
 
     Attributes:
         preset: `kitti` labels objects from 25 px of height with a tenth of them visible, `coco` those with 100 visible
@@ -109,10 +110,10 @@ class Visibility:
         self.limits()
 
     def limits(self) -> VisibilityLimits:
-        """The preset's limits with the given ones in their place.
+        """The preset's limits, replaced by the given ones.
 
         Raises:
-            FieldError: a limit is impossible.
+            FieldError: a limit is out of its range.
         """
         given = {field.name: getattr(self, field.name) for field in fields(VisibilityLimits)}
         return replace(PRESETS[self.preset], **{name: value for name, value in given.items() if value is not None})

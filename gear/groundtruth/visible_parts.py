@@ -1,4 +1,4 @@
-"""What the id buffer holds of each part, found in one pass over the picture."""
+"""Finds the visible pixels of all parts of objects in one pass over the id buffer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gear.values.frames import GeomTable, IdImage, SceneObject
 
 Mask = npt.NDArray[np.bool_]
 PartKey = tuple[int, int]
-"""Object id and label code."""
+"""Object id and label code, which identify a part."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -21,9 +21,9 @@ class VisiblePart:
     """The visible pixels of one part.
 
     Attributes:
-        left_px, top_px: index pixel of the mask's first pixel.
-        mask: (h, w) bool, tight.
-        count_px: its pixels.
+        left_px, top_px: column and row of the mask's first pixel in the picture.
+        mask: (h, w) bool, the smallest that holds the part.
+        count_px: number of visible pixels.
     """
 
     left_px: int
@@ -33,21 +33,21 @@ class VisiblePart:
 
 
 def gather(table: npt.NDArray[np.generic], geom_id: IdImage) -> npt.NDArray[np.generic]:
-    """`table[geom_id]` where the last entry of the table stands for -1, nothing."""
+    """`table[geom_id]`; the last entry of the table is for the geom id -1, where the picture shows no geom."""
     return np.take(table, geom_id, mode="wrap")
 
 
 def visible_parts(
     geom_id: IdImage, geoms: GeomTable, objects: Mapping[int, SceneObject], *, by_label: bool
 ) -> dict[PartKey, VisiblePart]:
-    """Each part that has at least one pixel.
+    """Finds all parts with at least one visible pixel.
 
     Args:
         geom_id: (H, W) int32, -1 for nothing.
-        geoms: tables by geom id.
-        objects: what counts; geoms of other objects and of the ego car count for nothing.
-        by_label: True tells the labels of an object apart (rider and bicycle); False takes it whole, under its own
-            label.
+        geoms: label and object of each geom.
+        objects: objects to measure; geoms of other objects and of the ego car are skipped.
+        by_label: True makes one part per label of an object (rider and bicycle); False one part per object, with its
+            main label.
     """
     runs = Runs.of(geom_id)
     keys: dict[PartKey, int] = {}

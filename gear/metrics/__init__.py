@@ -1,1 +1,1 @@
-"""Metrics: each an evaluator over a data set, by the definitions of the benchmark that it belongs to."""
+"""Metrics: evaluators over a dataset, each by the definitions of its benchmark."""

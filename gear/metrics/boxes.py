@@ -1,4 +1,4 @@
-"""Overlaps of boxes: upright in the picture, turned on the ground, and in space. All pairs at once."""
+"""Overlaps of all pairs of boxes: axis-aligned in the picture, rotated on the ground, and in space."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from gear.values.geometry import Array
 
 MAX_CORNERS = 8
-"""Two rectangles meet in a polygon of at most eight corners."""
+"""The intersection of two rectangles has at most eight corners."""
 
 
 def intersections_px2(a: Array, b: Array) -> Array:
-    """(N, 4) and (M, 4) boxes (left, top, right, bottom) to (N, M) areas of what they share."""
+    """(N, M) intersection areas of (N, 4) and (M, 4) boxes (left, top, right, bottom)."""
     low = np.maximum(a[:, None, :2], b[None, :, :2])
     high = np.minimum(a[:, None, 2:], b[None, :, 2:])
     return np.asarray(np.prod(np.clip(high - low, 0, None), axis=-1))
@@ -24,7 +24,7 @@ def iou_2d(a: Array, b: Array) -> Array:
 
 
 def share_of_first(a: Array, b: Array) -> Array:
-    """(N, M) intersection over the area of the first box."""
+    """(N, M) intersection areas of (N, 4) and (M, 4) boxes, divided by the area of the first box."""
     return _over(intersections_px2(a, b), np.broadcast_to(_areas(a)[:, None], (len(a), len(b))))
 
 
@@ -32,11 +32,11 @@ def iou_ground_and_space(a: Array, b: Array) -> tuple[Array, Array]:
     """Overlaps of KITTI's 3D boxes.
 
     Args:
-        a, b: (N, 7) and (M, 7): height, width, length, then x, y, z of the bottom's middle and rotation_y; camera
-            frame, y down.
+        a, b: (N, 7) and (M, 7) boxes: height, width, length, x, y, z of the middle of the bottom face, and rotation_y,
+            in the camera's frame with y down.
 
     Returns:
-        (N, M) intersection over union seen from above, and in space.
+        (N, M) intersection over union of the footprints, and of the volumes.
     """
     shared_m2 = footprint_intersections_m2(a, b)
     ground_a, ground_b = a[:, 1] * a[:, 2], b[:, 1] * b[:, 2]
@@ -49,7 +49,7 @@ def iou_ground_and_space(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def footprint_intersections_m2(a: Array, b: Array) -> Array:
-    """(N, 7) and (M, 7) boxes to (N, M) areas shared by their footprints."""
+    """(N, M) intersection areas of the footprints of (N, 7) and (M, 7) boxes, in square metres."""
     shared = np.zeros((len(a), len(b)))
     reach = (np.hypot(a[:, 1], a[:, 2])[:, None] + np.hypot(b[:, 1], b[:, 2])[None]) / 2
     near = np.hypot(a[:, None, 3] - b[None, :, 3], a[:, None, 5] - b[None, :, 5]) < reach
@@ -60,7 +60,7 @@ def footprint_intersections_m2(a: Array, b: Array) -> Array:
 
 
 def footprints(boxes: Array) -> Array:
-    """(N, 7) boxes to (N, 4, 2) corners in x and z, counter-clockwise in (x, z)."""
+    """(N, 4, 2) corners of the footprints of (N, 7) boxes in x and z, counter-clockwise in (x, z)."""
     c, s = np.cos(boxes[:, 6]), np.sin(boxes[:, 6])
     along = np.array([0.5, -0.5, -0.5, 0.5]) * boxes[:, 2:3]
     across = np.array([0.5, 0.5, -0.5, -0.5]) * boxes[:, 1:2]
@@ -70,11 +70,11 @@ def footprints(boxes: Array) -> Array:
 
 
 def _convex_intersections(polygons: Array, clips: Array) -> Array:
-    """Areas of (P, 4, 2) quadrangles cut by (P, 4, 2) ones, both counter-clockwise; Sutherland and Hodgman, all at
-    once.
+    """Areas of the intersections of (P, 4, 2) quadrangles with (P, 4, 2) others, all counter-clockwise.
 
-    A cut edge by edge: each corner is kept if it is inside, and a new one is made where an edge crosses. What is left
-    is packed to the front and the rest filled with the first corner, which adds no area.
+    The algorithm of Sutherland and Hodgman, for all pairs at once: for each clipping edge, corners inside are kept and
+    new ones are made where an edge crosses. The remaining corners are moved to the front, and the rest of the array is
+    filled with the first corner, which adds no area.
     """
     corners = polygons
     for edge in range(4):

@@ -1,4 +1,4 @@
-"""Average precision by pycocotools itself."""
+"""COCO's average precision, computed by pycocotools."""
 
 from __future__ import annotations
 
@@ -23,21 +23,22 @@ RECALLS = ("ar1", "ar10", "ar100", "ar_small", "ar_medium", "ar_large")
 
 
 class CocoEvaluator(Generic[SampleT]):
-    """Gathers pictures and detections, and hands them to pycocotools at the end."""
+    """Gathers pictures and detections, and evaluates them with pycocotools at the end."""
 
     def __init__(self, as_picture: Callable[[SampleT], Picture]) -> None:
-        """Args: as_picture: what COCO knows of a sample."""
+        """Args: as_picture: converts a sample to its COCO picture with annotations."""
         self._as_picture = as_picture
         self.pictures: list[Picture] = []
         self.detections: list[tuple[Detection, ...]] = []
 
     def update(self, sample: SampleT, prediction: Sequence[Detection]) -> Mapping[str, float]:
-        """Takes the detections of one sample; returns `found_share` and `false_alarms`.
+        """Adds the detections of one sample; returns `found_share` and `false_alarms` of this sample.
 
-        See `gear.metrics.single_picture`; average precision has no meaning for a single picture.
+        `gear.metrics.single_picture` defines both; average precision is not defined for a single picture.
 
         Raises:
-            ValueError: a detection has an unknown category, a box turned inside out, or a number that is not finite.
+            ValueError: a detection has an unknown category, a box whose right is left of its left or bottom above its
+                top, or a number that is not finite.
         """
         for found in prediction:
             left, top, right, bottom = found.box_px
@@ -53,12 +54,12 @@ class CocoEvaluator(Generic[SampleT]):
         return self._single(picture, prediction)
 
     def _single(self, picture: Picture, found: Sequence[Detection]) -> dict[str, float]:
-        """One picture's own metrics."""
+        """The metrics of a single picture."""
         return self._metrics(picture, found, 0.0)
 
     @staticmethod
     def _metrics(picture: Picture, found: Sequence[Detection], low_px: float) -> dict[str, float]:
-        """The same, where detections less high than `low_px` are no false alarms."""
+        """The metrics of a single picture, where detections that are lower than `low_px` are no false alarms."""
         edges = [(_edges(item.box_xywh), item) for item in picture.annotations]
         return single_metrics(
             boxes([(box, item.category_id, 1.0) for box, item in edges if not item.is_crowd]),
@@ -68,13 +69,14 @@ class CocoEvaluator(Generic[SampleT]):
         )
 
     def merge(self, other: Any) -> None:
-        """Takes in the pictures of another one."""
+        """Adds the pictures of another evaluator."""
         self.pictures += other.pictures
         self.detections += other.detections
 
     def result(self) -> Mapping[str, float]:
-        """COCO's twelve metrics for boxes (`ap`, `ap50`, …, `ar100`, …) and `ap_<category>` for what occurs; 0..1 or
-        NaN."""
+        """COCO's twelve metrics for boxes (`ap`, `ap50`, …, `ar100`, …), and `ap_<category>` of every category that
+        occurs; 0..1 or NaN.
+        """
         names = (*STATS, *RECALLS)
         occurring = sorted({item.category_id for item in _labelled(self.pictures)})
         if not occurring:
@@ -94,7 +96,7 @@ class CocoEvaluator(Generic[SampleT]):
         return metrics
 
     def resampled(self, draws: Draws) -> Spread:
-        """`ap`, `ap50`, `ap75` and `ap_<category>`."""
+        """(R,) values of `ap`, `ap50`, `ap75` and `ap_<category>`."""
         found = matches(self._matched())
         values = resampled(list(found.values()), draws)
         spread = {
@@ -107,11 +109,11 @@ class CocoEvaluator(Generic[SampleT]):
         return spread
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """Every metric here is a share."""
+        """0 and 1: every metric of this evaluator is a share."""
         return 0.0, 1.0
 
     def _matched(self) -> Any:
-        """pycocotools' evaluation with every picture matched."""
+        """A `COCOeval` after matching, before accumulation."""
         occurring = sorted({item.category_id for item in _labelled(self.pictures)})
         # The same picture may come twice, so pictures are numbered here.
         pictures = [
@@ -130,10 +132,10 @@ class CocoEvaluator(Generic[SampleT]):
         return evaluation
 
     def _adapt(self, labels: list[Json], found: list[Json]) -> None:
-        """Room for other ideas of an object's size."""
+        """Adapts the pictures before the evaluation; subclasses may change the size of objects."""
 
     def _limit(self, parameters: Any) -> None:
-        """Room for other limits."""
+        """Sets the parameters of the evaluation; subclasses may change limits."""
 
 
 def coco_eval(truth: Json, found: list[Json]) -> Any:
@@ -175,5 +177,5 @@ def _ignored(picture: Picture, category_ids: Sequence[int]) -> list[Annotation]:
 
 
 def _known(value: float) -> float:
-    """pycocotools says -1 for "no such ground truth"."""
+    """Replaces -1, with which pycocotools marks metrics without ground truth, by NaN."""
     return float(value) if value >= 0 else float("nan")

@@ -1,7 +1,7 @@
-"""Average precision from what pycocotools has matched, for any weights of the pictures.
+"""Average precision from the matches of pycocotools, with a weight for each picture.
 
-pycocotools matches picture by picture and only then gathers, so a resampled data set needs no second matching: each
-picture counts as often as it was drawn.
+pycocotools matches picture by picture, so that a resampled dataset needs no second matching: each picture is counted as
+often as it was drawn.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ RECALLS = np.linspace(0.0, 1.0, 101)
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Matches:
-    """Detections of one category, surest first.
+    """Matched detections of one category, in order of decreasing score.
 
     Attributes:
-        owner: (D,) number of the picture.
-        hit: (T, D) found a label, at each overlap.
-        counts: (T, D) is no detection that is ignored.
-        wanted: (N,) labels to be found in each picture.
+        owner: (D,) index of the picture of each detection.
+        hit: (T, D) whether the detection matches a label, for each IoU threshold.
+        counts: (T, D) whether the detection is not ignored.
+        wanted: (N,) number of labels to be found in each picture.
     """
 
     owner: npt.NDArray[np.int64]
@@ -37,7 +37,9 @@ class Matches:
 
 
 def matches(evaluation: Any) -> dict[int, Matches]:
-    """By category, of an evaluated `COCOeval`: its first range of areas; only categories with labels to be found."""
+    """The matches of an evaluated `COCOeval` by category, in its first area range; only categories with labels to be
+    found.
+    """
     parameters = evaluation.params
     pictures, areas = len(parameters.imgIds), len(parameters.areaRng)
     found = {}
@@ -62,7 +64,7 @@ def _gathered(rows: list[tuple[int, Any]], wanted: npt.NDArray[np.int64], most: 
 
 
 def average_precision(found: Matches, weights: npt.NDArray[np.int64]) -> Array:
-    """(T,) interpolated at 101 recalls, with each picture counted `weights` times; NaN without labels."""
+    """(T,) average precision at 101 recalls, with each picture counted `weights` times; NaN without labels."""
     total = int(weights @ found.wanted)
     if not total:
         return np.full(len(found.hit), np.nan)
@@ -87,7 +89,7 @@ def resampled(found: Sequence[Matches], draws: Draws) -> Array:
 
 
 def known_mean(values: Array, axes: tuple[int, ...]) -> Array:
-    """Mean over axes, NaN left out; NaN where all is."""
+    """Mean over axes without NaN; NaN where all values are NaN."""
     known = ~np.isnan(values)
     total = np.where(known, values, 0.0).sum(axis=axes)
     return np.asarray(np.where(known.any(axis=axes), total / np.maximum(known.sum(axis=axes), 1), np.nan))

@@ -1,4 +1,6 @@
-"""What a reference network of 2D detection is held to: what moves in traffic, where there is enough of it to see."""
+"""The metric by which reference networks of 2D detection are compared: AP50 of frequent traffic categories in the
+dataset.
+"""
 
 from __future__ import annotations
 
@@ -17,17 +19,17 @@ from gear.values.serial import Json
 CATEGORIES = ("person", "bicycle", "car", "motorcycle", "bus", "truck")
 MIN_HEIGHT_PX = 32.0
 AT_HEIGHT_PX = 800
-"""Heights are those of a picture of 800 rows."""
+"""Number of rows of a picture to which limits on heights refer."""
 
 MIN_INSTANCES = 50
 LARGE = 1e10
 
 
 class TallObjects(CocoEvaluator[SampleT]):
-    """AP at IoU 0.5, mean over the categories of traffic that have at least 50 instances.
+    """Average precision at IoU 0.5, averaged over the traffic categories with at least 50 instances.
 
-    An instance counts if its visible box is at least 32 px high in a picture of 800 rows; lower ones, and detections
-    as low that found nothing, are ignored as pycocotools ignores what leaves a range of areas.
+    An instance counts if its visible box is at least 32 px high in a picture of 800 rows. Lower instances, and lower
+    detections that match nothing, are ignored, as pycocotools ignores objects outside an area range.
     """
 
     def result(self) -> Mapping[str, float]:
@@ -45,13 +47,13 @@ class TallObjects(CocoEvaluator[SampleT]):
         return {"ap50": total, **{f"ap50_{name}": value for name, value in values.items()}, **instances}
 
     def resampled(self, draws: Draws) -> Spread:
-        """`ap50` and `ap50_<category>`; which categories count is decided by the whole data set."""
+        """(R,) values of `ap50` and `ap50_<category>`; the whole dataset decides which categories count."""
         found = {name: one for name, one in self._found().items() if int(one.wanted.sum()) >= MIN_INSTANCES}
         values = resampled(list(found.values()), draws)[:, :, 0]
         return {"ap50": known_mean(values, (1,)), **{f"ap50_{name}": values[:, i] for i, name in enumerate(found)}}
 
     def _single(self, picture: Picture, found: Sequence[Detection]) -> dict[str, float]:
-        """Of the same categories, and of what is tall enough."""
+        """The metrics of a single picture, for the same categories and heights."""
         low_px = MIN_HEIGHT_PX * picture.height_px / AT_HEIGHT_PX
         labels = [
             replace(item, is_crowd=item.is_crowd or item.box_xywh[3] < low_px)
@@ -70,7 +72,7 @@ class TallObjects(CocoEvaluator[SampleT]):
         }
 
     def _adapt(self, labels: list[Json], found: list[Json]) -> None:
-        """Height takes the place of area."""
+        """Replaces the areas of objects by their heights."""
         for item in (*labels, *found):
             item["area"] = item["bbox"][3] * AT_HEIGHT_PX / self.pictures[item["image_id"]].height_px
 

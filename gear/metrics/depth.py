@@ -1,4 +1,4 @@
-"""Monocular depth: the metrics of KITTI's devkit and the customary ones of Eigen et al.; means over pictures."""
+"""Monocular depth: the metrics of KITTI's devkit and those of Eigen et al. (NeurIPS 2014), as means over pictures."""
 
 from __future__ import annotations
 
@@ -24,25 +24,27 @@ CROPS: dict[str, tuple[float, float, float, float]] = {
     "garg": (0.40810811, 0.99189189, 0.03594771, 0.96405229),
     "eigen": (0.3324324, 0.91351351, 0.0359477, 0.96405229),
 }
-"""First and last row and column as shares of the picture."""
+"""Evaluated part of the picture by name: first and last row, first and last column, as shares of the picture's size."""
 
 MIN_DEPTH_M = 1e-3
 
-LEAST_TOLD_M = 1 / UNITS_PER_M
-"""The least depth that the devkit's pictures can say."""
+MIN_CODED_DEPTH_M = 1 / UNITS_PER_M
+"""Smallest depth that the 16-bit pictures of KITTI's devkit can hold, in metres."""
 
-PIECE = 1 << 16
-"""Pixels at a time: few enough that what is worked out of them stays in the processor's cache."""
+PIXELS_AT_ONCE = 1 << 16
+"""Number of pixels that are processed at a time, few enough for intermediate results to stay in the
+processor's cache.
+"""
 
-EVERYDAY_M = 1e5
-"""Depths up to here, and down to its inverse, are worked on in single precision."""
+SINGLE_PRECISION_M = 1e5
+"""Depths between the inverse of this value and this value are processed in single precision."""
 
-UNSURE = 1e-6
-"""Logarithms of quotients in single precision are off by a few times 1e-7 at most."""
+LOG_ERROR = 1e-6
+"""Bound on the error of a logarithm of a quotient in single precision, which is at most a few times 1e-7."""
 
 
 class DepthTruth(Protocol):
-    """What the metric looks at."""
+    """The part of a depth sample that the metric uses."""
 
     @property
     def depth_m(self) -> FloatImage:
@@ -51,11 +53,11 @@ class DepthTruth(Protocol):
 
 
 class DepthEvaluator:
-    """Gathers the metrics of every picture.
+    """Gathers the metrics of every picture and averages them.
 
-    Plain names are the devkit's, over every pixel whose ground truth its 16-bit pictures can say, which end at 256 m,
-    with predictions as far as those pictures can say them; `eigen_` names look at ground truth between 1 mm and
-    `max_depth_m` inside the crop, with predictions clipped to the same range.
+    Metrics without a prefix are those of KITTI's devkit: over all pixels whose ground truth its 16-bit pictures can
+    hold (up to 256 m), with predictions clipped to the range of these pictures. Metrics with the prefix `eigen_` use
+    ground truth between 1 mm and `max_depth_m` inside the crop, with predictions clipped to the same range.
     """
 
     _wants_devkit = True
@@ -66,10 +68,11 @@ class DepthEvaluator:
         self.metrics: dict[str, list[float]] = {}
 
     def update(self, sample: DepthTruth, prediction: FloatImage) -> Mapping[str, float]:
-        """Takes (H, W) metres; returns this picture's metrics.
+        """Adds a predicted (H, W) depth map in metres; returns the metrics of this picture.
 
         Raises:
-            ValueError: the prediction has another shape, or is not positive and finite where there is ground truth.
+            ValueError: the prediction has another shape than the ground truth, or is not positive and finite where
+                there is ground truth.
         """
         truth_m, prediction = sample.depth_m, np.asarray(prediction, np.float32)  # as it is kept in files
         if prediction.shape != truth_m.shape:
@@ -78,7 +81,7 @@ class DepthEvaluator:
         if self.crop != "none":
             near &= self._window(truth_m.shape)
         most_m = min(self.max_depth_m, MAX_PNG_DEPTH_M)
-        both = near & (prediction >= LEAST_TOLD_M) & (prediction <= most_m) & (truth_m <= MAX_PNG_DEPTH_M)
+        both = near & (prediction >= MIN_CODED_DEPTH_M) & (prediction <= most_m) & (truth_m <= MAX_PNG_DEPTH_M)
         others = np.isfinite(truth_m) & ~both
         other_truth_m, other_found_m = truth_m[others], prediction[others]
         if not np.isfinite(other_found_m).all() or (other_found_m <= 0).any():
@@ -87,7 +90,7 @@ class DepthEvaluator:
         found = {}
         if self._wants_devkit:
             told = other_truth_m <= MAX_PNG_DEPTH_M
-            kept_m = other_found_m[told].clip(LEAST_TOLD_M, MAX_PNG_DEPTH_M)
+            kept_m = other_found_m[told].clip(MIN_CODED_DEPTH_M, MAX_PNG_DEPTH_M)
             found = _devkit(shared + _summed(other_truth_m[told], kept_m))
         strays = near[others]
         clipped_m = other_found_m[strays].clip(MIN_DEPTH_M, self.max_depth_m)
@@ -104,7 +107,7 @@ class DepthEvaluator:
         return window
 
     def merge(self, other: Any) -> None:
-        """Takes in the pictures of another one."""
+        """Adds the pictures of another evaluator."""
         for name, values in other.metrics.items():
             self.metrics.setdefault(name, []).extend(values)
 
@@ -120,12 +123,12 @@ class DepthEvaluator:
         return {name: float(np.mean(np.sort(values))) if values else float("nan") for name, values in known.items()}
 
     def resampled(self, draws: Draws) -> Spread:
-        """Means over the drawn pictures; of single ones in the order that they came in."""
+        """(R,) means over the drawn pictures of each row of `draws`."""
         values = {name: np.array(self.metrics.get(name, []), np.float64) for name in self._names()}
         return {name: _known_means(one[draws]) for name, one in values.items() if len(one)}
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """Shares of pixels within a factor (`d1` to `d3`) end at 1; errors have no upper end."""
+        """0 and 1 for shares of pixels within a factor (`d1` to `d3`); 0 and infinity for errors."""
         return 0.0, 1.0 if metric.removeprefix("eigen_") in ("d1", "d2", "d3") else math.inf
 
     @staticmethod
@@ -134,9 +137,10 @@ class DepthEvaluator:
 
 
 class NearDepth(DepthEvaluator):
-    """What a reference network is held to: whole pictures below 80 m, predictions clipped there; no sky.
+    """The metric by which reference networks of depth are compared: whole pictures, ground truth below 80 m, without
+    the sky.
 
-    The devkit's metrics are not shown.
+    Predictions are clipped to 80 m. The devkit's metrics are not included.
     """
 
     _wants_devkit = False
@@ -149,23 +153,23 @@ class NearDepth(DepthEvaluator):
         return _renamed(super().update(sample, prediction))
 
     def result(self) -> Mapping[str, float]:
-        """`d1`, `rmse_m`, `d2`, `d3`, `abs_rel`, `sq_rel`, `rmse_log`, `log10`, `silog`: means over pictures."""
+        """Means over pictures of `d1`, `rmse_m`, `d2`, `d3`, `abs_rel`, `sq_rel`, `rmse_log`, `log10` and `silog`."""
         return _renamed(super().result())
 
     def resampled(self, draws: Draws) -> Spread:
-        """As `result`."""
+        """(R,) means over the drawn pictures of the metrics of `result`."""
         return _renamed(super().resampled(draws))
 
 
 def _known_means(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """(R,) of (R, N); NaN where nothing is known."""
+    """(R,) means of the rows of (R, N) values without NaN; NaN where a row has no other value."""
     known = ~np.isnan(values)
     count = known.sum(axis=1)
     return np.asarray(np.where(known, values, 0).sum(axis=1) / np.where(count, count, np.nan), np.float64)
 
 
 def _renamed(metrics: Mapping[str, T]) -> dict[str, T]:
-    """Eigen's metrics without their prefix."""
+    """Renames Eigen's metrics to names without the prefix."""
     prefix = "eigen_"
     plain = {name.removeprefix(prefix): value for name, value in metrics.items() if name.startswith(prefix)}
     first = {name: plain[name] for name in ("d1", "rmse_m")}
@@ -173,7 +177,7 @@ def _renamed(metrics: Mapping[str, T]) -> dict[str, T]:
 
 
 class _Sums:
-    """Sums over pixels, by name."""
+    """Sums over pixels of the quantities of all metrics."""
 
     def __init__(self, sums: Mapping[str, float] | None = None) -> None:
         self._sums = dict(sums or {})
@@ -183,28 +187,31 @@ class _Sums:
         return _Sums({name: self._sums.get(name, 0.0) + other._sums.get(name, 0.0) for name in names})
 
     def mean(self, name: str) -> float:
-        """NaN where there were no pixels."""
+        """Mean of a sum over the pixels; NaN if there are none."""
         pixels = self._sums.get("pixels", 0.0)
         return self._sums[name] / pixels if pixels else float("nan")
 
 
 def _summed(truth_m: FloatImage, found_m: FloatImage) -> _Sums:
-    """Over pixels with (N,) metres."""
+    """The sums over pixels with (N,) true and predicted depths in metres."""
     sums = _Sums()
-    for start in range(0, truth_m.size, PIECE):
-        sums += _sums_of_piece(truth_m[start : start + PIECE], found_m[start : start + PIECE])
+    for start in range(0, truth_m.size, PIXELS_AT_ONCE):
+        sums += _sums_of_piece(truth_m[start : start + PIXELS_AT_ONCE], found_m[start : start + PIXELS_AT_ONCE])
     return sums
 
 
 def _sums_of_piece(truth_m: FloatImage, found_m: FloatImage) -> _Sums:
-    """Single precision for each pixel, as depths are kept, and sums in double precision by NumPy.
+    """The sums over one piece of the pixels: single precision per pixel, as depths are stored, and sums in double
+    precision.
 
-    Double precision keeps the variance in `silog` right where it is the small difference of large means. NumPy adds in
-    an order that depends on the number of values alone; OpenCV's `sumElems` adds float32 in an order that depends on
-    where the array lies in memory, so that one picture had several results.
+    Double precision keeps the variance in `silog` accurate where it is the small difference of large means. NumPy adds
+    in an order that depends only on the number of values. OpenCV's `sumElems` adds float32 in an order that depends on
+    the array's address, so that the result for a picture is not always the same.
     """
     most, least = max(truth_m.max(), found_m.max()), min(truth_m.min(), found_m.min())
-    if most > EVERYDAY_M or least < 1 / EVERYDAY_M:  # their squares and quotients may leave single precision's range
+    if (
+        most > SINGLE_PRECISION_M or least < 1 / SINGLE_PRECISION_M
+    ):  # their squares and quotients may leave single precision's range
         truth_m, found_m = truth_m.astype(np.float64), found_m.astype(np.float64)
     error_m = found_m - truth_m
     relative = error_m / truth_m
@@ -240,12 +247,14 @@ def _sum_of_squares(values: npt.NDArray[np.floating[Any]]) -> float:
 
 
 def _count_within(ratio: float, log_size: Array, truth_m: FloatImage, found_m: FloatImage) -> int:
-    """Pixels whose depths differ by less than a factor; those that single precision cannot tell are looked at again."""
+    """Number of pixels whose depths differ by less than a factor; pixels too close to the factor are decided in double
+    precision.
+    """
     bound = math.log(ratio)
-    count = int(np.count_nonzero(log_size < bound - UNSURE))
-    if np.count_nonzero(log_size < bound + UNSURE) == count:
+    count = int(np.count_nonzero(log_size < bound - LOG_ERROR))
+    if np.count_nonzero(log_size < bound + LOG_ERROR) == count:
         return count
-    places = np.flatnonzero(np.abs(log_size - bound) <= UNSURE)
+    places = np.flatnonzero(np.abs(log_size - bound) <= LOG_ERROR)
     truth_m, found_m = truth_m.take(places).astype(np.float64), found_m.take(places).astype(np.float64)
     return count + int(np.count_nonzero(np.maximum(truth_m / found_m, found_m / truth_m) < ratio))
 

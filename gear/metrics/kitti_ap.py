@@ -1,9 +1,9 @@
-"""KITTI's object evaluation: average precision in the picture, from above and in space, and orientation similarity.
+"""KITTI's object evaluation: average precision of 2D boxes, of footprints and of 3D boxes, and orientation similarity.
 
-By the rules of the devkit: 41 thresholds, neighbours and hard labels ignored, DontCare regions excuse. `r11` is the
-mean over 11 recalls, `r40` the mean over 40 that replaced it in 2019. With fewer than 41 labels of a class a perfect
-detector stays below 1 in both, because that many recall steps do not exist; that is the benchmark's own definition, and
-`ceilings` says how far it could come.
+It follows the rules of the devkit: 41 thresholds, similar classes and labels beyond the difficulty ignored, detections
+in DontCare regions excused. `r11` is the mean over 11 recalls, `r40` the mean over 40 recalls that replaced it in 2019.
+With fewer than 41 labels of a class a perfect detector stays below 1 in both, because fewer recall steps exist. This is
+the benchmark's own definition; `ceilings` gives the largest possible values.
 """
 
 from __future__ import annotations
@@ -36,33 +36,29 @@ from gear.values.ground_truth import BoxPx
 SampleT = TypeVar("SampleT", contravariant=True)
 
 STEPS = 40
-"""Recall is looked at in steps of 1/40."""
+"""Number of recall steps: recalls are multiples of 1/40."""
 
 
 class KittiEvaluator(Generic[SampleT]):
-    """Gathers pictures; everything is computed at the end."""
+    """Gathers the labels and detections of all pictures, and computes the metrics at the end."""
 
     def __init__(
         self,
         labels_of: Callable[[SampleT], Sequence[KittiLabel]],
         ignored_of: Callable[[SampleT], Sequence[BoxPx]] = lambda _: (),
     ) -> None:
-        """Args:
-        labels_of: the lines of a sample's label file, DontCare regions with them.
-        ignored_of: boxes in the picture, in index pixels. They excuse detections as DontCare regions do, for overlaps
-            from above and in space, too.
-        """
+        """Args: labels_of: returns the lines of a sample's label file, including DontCare regions."""
         self._labels_of, self._ignored_of = labels_of, ignored_of
         self.pictures: list[PictureBoxes] = []
 
     def update(self, sample: SampleT, prediction: Sequence[KittiLabel]) -> Mapping[str, float]:
-        """Takes the detections of one sample; returns `found_share` and `false_alarms`, of boxes in the picture.
+        """Adds the detections of one sample; returns `found_share` and `false_alarms` of its 2D boxes.
 
-        See `gear.metrics.single_picture`; average precision has no meaning for a single picture.
+        `gear.metrics.single_picture` defines both; average precision is not defined for a single picture.
 
         Raises:
-            ValueError: a detection has no score, a type that is none of KITTI's, a box turned inside out, or a number
-                that is not finite.
+            ValueError: a detection has no score, a type that is none of KITTI's, a box whose right is left of its left
+                or bottom above its top, or a number that is not finite.
         """
         for found in prediction:
             _check(found)
@@ -79,11 +75,11 @@ class KittiEvaluator(Generic[SampleT]):
         )
 
     def merge(self, other: Any) -> None:
-        """Takes in the pictures of another one."""
+        """Adds the pictures of another evaluator."""
         self.pictures += other.pictures
 
     def result(self) -> Mapping[str, float]:
-        """Shares, 0..1; NaN where no label is to be found.
+        """Metrics by name, 0..1; NaN where no label is to be found.
 
         `<class>_<2d|bev|3d>_<easy|moderate|hard>_<r11|r40>` and `<class>_aos_…`, and `ap_3d_moderate`, the mean of the
         classes' `3d_moderate_r40`.
@@ -97,7 +93,7 @@ class KittiEvaluator(Generic[SampleT]):
         return {"ap_3d_moderate": float(np.mean(known)) if known else float("nan"), **metrics}
 
     def resampled(self, draws: Draws) -> Spread:
-        """`<class>_<2d|bev|3d>_moderate_r40` and `ap_3d_moderate`."""
+        """(R,) values of `<class>_<2d|bev|3d>_moderate_r40` and `ap_3d_moderate`."""
         moderate = next(difficulty for difficulty in DIFFICULTIES if difficulty.name == "moderate")
         spread: dict[str, Array] = {}
         for kind in NEIGHBOURS:
@@ -111,11 +107,11 @@ class KittiEvaluator(Generic[SampleT]):
         return spread
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """Every metric here is a share."""
+        """0 and 1: every metric of this evaluator is a share."""
         return 0.0, 1.0
 
     def ceilings(self) -> Mapping[str, float]:
-        """What perfect detections would come to, where that is less than 1."""
+        """The metrics that perfect detections would reach, for those below 1."""
         most: dict[str, float] = {}
         for kind in NEIGHBOURS:
             for overlap in OVERLAPS:
@@ -136,7 +132,7 @@ class KittiEvaluator(Generic[SampleT]):
 
 
 def _check(found: KittiLabel) -> None:
-    """Raises `ValueError` for a detection that cannot be measured, which would count as one that found nothing."""
+    """Raises `ValueError` for a detection that cannot be evaluated and would otherwise count as a false alarm."""
     if found.score is None:
         raise ValueError("every detection needs a score")
     if found.type not in TYPES:
@@ -150,9 +146,10 @@ def _check(found: KittiLabel) -> None:
 
 
 def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:
-    """(R,) average precision at 40 recalls over the pictures of each draw, (R, N); NaN if there is nothing to be found.
+    """(R,) average precision at 40 recalls over the pictures of each row of (R, N) draws; NaN without labels to be
+    found.
 
-    Every picture is matched once at every threshold that any draw can have.
+    Every picture is matched once, at all thresholds that occur in any draw.
     """
     wanted = np.array([int((picture.label_state == 0).sum()) for picture in chosen])
     scores = [(score, number) for number, picture in enumerate(chosen) for score in matched_scores(picture)]
@@ -177,7 +174,7 @@ def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:
 
 
 def curves(chosen: Sequence[Chosen]) -> tuple[Array, Array]:
-    """(41,) precision and orientation similarity over recall 0, 1/40, …, 1; NaN if there is nothing to be found."""
+    """(41,) precision and orientation similarity at recalls 0, 1/40, …, 1; NaN without labels to be found."""
     wanted = sum(int((picture.label_state == 0).sum()) for picture in chosen)
     if not wanted:
         return np.full(STEPS + 1, np.nan), np.full(STEPS + 1, np.nan)
@@ -197,7 +194,7 @@ def curves(chosen: Sequence[Chosen]) -> tuple[Array, Array]:
 
 
 def perfect_curve(chosen: Iterable[Chosen]) -> Array:
-    """(41,) precision as `curves` gives it, of detections that find every label and nothing else."""
+    """(41,) precision of perfect detections, as `curves` gives it."""
     wanted = sum(int((picture.label_state == 0).sum()) for picture in chosen)
     if not wanted:
         return np.full(STEPS + 1, np.nan)
@@ -205,7 +202,7 @@ def perfect_curve(chosen: Iterable[Chosen]) -> Array:
 
 
 def recall_thresholds(scores: Sequence[float], wanted: int) -> Array:
-    """Scores at which the recall passes each step of 1/40, highest first; at most 41."""
+    """Scores at which the recall reaches each step of 1/40, in decreasing order; at most 41."""
     thresholds = []
     recall = 0.0
     for i, score in enumerate(scores):
@@ -220,12 +217,12 @@ def recall_thresholds(scores: Sequence[float], wanted: int) -> Array:
 
 
 def _at_recalls(stem: str, curve: Array) -> dict[str, float]:
-    """Means of a curve over 11 and over 40 recalls."""
+    """Means of a (41,) curve over 11 and over 40 recalls."""
     return {f"{stem}_r11": float(curve[:: STEPS // 10].mean()), f"{stem}_r40": float(curve[1:].mean())}
 
 
 def _monotone(values: Array) -> Array:
-    """The best value at this recall or any higher one, filled with zeros to 41."""
+    """The largest value at each recall or any higher one, padded with zeros to 41 values."""
     curve = np.zeros(STEPS + 1)
     kept = values[: STEPS + 1]
     curve[: len(kept)] = np.maximum.accumulate(kept[::-1])[::-1]

@@ -1,4 +1,4 @@
-"""Matching labels and detections of one picture as KITTI's devkit does, for many score thresholds at once."""
+"""Matches labels and detections of one picture by the rules of KITTI's devkit, for many score thresholds at once."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Overlap = Literal["2d", "bev", "3d"]
 OVERLAPS: tuple[Overlap, ...] = ("2d", "bev", "3d")
 
 NEIGHBOURS = {"Car": "Van", "Pedestrian": "Person_sitting", "Cyclist": ""}
-"""Classes, and the types so like them that finding one counts neither for nor against."""
+"""For each class the similar type whose objects are ignored: detecting one is neither a hit nor a false alarm."""
 
 MIN_OVERLAP = {"Car": 0.7, "Pedestrian": 0.5, "Cyclist": 0.5}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difficulty:
-    """What a label may lack and still be looked for."""
+    """The limits of a difficulty: labels beyond them are ignored."""
 
     name: str
     min_height_px: float
@@ -46,9 +46,9 @@ class PictureBoxes:
     """Labels and detections of one picture with their overlaps.
 
     Attributes:
-        labels: without DontCare.
-        detections: every one with a score.
-        overlaps: (labels, detections) by kind.
+        labels: all labels except DontCare regions.
+        detections: all detections, each with a score.
+        overlaps: (labels, detections) intersections over union, by kind of overlap.
         in_dont_care: (detections,) largest share of a detection's own box that lies in one DontCare region.
         in_ignored: (detections,) the same for regions that are ignored for overlaps from above and in space, too.
     """
@@ -63,7 +63,7 @@ class PictureBoxes:
 def picture_boxes(
     labels: Sequence[KittiLabel], detections: Sequence[KittiLabel], ignored_px: Sequence[BoxPx] = ()
 ) -> PictureBoxes:
-    """Computes all overlaps of a picture once.
+    """Computes the overlaps of all labels and detections of a picture.
 
     Args:
         labels: with DontCare regions.
@@ -99,16 +99,16 @@ def _boxes_m(labels: Sequence[KittiLabel]) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Chosen:
-    """What of a picture concerns one class at one difficulty.
+    """Labels and detections of one picture, sorted for one class at one difficulty.
 
     Attributes:
-        label_state: (labels,) 0 to be found, 1 ignored, -1 of no concern.
-        detection_state: (detections,) likewise.
-        scores: (detections,).
-        overlaps: (labels, detections).
+        label_state: (labels,) 0 for labels to be found, 1 for ignored ones, -1 for those of other classes.
+        detection_state: (detections,) the same for detections.
+        scores: (detections,) scores.
+        overlaps: (labels, detections) intersections over union.
         angle_gain: (labels, detections) (1 + cos of the difference of alpha) / 2.
         excused: (detections,) lies in a DontCare region or in an ignored one.
-        min_overlap: that a match needs.
+        min_overlap: smallest overlap of a match.
     """
 
     label_state: npt.NDArray[np.int8]
@@ -129,15 +129,15 @@ def choose(
     min_overlap: float | None = None,
     max_distance_m: float = np.inf,
 ) -> Chosen:
-    """Sorts labels and detections into those that count, those that are ignored and those of no concern.
+    """Sorts labels and detections into those that count, those that are ignored, and those of other classes.
 
     Args:
         picture: labels and detections.
-        kind: of object.
-        difficulty: what a label may lack.
-        overlap: in the picture, from above, or in space.
-        min_overlap: that a match needs; the benchmark's by default.
-        max_distance_m: what lies farther ahead is ignored.
+        kind: class of object.
+        difficulty: the limits of the difficulty.
+        overlap: kind of overlap: of 2D boxes, of footprints, or of 3D boxes.
+        min_overlap: smallest overlap of a match; the benchmark's by default.
+        max_distance_m: labels and detections that are farther ahead are ignored.
     """
     label_state = np.full(len(picture.labels), -1, dtype=np.int8)
     for i, label in enumerate(picture.labels):
@@ -174,7 +174,9 @@ def choose(
 
 
 def matched_scores(chosen: Chosen) -> list[float]:
-    """Scores of the detections that would find each label if every one were kept; each label takes the surest."""
+    """Scores of the detections that match a label if no score threshold is applied; each label takes the one with the
+    highest score.
+    """
     taken = np.zeros(len(chosen.scores), dtype=np.bool_)
     scores = []
     for i in np.flatnonzero(chosen.label_state >= 0):
@@ -190,7 +192,7 @@ def matched_scores(chosen: Chosen) -> list[float]:
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class Counts:
-    """What happens at each threshold: hits, false alarms, misses, and hits weighed by angle; (T,) each."""
+    """Counts at each threshold, (T,) each: hits, false alarms, misses, and hits weighted by orientation similarity."""
 
     tp: Array
     fp: Array

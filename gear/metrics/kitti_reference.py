@@ -1,4 +1,4 @@
-"""What a reference network of stereo detection is held to: near cars, seen from above."""
+"""The metric by which reference networks of stereo detection are compared: near cars, seen from above."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ MIN_OVERLAP = 0.5
 
 
 class NearCars(KittiEvaluator[SampleT]):
-    """Average precision of cars seen from above, at an overlap of 0.5.
+    """Average precision of the footprints of cars, at an overlap of 0.5.
 
-    Labels and detections more than 40 m ahead are ignored. Everything else, the difficulties too, is the devkit's.
+    Labels and detections more than 40 m ahead are ignored. All other rules, including the difficulties, are the
+    devkit's.
     """
 
     def update(self, sample: SampleT, prediction: Sequence[KittiLabel]) -> Mapping[str, float]:
-        """Takes the detections of one sample; returns `found_share` and `false_alarms` of its near cars from above.
+        """Adds the detections of one sample; returns `found_share` and `false_alarms` of the footprints of its near
+        cars.
 
-        They are those of moderate difficulty; detections count from a score of 0.5 on.
+        Both are for moderate difficulty and detections with a score of at least 0.5.
 
         Raises:
-            ValueError: a detection has no score, a type that is none of KITTI's, a box turned inside out, or a number
-                that is not finite.
+            ValueError: a detection has no score, a type that is none of KITTI's, a box whose right is left of its left
+                or bottom above its top, or a number that is not finite.
         """
         super().update(sample, prediction)
         here = count(_near(self.pictures[-1], _moderate_first()[0]), np.array([SURE]))
@@ -37,7 +39,7 @@ class NearCars(KittiEvaluator[SampleT]):
         return {"found_share": hits / wanted if wanted else float("nan"), "false_alarms": float(here.fp[0])}
 
     def result(self) -> Mapping[str, float]:
-        """`car_bev_<moderate|easy|hard>_r40`, shares, 0..1; NaN where no label is to be found."""
+        """`car_bev_<moderate|easy|hard>_r40`, 0..1; NaN where no label is to be found."""
         metrics = {}
         for difficulty in _moderate_first():
             precision, _ = curves(self._chosen(difficulty))
@@ -45,11 +47,11 @@ class NearCars(KittiEvaluator[SampleT]):
         return metrics
 
     def resampled(self, draws: Draws) -> Spread:
-        """All of them."""
+        """(R,) values of all metrics of `result`."""
         return {_name(one): resampled_r40(self._chosen(one), draws) for one in _moderate_first()}
 
     def ceilings(self) -> Mapping[str, float]:
-        """What perfect detections would come to, where that is less than 1."""
+        """The metrics that perfect detections would reach, for those below 1."""
         curves_by_name = {_name(one): perfect_curve(self._chosen(one)) for one in _moderate_first()}
         most = {name: float(curve[1 : STEPS + 1].mean()) for name, curve in curves_by_name.items()}
         return {name: value for name, value in most.items() if value < 1}

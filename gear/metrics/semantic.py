@@ -1,8 +1,8 @@
 """Semantic segmentation by the definitions of Cityscapes: IoU of classes and categories, and iIoU.
 
-Pixels whose ground truth is not evaluated count nowhere. A class that occurs neither in ground truth nor in
-predictions is left out of the mean. For iIoU every pixel of an instance weighs the class's average instance size over
-that instance's size.
+Pixels whose ground truth is not evaluated are skipped. A class that occurs neither in ground truth nor in predictions
+is left out of the mean. For iIoU every pixel of an instance has the weight (average instance size of the class) / (size
+of the instance).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ AVERAGE_INSTANCE_PX: dict[str, float] = {
     "truck": 27855.1264367816,
     "trailer": 16926.9763313609,
 }
-"""Average size of an instance in the benchmark's training set."""
+"""Average size in pixels of an instance of each class in Cityscapes' training set."""
 
 EVALUATED = tuple(label for label in LABELS if label.is_evaluated)
 CATEGORIES = tuple(dict.fromkeys(label.category for label in EVALUATED))
@@ -36,11 +36,11 @@ COUNT = len(LABELS)
 PIECE_PX = 1 << 17
 
 Values = npt.NDArray[np.float64]
-"""One metric, or as many as there are draws."""
+"""The value of a metric, or (R,) values for R draws."""
 
 
 class SegmentedSample(Protocol):
-    """What the metric looks at."""
+    """The part of a segmentation sample that the metric uses."""
 
     @property
     def label_ids(self) -> npt.NDArray[np.uint8]:
@@ -64,11 +64,11 @@ class SemanticEvaluator:
         self.weighted_category_fn = np.zeros(COUNT)
 
     def update(self, sample: SegmentedSample, prediction: npt.NDArray[np.uint8]) -> Mapping[str, float]:
-        """Takes (H, W) uint8 label ids; returns `miou` of this picture.
+        """Adds predicted (H, W) uint8 label ids; returns `miou` of this picture.
 
         Raises:
-            ValueError: the prediction has another shape, or holds what is no id: numbers with a fraction, below 0 or
-                above 33.
+            ValueError: the prediction has another shape than the ground truth, or holds a value that is no label id:
+                not an integer, below 0 or above 33.
         """
         if prediction.shape != sample.label_ids.shape:
             raise ValueError(f"prediction must have shape {sample.label_ids.shape}, got {prediction.shape}")
@@ -105,7 +105,7 @@ class SemanticEvaluator:
             self.weighted_category_fn[label.id] += (size - near) * weight
 
     def merge(self, other: Any) -> None:
-        """Adds the counts of another one."""
+        """Adds the counts of another evaluator."""
         self.confusion += other.confusion
         self.weighted_tp += other.weighted_tp
         self.weighted_fn += other.weighted_fn
@@ -117,11 +117,13 @@ class SemanticEvaluator:
         return {name: float(value) for name, value in self.metrics(self.totals()).items()}
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """Every metric here is a share."""
+        """0 and 1: every metric of this evaluator is a share."""
         return 0.0, 1.0
 
     def totals(self) -> Mapping[str, npt.NDArray[Any]]:
-        """The counts, (COUNT, COUNT) of pixels and (COUNT,) of weighted ones."""
+        """The counts by name: the (COUNT, COUNT) confusion matrix of pixels, and (COUNT,) weighted counts
+        of instances.
+        """
         return {
             "confusion": self.confusion,
             "tp": self.weighted_tp,
@@ -131,7 +133,7 @@ class SemanticEvaluator:
         }
 
     def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
-        """As `result`, of counts with any axes in front."""
+        """The metrics of `result`, computed from counts that may have further leading axes."""
         confusion = totals["confusion"]
         classes = self._classes(confusion)
         metrics = {
@@ -144,24 +146,24 @@ class SemanticEvaluator:
         return metrics | {f"iou_{name.replace(' ', '_')}": value for name, value in classes.items()}
 
     def _classes(self, confusion: npt.NDArray[Any]) -> dict[str, Values]:
-        """IoU by name of the classes that the mean is over, of one picture or of all."""
+        """IoU by name of the classes over which the mean is taken, for one picture or for all."""
         return _class_iou(confusion)
 
 
 class PresentClasses(SemanticEvaluator):
-    """mIoU over the evaluated classes that occur in the ground truth, train left out.
+    """mIoU over the evaluated classes that occur in the ground truth, without the class train.
 
-    The benchmark counts a class that is predicted but never there as 0; here such pixels count against the classes
-    that they belong to, and the class itself is NaN: absent.
+    Cityscapes counts the IoU of a class that is predicted but does not occur as 0. Here this class has IoU NaN and is
+    left out of the mean; its pixels still count as errors of the classes to which they belong.
     """
 
     def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
-        """`miou` and `iou_<class>`; shares, 0..1, NaN for what does not occur."""
+        """`miou` and `iou_<class>`, 0..1; NaN for classes that do not occur."""
         classes = self._classes(totals["confusion"])
         return {"miou": _mean(classes)} | {f"iou_{name.replace(' ', '_')}": iou for name, iou in classes.items()}
 
     def _classes(self, confusion: npt.NDArray[Any]) -> dict[str, Values]:
-        """NaN for what does not occur."""
+        """IoU by name of the classes over which the mean is taken; NaN for classes that do not occur."""
         occurs = confusion.sum(axis=-1) > 0
         return {
             label.name: np.where(occurs[..., label.id], iou, np.nan)
@@ -175,18 +177,19 @@ def _ids(category: str, among: Sequence[CityscapesLabel] = EVALUATED) -> list[in
 
 
 def _block(confusion: npt.NDArray[Any], rows: Sequence[int], columns: Sequence[int]) -> Values:
-    """(...,) pixels whose ground truth is one of `rows` and that are predicted as one of `columns`."""
+    """(...,) number of pixels whose ground truth is one of `rows` and whose prediction is one of `columns`."""
     return np.asarray(confusion[..., np.array(rows)[:, None], np.array(columns)].sum(axis=(-2, -1)), np.float64)
 
 
 def _false_positives(confusion: npt.NDArray[Any], ids: Sequence[int]) -> Values:
-    """Pixels predicted as one of `ids` whose ground truth is evaluated and another."""
+    """Number of pixels that are predicted as one of `ids` and whose ground truth is another, evaluated label."""
     return _block(confusion, [label.id for label in EVALUATED if label.id not in ids], ids)
 
 
 def _confusion(truth: npt.NDArray[np.uint8], prediction: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
-    """(COUNT, COUNT) pixels by label of the ground truth and of the prediction, both (N,); a piece at a time, so that
-    it stays in the cache."""
+    """(COUNT, COUNT) confusion matrix of (N,) true and predicted labels, computed piece by piece so that a piece stays
+    in the processor's cache.
+    """
     counts = np.zeros(COUNT * COUNT, dtype=np.int64)
     for start in range(0, truth.size, PIECE_PX):
         pairs = truth[start : start + PIECE_PX].astype(np.intp)
@@ -238,12 +241,12 @@ def _accuracy(confusion: npt.NDArray[Any]) -> Values:
 
 
 def _quotient(part: npt.NDArray[Any], whole: npt.NDArray[Any]) -> Values:
-    """NaN where the whole is nothing."""
+    """Quotient; NaN where the denominator is 0."""
     return np.asarray(np.divide(part, np.where(whole, whole, np.nan)), np.float64)
 
 
 def _mean(values: Mapping[str, Values]) -> Values:
-    """Over those that are known; NaN where none is."""
+    """Mean of the values that are not NaN; NaN if all are."""
     every = np.stack(list(values.values()))
     known = ~np.isnan(every)
     return _quotient(np.where(known, every, 0).sum(axis=0), known.sum(axis=0))

@@ -1,4 +1,4 @@
-"""What a detector does in one picture, where average precision has no meaning."""
+"""Metrics of a detector for a single picture, for which average precision is not defined."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Boxes:
 
     Attributes:
         box_px: (N, 4) left, top, right, bottom.
-        kind: (N,) number of the class.
-        weight: (N,) of labels: whether it is to be found; of detections: the score.
+        kind: (N,) number of each box's class.
+        weight: (N,) for labels 1 if the label is to be found, otherwise 0; for detections the score.
     """
 
     box_px: Array
@@ -31,7 +31,7 @@ class Boxes:
 
 
 def boxes(rows: Sequence[tuple[Sequence[float], int, float]]) -> Boxes:
-    """From box, class and weight."""
+    """Boxes from tuples of box, class and weight."""
     return Boxes(
         box_px=np.array([box for box, _, _ in rows], dtype=np.float64).reshape(-1, 4),
         kind=np.array([kind for _, kind, _ in rows], dtype=np.int64),
@@ -40,16 +40,17 @@ def boxes(rows: Sequence[tuple[Sequence[float], int, float]]) -> Boxes:
 
 
 def single_metrics(labels: Boxes, found: Boxes, ignored_px: Array, low_px: float = 0.0) -> dict[str, float]:
-    """`found_share` of the labels, NaN without any, and the number of `false_alarms`.
+    """`found_share`, the share of the labels that are found (NaN without labels), and the number of `false_alarms`.
 
-    Detections of at least 0.5, surest first, each take the label of their class that they overlap most, by 0.5 at
-    least. What finds nothing, or a label that is taken, is a false alarm, unless half of it lies in an ignored box.
+    Detections with a score of at least 0.5, in order of decreasing score, each take the label of their class with the
+    largest overlap, if it is at least 0.5. A detection without a label, or whose label is already taken, is a false
+    alarm, unless at least half of it lies in an ignored box.
 
     Args:
-        labels: those to be looked for.
+        labels: labels; those with weight 0 need not be found.
         found: detections.
-        ignored_px: (M, 4) boxes of what is not to be looked for.
-        low_px: what is less high and finds nothing is no false alarm.
+        ignored_px: (M, 4) boxes of regions to ignore.
+        low_px: detections that are lower than this and match nothing are no false alarms.
     """
     sure = np.flatnonzero(found.weight >= SURE)
     sure = sure[np.argsort(-found.weight[sure], kind="stable")]

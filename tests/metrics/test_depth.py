@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gear.formats.kitti_depth import MAX_PNG_DEPTH_M, to_predicted_units, to_units
-from gear.metrics.depth import CROPS, PIECE, DepthEvaluator
+from gear.metrics.depth import CROPS, PIXELS_AT_ONCE, DepthEvaluator
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def test_impossible_predictions_are_refused(bad: float) -> None:
 @pytest.mark.parametrize("crop", ["none", "garg"])
 def test_many_pieces_are_one_picture(crop: Literal["none", "garg"]) -> None:
     rng = np.random.default_rng(4)
-    truth = np.exp(rng.uniform(0, 6, (300, 3 * PIECE // 280))).astype(np.float32)
+    truth = np.exp(rng.uniform(0, 6, (300, 3 * PIXELS_AT_ONCE // 280))).astype(np.float32)
     truth[rng.random(truth.shape) < 0.2] = np.nan
     truth[:90] = np.nan
     found = np.nan_to_num(truth, nan=70.0) * rng.uniform(0.6, 1.5, truth.shape).astype(np.float32)
@@ -205,7 +205,7 @@ def test_a_scale_alone_is_no_error_of_scale_invariant_metrics() -> None:
     assert DepthEvaluator().update(Deep(truth), truth * np.float32(1.25))["silog"] < 1e-4
 
 
-@pytest.mark.parametrize("count", [PIECE, 40_001, 1000])
+@pytest.mark.parametrize("count", [PIXELS_AT_ONCE, 40_001, 1000])
 def test_no_metric_depends_on_where_memory_lies(count: int) -> None:
     """OpenCV's sums of float32 differ in the last digits with the alignment of an array."""
     rng = np.random.default_rng(3)

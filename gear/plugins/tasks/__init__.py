@@ -1,1 +1,1 @@
-"""Tasks that gear brings, one file each."""
+"""Built-in tasks, one file each."""

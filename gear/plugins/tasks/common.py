@@ -1,4 +1,4 @@
-"""What gear's own tasks share: camera options, checks and drawing."""
+"""Shared parts of the built-in tasks: camera options, checks and drawing."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from gear.values.scene import SceneRecord, Vec3
 from gear.values.serial import Json
 
 REPAIR = "`gear verify DIR --repair` makes it again"
-"""What to do about a file that is gone or damaged."""
+"""Advice in errors about files that are missing or damaged."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,14 +37,14 @@ class CameraOptions:
         width_px, height_px: size of the picture.
         hfov_deg: horizontal field of view, 1 to 170; not used where `focal_px` is given.
         position_m: in the ego frame: x forward, y left, z up, the origin on the ground.
-        pitch_deg: turned downwards, -90 to 90.
-        roll_deg: turned clockwise as seen from behind the camera, -180 to 180.
-        follows_road: False keeps the camera level, as the original's loaders demand; True takes the car's pitch and
-            roll.
+        pitch_deg: downward rotation, -90 to 90.
+        roll_deg: clockwise rotation as seen from behind the camera, -180 to 180.
+        follows_road: False keeps the camera level, as the loaders of CARLA-GeAR require; True gives it the car's pitch
+            and roll.
         focal_px: horizontal focal length, instead of `hfov_deg`.
-        focal_y_px: vertical focal length; without it the same as the horizontal one.
-        principal_px: principal point (column, row), the centre of the first pixel is (0, 0); without it the middle of
-            the picture.
+        focal_y_px: vertical focal length; the same as the horizontal one by default.
+        principal_px: principal point (column, row), where the centre of the first pixel is (0, 0); the middle of the
+            picture by default.
     """
 
     width_px: int
@@ -70,11 +70,11 @@ class CameraOptions:
 
     @property
     def is_level(self) -> bool:
-        """Whether the camera's vertical axis is the world's in every sample."""
+        """Whether the camera's vertical axis is vertical in the world in every sample."""
         return self.pitch_deg == 0 and self.roll_deg == 0 and not self.follows_road
 
     def mount(self, name: str, right_m: float = 0.0) -> CameraMount:
-        """The camera under a name, moved along its own horizontal axis by so many metres to the right."""
+        """The mount of a named camera, moved to the right along its own horizontal axis by a number of metres."""
         return CameraMount(
             name=name,
             width_px=self.width_px,
@@ -89,7 +89,7 @@ class CameraOptions:
         )
 
     def _moved_right(self, right_m: float) -> Vec3:
-        """The position, moved along the picture's horizontal axis: pitch leaves that level, roll turns it."""
+        """The position after a move along the picture's horizontal axis, which roll tilts and pitch does not."""
         x, y, z = self.position_m
         pitch_rad, roll_rad = math.radians(self.pitch_deg), math.radians(self.roll_deg)
         down_m = right_m * math.sin(roll_rad)
@@ -98,22 +98,22 @@ class CameraOptions:
 
 
 def surfaces_of(frame: Frame, record: SceneRecord) -> tuple[SurfaceTruth, ...]:
-    """Every surface in every view, view by view in the record's order of cameras."""
+    """Measures every surface in every view, view by view in the record's order of cameras."""
     return tuple(
         truth for camera in record.cameras for truth in observe_surfaces(frame.views[camera.name], frame.geoms, record)
     )
 
 
 def images_of(frame: Frame) -> dict[str, UInt8Image]:
-    """The pictures of every view."""
+    """The pictures of all views, by camera name."""
     return {name: view.rgb for name, view in frame.views.items()}
 
 
 def read_rgb(root: Path, relative: str, record: SceneRecord | None = None, view: str = "") -> UInt8Image:
-    """A colour picture of a dataset: of one view of a record, where that is named, and of its size then.
+    """Reads a colour picture of a dataset; if a view of a record is named, the picture must have its size.
 
     Raises:
-        DatasetError: it is not there, outside of the dataset, damaged, or of another size than the view.
+        DatasetError: the file is missing, outside of the dataset, damaged, or of another size than the view.
     """
     picture = _read(root, relative, decode_rgb)
     if record is not None:
@@ -124,10 +124,10 @@ def read_rgb(root: Path, relative: str, record: SceneRecord | None = None, view:
 def read_map(
     root: Path, relative: str, record: SceneRecord, view: str, dtype: npt.DTypeLike, most: int | None = None
 ) -> npt.NDArray[Any]:
-    """A label or depth picture of a dataset, of one view of a record; `most` is its largest value.
+    """Reads a label or depth picture of one view of a record; `most` is the largest value that it may hold.
 
     Raises:
-        DatasetError: it is not there, damaged, or of another size than the view, another kind or larger values.
+        DatasetError: the file is missing or damaged, or has another size than the view, another dtype or larger values.
     """
     values = read_plain(root, relative)
     _check_size(root / relative, values, record, view)
@@ -138,10 +138,10 @@ def read_map(
 
 
 def read_plain(root: Path, relative: str) -> npt.NDArray[Any]:
-    """A label or depth picture of whatever size.
+    """Reads a label or depth picture of any size.
 
     Raises:
-        DatasetError: it is not there, outside of the dataset, or damaged.
+        DatasetError: the file is missing, outside of the dataset, or damaged.
     """
     return _read(root, relative, decode_plain)
 
@@ -170,25 +170,25 @@ IGNORED_COLOUR = (170, 170, 170)
 
 
 def draw_surfaces(picture: UInt8Image, sample: Sample, camera: str) -> None:
-    """Outlines every surface of a view in magenta, in place."""
+    """Draws the outlines of a view's surfaces in magenta, in place."""
     for truth in sample.surfaces:
         if truth.camera == camera and truth.corners_px is not None:
             draw_polygon(picture, truth.corners_px, (255, 0, 255))
 
 
 def draw_polygon(picture: UInt8Image, points_px: Sequence[Sequence[float]], rgb: tuple[int, int, int]) -> None:
-    """A closed line through index pixels, in place."""
+    """Draws a closed line through points in index pixels, in place."""
     draw_segments(picture, list(zip(points_px, [*points_px[1:], points_px[0]], strict=True)), rgb)
 
 
 FAR_PX = 4 * 8192
-"""Largest distance of a drawn point from the picture in pixels: OpenCV computes with 32 bits."""
+"""Largest distance of a drawn point from the picture in pixels, because OpenCV computes with 32 bits."""
 
 
 def draw_segments(
     picture: UInt8Image, segments_px: Iterable[tuple[Sequence[float], Sequence[float]]], rgb: tuple[int, int, int]
 ) -> None:
-    """Straight lines between index pixels, in place; ends far outside are fine."""
+    """Draws straight lines between points in index pixels, in place; their ends may be far outside the picture."""
     for ends in segments_px:
         (x0, y0), (x1, y1) = (np.round(np.clip(end, -FAR_PX, FAR_PX) * 16).astype(int).tolist() for end in ends)
         cv2.line(picture, (x0, y0), (x1, y1), rgb, 1, cv2.LINE_AA, 4)
@@ -197,7 +197,7 @@ def draw_segments(
 def draw_box(
     picture: UInt8Image, box: Sequence[float], rgb: tuple[int, int, int], text: str = "", *, dashed: bool = False
 ) -> None:
-    """A box in index pixels with a word on it, in place; dashed for what is to be ignored; far outside is fine."""
+    """Draws a box in index pixels with a text, in place; dashed for ignored objects. The box may exceed the picture."""
     left, top, right, bottom = (round(min(max(float(v), -FAR_PX), FAR_PX)) for v in box)
     if dashed:
         for x in range(left, right, 8):
@@ -216,10 +216,10 @@ def draw_box(
 
 
 def expect(facts: Any, *keys: str, place: Path) -> Mapping[str, Any]:
-    """The facts of a sidecar, checked for the keys that a task needs.
+    """Returns the facts of a sidecar after checking that they have the keys that a task needs.
 
     Raises:
-        DatasetError: something is missing: the sidecar is another task's, or damaged.
+        DatasetError: a key is missing, because the sidecar is that of another task or damaged.
     """
     missing = [key for key in keys if not isinstance(facts, dict) or key not in facts]
     if missing:
@@ -228,14 +228,15 @@ def expect(facts: Any, *keys: str, place: Path) -> Mapping[str, Any]:
 
 
 def check_objects(content: Json, boxes_px: Iterable[BoxPx]) -> None:
-    """Whether the objects that a sidecar's facts speak of can be true, as far as tasks have that in common.
+    """Checks that the objects in the facts of a sidecar are plausible; for properties that all tasks share.
 
     Args:
-        content: them, as they are written.
-        boxes_px: of each, in the picture.
+        content: the objects as they are stored.
+        boxes_px: box of each object in the picture.
 
     Raises:
-        FieldError: a number is absurd, or a box ends before it begins; says where.
+        FieldError: a number is out of range, or a box's right is left of its left or bottom above its top; the error
+            names the object.
     """
     check_numbers(content, "objects")
     for place, (left, top, right, bottom) in enumerate(boxes_px):

@@ -1,4 +1,4 @@
-"""Monocular depth: KITTI's 16-bit pictures and exact metres, in the original's tree."""
+"""Monocular depth: KITTI's 16-bit pictures and exact depth files, in the folders of CARLA-GeAR."""
 
 from __future__ import annotations
 
@@ -49,12 +49,13 @@ class DepthConfig(CameraOptions):
     """Options of monocular depth.
 
     Pictures have the size that loaders of KITTI depth crop them to, 1216 x 352. CARLA-GeAR's loader keeps the lowest
-    352 rows and takes their middle for the camera's axis, so it places patches right in pictures of this size alone.
+    352 rows and assumes the camera's axis in their middle, so that it places patches correctly only in pictures of this
+    size.
 
     Attributes:
-        max_depth_m: what lies farther has no ground truth.
-        eval_max_depth_m: what lies farther is not evaluated by the `eigen_` metrics; 80 m is customary.
-        eval_crop: part of the picture that the `eigen_` metrics look at.
+        max_depth_m: pixels that are farther have no ground truth.
+        eval_max_depth_m: pixels that are farther are not evaluated by the `eigen_` metrics; 80 m is customary.
+        eval_crop: part of the picture that the `eigen_` metrics evaluate.
     """
 
     width_px: int = 1216
@@ -72,7 +73,7 @@ class DepthConfig(CameraOptions):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class DepthSample(Sample):
-    """A picture with its depth.
+    """A picture with its depth map.
 
     Attributes:
         depth_m: (H, W) float32, planar z, NaN where there is no ground truth.
@@ -82,23 +83,23 @@ class DepthSample(Sample):
 
 
 def _paths(split: str, index: int) -> tuple[str, str, str]:
-    """Picture, 16-bit depth, depth in metres."""
+    """Paths of the picture, the 16-bit depth and the depth in metres."""
     name = f"{split}/rgb_{index:04d}"
     return f"leftImg8bit/{name}.png", f"gtFine/{name}.png", f"gtFine/{name}.tiff"
 
 
 class DepthTask:
-    """`leftImg8bit`, `gtFine`, `filenames`."""
+    """The task of monocular depth; it writes `leftImg8bit`, `gtFine` and `filenames`."""
 
     def __init__(self, config: DepthConfig) -> None:
         self.config = config
 
     def rig(self) -> Rig:
-        """One camera."""
+        """A rig of one camera."""
         return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> DepthSample:
-        """The depth buffer, up to the range."""
+        """Takes the depth buffer up to `max_depth_m`."""
         depth_m = frame.views[VIEW].depth_m
         known = (depth_m > 0) & (depth_m <= self.config.max_depth_m)
         return DepthSample(
@@ -109,7 +110,7 @@ class DepthTask:
         )
 
     def encode(self, sample: DepthSample, info: SplitInfo) -> Encoded:
-        """Picture and both depth files."""
+        """Encodes the picture and both depth files."""
         image, units, metres = _paths(info.split, sample.record.index)
         known = np.isfinite(sample.depth_m)
         files = {
@@ -120,7 +121,7 @@ class DepthTask:
         return Encoded(files=files, facts={"known_px": int(known.sum())})
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """Both lists and the original's poses."""
+        """Writes the file lists and the poses for CARLA-GeAR's loader."""
         paths = [_paths(info.split, sidecar.record.index) for sidecar in sidecars]
         records = [sidecar.record for sidecar in sidecars]
         poses = billboard_info(records, task="depth", patch_label=info.patch_label, reference=VIEW)
@@ -144,23 +145,23 @@ class DepthTask:
         )
 
     def as_prediction(self, sample: DepthSample) -> FloatImage:
-        """(H, W) float32 metres; what is unknown is said to be at the range."""
+        """(H, W) float32 metres; pixels without ground truth get `max_depth_m`."""
         return np.where(np.isfinite(sample.depth_m), sample.depth_m, np.float32(self.config.max_depth_m))
 
     def evaluator(self) -> Evaluator[DepthSample, FloatImage]:
-        """The devkit's metrics and Eigen's."""
+        """An evaluator with the metrics of KITTI's devkit and of Eigen et al."""
         return DepthEvaluator(max_depth_m=self.config.eval_max_depth_m, crop=self.config.eval_crop)
 
     def reports(self) -> Mapping[str, Evaluator[DepthSample, FloatImage]]:
-        """`reference`: whole pictures below 80 m; the sky has no ground truth."""
+        """One report, `reference`: whole pictures, ground truth below 80 m, without the sky."""
         return {"reference": NearDepth()}
 
     def without(self, sample: DepthSample, masks: Masks) -> DepthSample:
-        """No ground truth inside the mask."""
+        """The sample without ground truth inside the mask."""
         return replace(sample, depth_m=np.where(masks[VIEW], np.float32(np.nan), sample.depth_m))
 
     def encode_prediction(self, sample: DepthSample, prediction: FloatImage, info: SplitInfo) -> Encoded:
-        """The devkit's 16-bit picture, which says 256 m of all that lies beyond, and every bit of it in metres."""
+        """Encodes the devkit's 16-bit picture, in which depth is clipped to 256 m, and a lossless file in metres."""
         units, metres = results.kitti_depth_paths(sample.record.index)
         depth_m = np.asarray(prediction, dtype=np.float32)
         return Encoded(
@@ -168,15 +169,15 @@ class DepthTask:
         )
 
     def decode_prediction(self, root: Path, sample: DepthSample, facts: Json, info: SplitInfo) -> FloatImage:
-        """Reads the metres."""
+        """Reads the lossless file in metres."""
         return read_plain(root, results.kitti_depth_paths(sample.record.index)[1])
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """The pictures are all there is."""
+        """No files: the pictures are complete results."""
         return {}
 
     def preview(self, sample: DepthSample) -> Mapping[str, UInt8Image]:
-        """The picture, and inverse depth in colours, nearest red, nothing black."""
+        """The picture, and inverse depth in colours: red is nearest, black has no depth."""
         picture = sample.images[VIEW].copy()
         draw_surfaces(picture, sample, VIEW)
         colours = depth_colours(sample.depth_m)
@@ -216,11 +217,11 @@ def _nearness(depth_m: npt.NDArray[np.floating[Any]] | np.float64) -> Any:
 
 
 WHITE_FROM_M = 80.0
-"""Depth that CutDepth paints white."""
+"""Depth in metres at which the grey of CutDepth reaches white."""
 
 
 def flip(sample: DepthSample) -> DepthSample:
-    """The sample mirrored, left to right."""
+    """Mirrors a sample, left to right."""
     return replace(
         sample,
         images={name: flip_array(picture) for name, picture in sample.images.items()},
@@ -230,17 +231,19 @@ def flip(sample: DepthSample) -> DepthSample:
 
 
 def cut(sample: DepthSample, window: Window) -> DepthSample:
-    """The part of the sample that a window shows; depth is unknown beyond the picture.
+    """Crops a sample to a window; depth is unknown beyond the picture.
 
-    Depth is divided by the window's scale: for a camera of the same focal length an object that looks `s` times as
-    large is `s` times as near.
+    Depth is divided by the window's scale: with the same focal length, an object that appears `s` times as large is at
+    1/s of the distance.
     """
     small = shrink(sample, window)
     return replace(small, depth_m=(small.depth_m / np.float32(window.scale)).astype(np.float32))
 
 
 def shrink(sample: DepthSample, window: Window) -> DepthSample:
-    """The part of the sample that a window shows, at its own depth: the same lens with fewer pixels."""
+    """Resizes a sample to a window without changing its depth, as a camera with the same field of view and fewer
+    pixels.
+    """
     return replace(
         sample,
         images={name: cut_picture(picture, window) for name, picture in sample.images.items()},
@@ -250,7 +253,7 @@ def shrink(sample: DepthSample, window: Window) -> DepthSample:
 
 
 def cut_depth(sample: DepthSample, rng: np.random.Generator) -> DepthSample:
-    """Vertical CutDepth: a band of columns of the picture is replaced by its true depth, as grey.
+    """Vertical CutDepth: replaces a band of columns of the picture by its true depth as grey values.
 
     Kim et al., "Global-Local Path Networks for Monocular Depth Estimation with Vertical CutDepth", 2022, section 3.3:
     the band reaches from top to bottom, because depth changes most along columns. It takes at most three quarters of

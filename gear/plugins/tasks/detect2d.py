@@ -81,21 +81,21 @@ class Detect2dConfig(CameraOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Object2d:
-    """One labelled part of one object; a cyclist is a bicycle and a person.
+    """One labelled part of an object; a cyclist has two, a bicycle and a person.
 
     Attributes:
-        object_id: the same in every sample of a sequence.
+        object_id: id of the object, the same in every sample of a sequence.
         label: gear's name of the part's label.
-        category_id: COCO's.
-        is_ignored: seen too little of to be looked for.
+        category_id: COCO's category id.
+        is_ignored: whether too little of it is visible for it to be labelled.
         box_px: tight box of the visible pixels, edge pixels. Stray pixels are left out
             (`gear.groundtruth.stray_pixels`), here and in the area and the mask.
         amodal_box_px: tight box of the whole silhouette; may exceed the picture.
-        area_px: pixels of the mask.
+        area_px: number of pixels of the mask.
         rle: run lengths of the mask for the whole picture.
-        visible_fraction, occluded_fraction, truncated_fraction: of the silhouette: seen; covered, of what lies in the
-            picture; outside the picture.
-        distance_m: camera to the middle of the object's box.
+        visible_fraction, occluded_fraction, truncated_fraction: visible share of the silhouette; covered share of its
+            part in the picture; share outside the picture.
+        distance_m: distance from the camera to the middle of the object's 3D box.
     """
 
     object_id: int
@@ -114,10 +114,10 @@ class Object2d:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Detect2dSample(Sample):
-    """A picture with its objects.
+    """A picture with its labelled and ignored objects.
 
     Attributes:
-        objects: labelled and ignored ones.
+        objects: labelled and ignored objects.
         ignored_px: boxes, in edge pixels, in which detections that find no object count neither way; datasets have
             none (`Detect2dTask.without`).
     """
@@ -127,17 +127,17 @@ class Detect2dSample(Sample):
 
 
 class Detect2dTask:
-    """`images/<split>`, `annotations`."""
+    """The task of 2D object detection; it writes `images/<split>` and `annotations`."""
 
     def __init__(self, config: Detect2dConfig) -> None:
         self.config = config
 
     def rig(self) -> Rig:
-        """One camera."""
+        """A rig of one camera."""
         return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> Detect2dSample:
-        """Measures every object that COCO has a category for."""
+        """Measures every object for which COCO has a category."""
         view, limits = frame.views[VIEW], self.config.visibility.limits()
         height, width = view.geom_id.shape
         found = []
@@ -170,12 +170,12 @@ class Detect2dTask:
         )
 
     def encode(self, sample: Detect2dSample, info: SplitInfo) -> Encoded:
-        """The picture; its annotations wait in the sidecar for the split's one file."""
+        """Encodes the picture; its annotations are kept in the sidecar until `finalise` writes the annotation file."""
         files = {f"images/{info.split}/{_name(sample.record.index)}": encode_rgb(sample.images[VIEW])}
         return Encoded(files=files, facts={"objects": to_json(sample.objects)})
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """The annotation file under both of its usual names, and the original's poses."""
+        """Writes the annotation file under both of its usual names, and the poses for CARLA-GeAR's loader."""
         pictures = [self._picture(sidecar) for sidecar in sidecars]
         description = f"gear {info.town} {info.scene} {info.split}, patch: {info.patch_label}"
         annotations = dump(coco.dataset_json(pictures, description=description, created=info.created))
@@ -188,7 +188,7 @@ class Detect2dTask:
         }
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Detect2dSample:
-        """Reads the picture; the objects are in the sidecar."""
+        """Reads the picture from its file and the objects from the sidecar."""
         record = sidecar.record
         return Detect2dSample(
             record=record,
@@ -198,7 +198,7 @@ class Detect2dTask:
         )
 
     def as_prediction(self, sample: Detect2dSample) -> tuple[coco.Detection, ...]:
-        """Every labelled box, quite sure."""
+        """Every labelled box, with a score near 1."""
         return tuple(
             coco.Detection(category_id=thing.category_id, box_px=thing.box_px, score=1.0)
             for thing in sample.objects
@@ -206,7 +206,7 @@ class Detect2dTask:
         )
 
     def evaluator(self) -> Evaluator[Detect2dSample, tuple[coco.Detection, ...]]:
-        """COCO's average precision."""
+        """An evaluator of COCO's average precision."""
         return CocoEvaluator(self._as_shown)
 
     def reports(self) -> Mapping[str, Evaluator[Detect2dSample, tuple[coco.Detection, ...]]]:
@@ -230,7 +230,7 @@ class Detect2dTask:
     def encode_prediction(
         self, sample: Detect2dSample, prediction: Sequence[coco.Detection], info: SplitInfo
     ) -> Encoded:
-        """The detections wait in the facts for the split's one file."""
+        """No files: the detections are kept in the facts until `finalise_predictions` writes the results file."""
         plain = [
             coco.Detection(
                 category_id=int(one.category_id),
@@ -244,11 +244,11 @@ class Detect2dTask:
     def decode_prediction(
         self, root: Path, sample: Detect2dSample, facts: Json, info: SplitInfo
     ) -> tuple[coco.Detection, ...]:
-        """They are in the facts."""
+        """Takes the detections from the facts."""
         return from_json(tuple[coco.Detection, ...], facts["detections"], "detections")
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """COCO's results file."""
+        """Writes COCO's results file."""
         lines = [
             line
             for record, one in facts
@@ -259,7 +259,7 @@ class Detect2dTask:
         return {results.coco_path(info.split): dump(lines)}
 
     def preview(self, sample: Detect2dSample) -> Mapping[str, UInt8Image]:
-        """Masks and boxes over the picture; ignored objects dashed in grey, without a word."""
+        """Draws masks and boxes over the picture; ignored objects are dashed, grey and have no text."""
         picture = sample.images[VIEW].copy()
         height, width = picture.shape[:2]
         for thing in sample.objects:
@@ -286,7 +286,7 @@ class Detect2dTask:
         return replace(picture, annotations=tuple(_with_polygons(one, picture) for one in picture.annotations))
 
     def _as_shown(self, sample: Detect2dSample) -> coco.Picture:
-        """At the size of the sample's own picture, which may be smaller than the one that was rendered."""
+        """Resizes an object to the size of the sample's picture, which may be smaller than the rendered one."""
         height, width = sample.images[VIEW].shape[:2]
         picture = self._as_picture(sample.record, sample.objects)
         return replace(picture, height_px=height, width_px=width, ignored_px=sample.ignored_px)
@@ -303,7 +303,7 @@ class Detect2dTask:
 
 
 def _image_id(record: SceneRecord) -> int:
-    """COCO's, from 1: some readers take 0 for "none"."""
+    """COCO's picture id, from 1, because some readers take 0 for "none"."""
     return record.index + 1
 
 
@@ -386,7 +386,7 @@ LEAST_SIDE_PX = 4.0
 
 
 def flip(sample: Detect2dSample) -> Detect2dSample:
-    """The sample mirrored, left to right."""
+    """Mirrors a sample, left to right."""
     height, width = sample.images[VIEW].shape[:2]
     return replace(
         sample,
@@ -409,11 +409,10 @@ def _flipped(thing: Object2d, height: int, width: int) -> Object2d:
 
 
 def cut(sample: Detect2dSample, window: Window) -> Detect2dSample:
-    """The part of the sample that a window shows. Objects outside are left out; objects with a small part inside are
-    ignored.
+    """Crops a sample to a window. Objects outside are left out; objects with a small part inside are ignored.
 
-    Masks are cut and boxes are measured on them again. The share of a silhouette outside the window is estimated by its
-    box, because silhouettes are not stored. Distances remain those of the scene.
+    Masks are cropped and boxes are measured again on them. The share of a silhouette outside the window is estimated by
+    its box, because silhouettes are not stored. Distances do not change.
     """
     height, width = sample.images[VIEW].shape[:2]
     moved = (_cut(thing, window, height, width) for thing in sample.objects)
@@ -458,7 +457,7 @@ def _cut(thing: Object2d, window: Window, height: int, width: int) -> Object2d |
 
 
 def _inside(box_px: BoxPx, height: int, width: int) -> BoxPx:
-    """The part of a box in edge pixels that lies in a picture."""
+    """Clips a box in edge pixels to a picture."""
     return clipped(box_px, (0.0, 0.0, float(width), float(height)))
 
 

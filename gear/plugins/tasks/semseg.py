@@ -47,12 +47,12 @@ VIEW = "left"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LabelOptions:
-    """How fine the labels are.
+    """Option for the granularity of labels.
 
     Attributes:
-        granularity: `fine` is what each pixel shows. `coarse` is what a person with a polygon tool would draw: each
-            pixel takes the label that fills most of a square around it, so that thin poles, wires, single leaves and
-            the sky between twigs go to what surrounds them.
+        granularity: `fine` labels each pixel by what it shows. `coarse` imitates an annotator with a polygon tool: each
+            pixel takes the most frequent label in a square around it, so that thin poles, wires, single leaves and the
+            sky between twigs take the label of their surroundings.
         coarse_window_px: side of that square, odd; things thinner than about half of it vanish.
     """
 
@@ -69,7 +69,7 @@ class SemsegConfig(CameraOptions):
     """Options of semantic segmentation.
 
     Attributes:
-        labels: how fine the labels are.
+        labels: granularity of the labels.
         polygons: whether to write polygon files too (about two fifths of the task's own time).
     """
 
@@ -81,7 +81,7 @@ class SemsegConfig(CameraOptions):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SemsegSample(Sample):
-    """A picture with its labels.
+    """A picture with its label map and instance map.
 
     Attributes:
         label_ids: (H, W) uint8, Cityscapes ids 0..33.
@@ -93,17 +93,17 @@ class SemsegSample(Sample):
 
 
 class SemsegTask:
-    """Cityscapes: `leftImg8bit`, `gtFine`, `camera`."""
+    """The task of semantic segmentation; it writes Cityscapes' `leftImg8bit`, `gtFine` and `camera`."""
 
     def __init__(self, config: SemsegConfig) -> None:
         self.config = config
 
     def rig(self) -> Rig:
-        """One camera."""
+        """A rig of one camera."""
         return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> SemsegSample:
-        """Reads labels off the id buffer."""
+        """Computes labels and instances from the id buffer."""
         instances = instance_map(frame.views[VIEW].geom_id, frame.geoms, frame.objects)
         if self.config.labels.granularity == "coarse":
             instances = coarsen(instances, self.config.labels.coarse_window_px)
@@ -116,7 +116,7 @@ class SemsegTask:
         )
 
     def encode(self, sample: SemsegSample, info: SplitInfo) -> Encoded:
-        """Picture, labels, instances, colours, polygons, camera."""
+        """Encodes picture, labels, instances, colours, polygons and camera."""
         record = sample.record
         paths = cityscapes.paths(info.town, info.split, record.sequence, record.frame)
         world_from_vehicle = record.ego.world_from_actor.transform("world", "ego")
@@ -135,7 +135,7 @@ class SemsegTask:
         return Encoded(files=files, facts={"label_px": present})
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """The original's list of poses."""
+        """Writes the poses for CARLA-GeAR's loader."""
         records = [sidecar.record for sidecar in sidecars]
         poses = billboard_info(records, task="ss", patch_label=info.patch_label, reference=VIEW)
         return {f"gtFine/{info.split}/camera_billboard_info.json": dump(poses)}
@@ -153,19 +153,19 @@ class SemsegTask:
         )
 
     def as_prediction(self, sample: SemsegSample) -> npt.NDArray[np.uint8]:
-        """(H, W) uint8 label ids."""
+        """The ground truth's (H, W) uint8 label ids."""
         return sample.label_ids
 
     def evaluator(self) -> Evaluator[SemsegSample, npt.NDArray[np.uint8]]:
-        """mIoU and iIoU."""
+        """An evaluator of mIoU and iIoU."""
         return SemanticEvaluator()
 
     def reports(self) -> Mapping[str, Evaluator[SemsegSample, npt.NDArray[np.uint8]]]:
-        """`reference`: mIoU over the classes that occur, without train."""
+        """One report, `reference`: mIoU over the classes that occur, without the class train."""
         return {"reference": PresentClasses()}
 
     def without(self, sample: SemsegSample, masks: Masks) -> SemsegSample:
-        """Unlabelled inside the mask, which no metric counts."""
+        """The sample with pixels inside the mask unlabelled, so that no metric counts them."""
         silent = masks[VIEW]
         return replace(
             sample,
@@ -174,22 +174,22 @@ class SemsegTask:
         )
 
     def encode_prediction(self, sample: SemsegSample, prediction: npt.NDArray[np.uint8], info: SplitInfo) -> Encoded:
-        """A picture of label ids, as the benchmark's script wants it."""
+        """Encodes a picture of label ids, as Cityscapes' evaluation script reads it."""
         path = results.cityscapes_path(info.town, sample.record.sequence, sample.record.frame)
         return Encoded(files={path: encode_label_map(prediction.astype(np.uint8))}, facts={})
 
     def decode_prediction(
         self, root: Path, sample: SemsegSample, facts: Json, info: SplitInfo
     ) -> npt.NDArray[np.uint8]:
-        """Reads the picture."""
+        """Reads the picture of label ids."""
         return read_plain(root, results.cityscapes_path(info.town, sample.record.sequence, sample.record.frame))
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """The pictures are all there is."""
+        """No files: the pictures are complete results."""
         return {}
 
     def preview(self, sample: SemsegSample) -> Mapping[str, UInt8Image]:
-        """The labels' colours over the picture, borders between instances in white."""
+        """Draws the labels' colours over the picture, with borders between instances in white."""
         colours = cityscapes.colour_map(sample.label_ids)[..., :3]
         picture = cv2.addWeighted(sample.images[VIEW], 0.45, np.ascontiguousarray(colours), 0.55, 0.0)
         instances = sample.instance_ids
@@ -212,7 +212,7 @@ UNLABELLED = 0
 
 
 def flip(sample: SemsegSample) -> SemsegSample:
-    """The sample mirrored, left to right."""
+    """Mirrors a sample, left to right."""
     return replace(
         sample,
         images={name: flip_array(picture) for name, picture in sample.images.items()},
@@ -223,7 +223,7 @@ def flip(sample: SemsegSample) -> SemsegSample:
 
 
 def cut(sample: SemsegSample, window: Window) -> SemsegSample:
-    """The part of the sample that a window shows; each label is that of the nearest pixel."""
+    """Crops a sample to a window; labels are resized by nearest neighbour."""
     return replace(
         sample,
         images={name: cut_picture(picture, window) for name, picture in sample.images.items()},

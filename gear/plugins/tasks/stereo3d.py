@@ -74,7 +74,7 @@ class Stereo3dConfig(CameraOptions):
     """Options of stereo 3D detection.
 
     Attributes:
-        baseline_m: left camera to right camera.
+        baseline_m: distance from the left to the right camera.
         visibility: what an object must show to be labelled; an object that shows less is a `DontCare` region.
     """
 
@@ -92,20 +92,20 @@ class Stereo3dConfig(CameraOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Object3d:
-    """One labelled object, seen by the left camera.
+    """One labelled object, measured in the left view.
 
     Attributes:
-        object_id: the same in every sample of a sequence.
-        kitti_type: KITTI's type of the whole; a cyclist is one object.
+        object_id: id of the object, the same in every sample of a sequence.
+        kitti_type: KITTI's type of the whole object; a cyclist with bicycle is one object.
         is_ignored: whether it is a `DontCare` region, because too little of it is visible.
-        box: in the frame of the left camera.
+        box: 3D box in the frame of the left camera.
         box_px: tight box of the silhouette inside the picture, hidden parts included; index pixels.
         amodal_box_px: tight box of the whole silhouette, which may exceed the picture; index pixels.
         truncated: share of the silhouette outside the picture, 0..1.
         occluded: how much of the silhouette in the picture is visible: 0 for at least 80 %, 1 for at least 50 %, 2 for
             at least 10 %, 3 for less.
-        visible_px: pixels in the id buffer.
-        occluded_fraction: covered share of the silhouette in the picture.
+        visible_px: number of pixels in the id buffer.
+        occluded_fraction: covered share of the silhouette's part in the picture.
     """
 
     object_id: int
@@ -120,7 +120,7 @@ class Object3d:
     occluded_fraction: float
 
     def label(self) -> KittiLabel:
-        """Its line in the label file."""
+        """The object's line in the label file."""
         if self.is_ignored:
             return dont_care(self.box_px)
         return KittiLabel(
@@ -142,8 +142,8 @@ class Stereo3dSample(Sample):
     """A rectified pair with its objects.
 
     Attributes:
-        calibration: of the pair; the left camera is the reference frame.
-        objects: labelled and ignored ones.
+        calibration: calibration of the pair; the left camera is the reference frame.
+        objects: labelled and ignored objects.
         ignored_px: boxes in the left picture, in index pixels, in which detections that find no object count neither
             way; datasets have none (`Stereo3dTask.without`).
     """
@@ -154,18 +154,20 @@ class Stereo3dSample(Sample):
 
 
 class Stereo3dTask:
-    """`<split>/{image_2,image_3,calib,label_2}`, `splits`, `ImageSets`."""
+    """The task of stereo 3D detection; it writes `<split>/{image_2,image_3,calib,label_2}`, `splits` and
+    `ImageSets`.
+    """
 
     def __init__(self, config: Stereo3dConfig) -> None:
         self.config = config
 
     def rig(self) -> Rig:
-        """Two parallel cameras."""
+        """A rig of two parallel cameras."""
         cameras = (self.config.mount(LEFT), self.config.mount(RIGHT, right_m=self.config.baseline_m))
         return Rig(cameras=cameras, follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> Stereo3dSample:
-        """Measures every object that KITTI has a type for, in the left view."""
+        """Measures every object for which KITTI has a type, in the left view."""
         view, limits = frame.views[LEFT], self.config.visibility.limits()
         found = []
         for truth in observe_objects(view, frame.geoms, frame.objects, by_label=False):
@@ -184,7 +186,7 @@ class Stereo3dTask:
         return Calibration(intrinsics=record.camera(LEFT).intrinsics, baseline_m=self.config.baseline_m)
 
     def encode(self, sample: Stereo3dSample, info: SplitInfo) -> Encoded:
-        """Both pictures, calibration and labels."""
+        """Encodes both pictures, the calibration and the labels."""
         name = _name(sample.record.index)
         files = {
             f"{info.split}/image_2/{name}.png": encode_rgb(sample.images[LEFT]),
@@ -196,14 +198,14 @@ class Stereo3dTask:
         return Encoded(files=files, facts=facts)
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """The lists of ids and the original's poses."""
+        """Writes the lists of ids, and the poses for CARLA-GeAR's loader."""
         records = [sidecar.record for sidecar in sidecars]
         poses = billboard_info(records, task="3dod", patch_label=info.patch_label, reference=LEFT, second=RIGHT)
         lists = split_lists(info.split, [_name(record.index) for record in records])
         return {**lists, f"{info.split}/label_2/camera_billboard_info.json": dump(poses)}
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Stereo3dSample:
-        """Reads both pictures; the objects, unrounded, are in the sidecar."""
+        """Reads both pictures from their files, and the objects, which are not rounded, from the sidecar."""
         record, name = sidecar.record, _name(sidecar.record.index)
         facts = expect(sidecar.facts, "baseline_m", "objects", place=root)
         baseline_m = from_json(float, facts["baseline_m"], "baseline_m")
@@ -223,11 +225,11 @@ class Stereo3dTask:
         )
 
     def as_prediction(self, sample: Stereo3dSample) -> tuple[KittiLabel, ...]:
-        """Every labelled object, quite sure."""
+        """Every labelled object, with a score near 1."""
         return tuple(replace(thing.label(), score=1.0) for thing in sample.objects if not thing.is_ignored)
 
     def evaluator(self) -> Evaluator[Stereo3dSample, tuple[KittiLabel, ...]]:
-        """KITTI's average precisions."""
+        """An evaluator of KITTI's average precisions."""
         return KittiEvaluator(_lines, _ignored)
 
     def reports(self) -> Mapping[str, Evaluator[Stereo3dSample, tuple[KittiLabel, ...]]]:
@@ -252,7 +254,7 @@ class Stereo3dTask:
         return replace(sample, objects=tuple(objects), ignored_px=(*sample.ignored_px, *boxes))
 
     def encode_prediction(self, sample: Stereo3dSample, prediction: Sequence[KittiLabel], info: SplitInfo) -> Encoded:
-        """A result file."""
+        """Encodes a result file."""
         lines = results.kitti_result_lines(prediction)
         return Encoded(files={results.kitti_object_path(sample.record.index): lines}, facts={})
 
@@ -263,11 +265,11 @@ class Stereo3dTask:
         return parse_labels(read_bytes(root / results.kitti_object_path(sample.record.index)).decode())
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """The result files are all there is."""
+        """No files: the result files of the samples are complete."""
         return {}
 
     def preview(self, sample: Stereo3dSample) -> Mapping[str, UInt8Image]:
-        """3D boxes on the left picture, ignored regions dashed in grey, and the right picture."""
+        """The left picture with 3D boxes and with ignored regions dashed in grey, and the right picture."""
         left = sample.images[LEFT].copy()
         for thing in sample.objects:
             if thing.is_ignored:
@@ -295,13 +297,13 @@ class Stereo3dTask:
 WIRES = tuple((i, (i + 1) % 4) for i in range(4)) + tuple((i + 4, (i + 1) % 4 + 4) for i in range(4)) + tuple(
     (i, i + 4) for i in range(4)
 )  # fmt: skip
-"""Edges of a box in the order of `label_corners`; its front is the face of corners 0, 1, 4, 5."""
+"""Edges of a box as pairs of corner numbers of `label_corners`; its front is the face of corners 0, 1, 4, 5."""
 
 
 def _measured(
     truth: ObjectTruth, thing: SceneObject, kind: KittiType, view: View, limits: VisibilityLimits
 ) -> Object3d:
-    """One object with at least one visible pixel, as KITTI describes it."""
+    """Measures an object with at least one visible pixel, by KITTI's definitions."""
     box = box_in_camera(thing, view.camera)
     box_px = from_edge_pixels(truth.pictured_box or truth.amodal_box, view.camera.intrinsics)
     left, top, right, bottom = truth.amodal_box
@@ -320,7 +322,7 @@ def _measured(
 
 
 def _notes(config: Stereo3dConfig) -> tuple[str, ...]:
-    """That 3D boxes of a tilted camera are approximate."""
+    """Notes on the options: that 3D boxes of a tilted camera are approximate."""
     if config.is_level:
         return ()
     return (
@@ -331,7 +333,9 @@ def _notes(config: Stereo3dConfig) -> tuple[str, ...]:
 
 
 def _lines(sample: Stereo3dSample) -> tuple[KittiLabel, ...]:
-    """Its label file as the devkit reads it: two decimals decide which level a label at the border of one is of."""
+    """The labels of a sample after rounding to two decimals, as the devkit reads them; rounding can change the
+    difficulty of a label.
+    """
     return parse_labels(format_labels(thing.label() for thing in sample.objects).decode())
 
 
@@ -344,12 +348,12 @@ def _name(index: int) -> str:
 
 
 def flip(sample: Stereo3dSample) -> Stereo3dSample:
-    """The pair mirrored, left to right: the right camera becomes the left one.
+    """Mirrors a stereo pair, left to right: the right camera becomes the left one.
 
-    Occlusion was measured by the left camera, and is taken over for the right one. The silhouette in the right picture
-    is not stored: each side of its box lies as far from the side in the left picture as the same side of the projected
-    3D box does. Where the border cuts an object, the other sides of its box are those of the left picture's part.
-    Ignored boxes are left out: where they lie in the right picture is not known.
+    Occlusion was measured in the left view and is kept for the right one. The silhouette in the right picture is not
+    stored, so its box is estimated: each side moves between the pictures as far as the same side of the projected 3D
+    box does. If the picture's border cuts an object, the other sides of its box are those of its part in the left
+    picture. Ignored boxes are left out: where they lie in the right picture is not known.
     """
     baseline_m, intrinsics = sample.calibration.baseline_m, sample.calibration.intrinsics
     moved = (_mirrored(thing, baseline_m, intrinsics) for thing in sample.objects)
@@ -364,7 +368,7 @@ def flip(sample: Stereo3dSample) -> Stereo3dSample:
 
 
 def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Object3d | None:
-    """An object as the mirrored right camera sees it; None outside its picture."""
+    """An object in the view of the mirrored right camera; None outside its picture."""
     x, y, z = thing.box.bottom_m
     turned = wrap_angle_rad(math.pi - thing.box.rotation_y_rad)
     box = replace(thing.box, bottom_m=(baseline_m - x, y, z), rotation_y_rad=turned)
@@ -385,12 +389,13 @@ def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Obj
 
 
 def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
-    """The part of both pictures that a window about their centre shows, with the calibration that belongs to it.
+    """Crops both pictures to a window around their centre, and adapts the calibration.
 
-    Metres stay as they are; the focal length changes. The share of a silhouette outside is estimated by its box.
+    Sizes and distances in metres do not change, but the focal length does. The share of a silhouette outside the window
+    is estimated by its box.
 
     Raises:
-        ValueError: the window does not share the picture's centre, where the principal point must lie.
+        ValueError: the window's centre is not the picture's centre, where the principal point must be.
     """
     height, width = sample.images[LEFT].shape[:2]
     if 2 * window.left_px + window.width_px != width or 2 * window.top_px + window.height_px != height:
@@ -431,13 +436,13 @@ def _box(sides: Array) -> BoxPx:
 def _placed(
     thing: Object3d, box: Box3d, box_px: BoxPx, amodal_box_px: BoxPx, frame_px: BoxPx, shown_px: BoxPx
 ) -> Object3d | None:
-    """An object at its place in a new picture; None where nothing of its box lies there.
+    """An object in a new picture; None if its box lies outside the picture.
 
     Args:
-        thing: the object in the picture that it was measured in.
-        box: its place in space, from the new camera.
+        thing: the object as measured in the old picture.
+        box: its 3D box in the frame of the new camera.
         box_px, amodal_box_px: its boxes in the new picture, not clipped; index pixels.
-        frame_px, shown_px: what shows the scene of the old and of the new picture, up to the outer borders.
+        frame_px, shown_px: outer borders of the part of the old picture, and of the new picture, that show the scene.
     """
     left, top, right, bottom = shown_px
     inside_px = clipped(box_px, (left + 0.5, top + 0.5, right - 0.5, bottom - 0.5))
@@ -449,7 +454,7 @@ def _placed(
 
 
 def _share(box_px: BoxPx, frame_px: BoxPx) -> float:
-    """Share of a box that lies in a frame, 0..1."""
+    """Share, 0..1, of a box that lies inside a frame."""
     whole = box_area(box_px)
     return box_area(clipped(box_px, frame_px)) / whole if whole > 0 else 0.0
 
