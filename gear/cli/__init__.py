@@ -1,1 +1,1 @@
-"""The command line: one small file a command: parse, call, print."""
+"""The command line: one small file per command, which parses arguments, calls the library and prints."""

@@ -1,4 +1,4 @@
-"""What to say when the machine, not the user's input, ends a command: memory, open files, processes."""
+"""Error messages for limits of the machine: memory, open files, processes."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ SAID = {
     "out of memory": MEMORY,
     "can't start new thread": THREADS,
 }
-"""By what libraries in C and C++ say, in errors of their own kinds."""
+"""Explanations by the texts that C and C++ libraries use in their errors."""
 
 
 def limit_reached(error: BaseException) -> str | None:
-    """One line on the limit that an error, or one that it comes from, reports; None where it reports none."""
+    """One line on the limit that an error or its cause reports; None if neither reports a limit."""
     for one in _chain(error):
         if isinstance(one, OSError) and one.errno in LINES:
             return LINES[one.errno]

@@ -1,4 +1,4 @@
-"""The `gear` command: finds the subcommand, runs it, and turns errors of the user into one line."""
+"""The `gear` command: finds the subcommand, runs it, and prints errors that the user can correct as one line."""
 
 from __future__ import annotations
 
@@ -56,16 +56,16 @@ CIRCUMSTANCES = {
     errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO,
     errno.ESTALE,
 }  # fmt: skip
-"""Errors of disks and permissions: one line, wherever they are raised."""
+"""Errors of disks and permissions, which are printed as one line wherever they are raised."""
 
 FULL = {errno.ENOSPC, errno.EDQUOT}
 
 NO_TEMPORARY = "No usable temporary directory"
-"""Beginning of Python's message, which names no file, when no disk takes its temporary files."""
+"""Beginning of Python's message when no folder for temporary files is usable; the message names no file."""
 
 
 class Terminated(KeyboardInterrupt):
-    """A request to end the process (SIGTERM), such as a batch system's: handled as Ctrl-C is."""
+    """A request to end the process (SIGTERM), for example by a batch system; handled like Ctrl-C."""
 
 
 def entry() -> None:
@@ -78,8 +78,8 @@ def main(argv: Sequence[str]) -> int:
     """Runs one command.
 
     Returns:
-        0, 2 for what the user can put right (one line on stderr), 130 when interrupted, 143 when terminated. Bugs keep
-        their traceback.
+        The exit code: 0; 2 for errors that the user can correct (one line on stderr); 130 when interrupted; 143 when
+        terminated. Bugs keep their traceback.
     """
     prepare_streams()
     try:
@@ -124,7 +124,7 @@ def full_parser(wanted: str | None = None) -> Parser:
     """The parser of the command line.
 
     Args:
-        wanted: the only command that gets its flags, so that only its module is imported; None for all of them.
+        wanted: the only command whose flags are added, so that only its module is imported; None for all commands.
     """
     parser = Parser(
         prog="gear",
@@ -171,7 +171,9 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 def _interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
-    """The Ctrl-C that caused an error: a compiled module interrupted in its import raises an ImportError from it."""
+    """The KeyboardInterrupt that caused an error, because a compiled module that is interrupted during import raises an
+    ImportError; None if there is none.
+    """
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error

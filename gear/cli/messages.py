@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 LONGEST = 200
-"""Characters of a quoted value in a message."""
+"""Largest length of a quoted value in a message, in characters."""
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 _QUOTED = re.compile(f"'[^']{{{LONGEST + 1},}}'|\"[^\"]{{{LONGEST + 1},}}\"")

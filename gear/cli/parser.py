@@ -14,7 +14,7 @@ class Parser(argparse.ArgumentParser):
     """An argparse parser whose errors are one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Exits with 2 and one line."""
+        """Prints one line and exits with code 2."""
         self.exit(2, f"{self.prog}: {one_line(message)}; {self.prog} --help says more\n")
 
     def command(self, name: str) -> Parser:
@@ -25,7 +25,7 @@ class Parser(argparse.ArgumentParser):
         return parser
 
     def refuse(self, unknown: Sequence[str]) -> NoReturn:
-        """Exits with 2, for words that no argument takes."""
+        """Prints one line about words that no argument takes, and exits with code 2."""
         flag = next((word.partition("=")[0] for word in unknown if word.startswith("-")), None)
         if flag is None:
             self.error(f"does not know what to do with {' '.join(unknown)!r}")

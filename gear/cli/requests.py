@@ -1,4 +1,4 @@
-"""Requests of the verbs from parsed flags: each field comes from the flag of its name."""
+"""Makes requests of the verbs from parsed flags: each field takes the value of the flag with its name."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ RequestT = TypeVar("RequestT")
 
 
 def request_of(kind: type[RequestT], args: argparse.Namespace, **given: Any) -> RequestT:
-    """A request whose fields are flags; lists become tuples, and what was not given keeps the field's default.
+    """Makes a request from flags; lists become tuples, and flags that were not given leave the field's default.
 
     Args:
-        kind: the dataclass.
-        args: of the command.
-        given: fields that are no flag of their name; they replace what the flags say.
+        kind: dataclass of the request.
+        args: parsed arguments of the command.
+        given: values of further fields; they override the flags.
 
     Raises:
         GearError: the values contradict each other.
@@ -37,7 +37,7 @@ def guard_of(args: argparse.Namespace) -> Guard | None:
     """The defense that `--defense`, `--defense-set` and the calibration flags name; None without one.
 
     Raises:
-        GearError: its options or calibration data are given without it.
+        GearError: options or calibration data are given without a defense.
     """
     from gear.measuring.guard import Guard
 

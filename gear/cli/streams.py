@@ -1,4 +1,4 @@
-"""The terminal's streams: their encoding, and how wide a line may be."""
+"""The terminal's streams: their encoding, and the width of their lines."""
 
 from __future__ import annotations
 
@@ -20,5 +20,7 @@ def prepare_streams() -> None:
 
 
 def line_width() -> int:
-    """Characters a line of a table may have: the terminal's (or `COLUMNS`), 100 where the output is no terminal."""
+    """Largest width of a line in characters: that of the terminal (or `COLUMNS`); 100 if the output is not
+    a terminal.
+    """
     return max(shutil.get_terminal_size((WIDTH, 24)).columns, 60)

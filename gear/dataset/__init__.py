@@ -1,1 +1,1 @@
-"""Datasets on disk: whole files or none, sidecars, manifests, resuming, twins, readers."""
+"""Datasets on disk: atomic writes, sidecars, manifests, resuming, twins and readers."""

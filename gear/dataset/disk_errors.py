@@ -1,4 +1,4 @@
-"""What a disk refuses, as one line for the user."""
+"""Errors of the disk as one line for the user."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ HINTS = {
     errno.EISDIR: "a folder is where a file should be; choose another --out",
     errno.EEXIST: "a file is where a folder should be; choose another --out",
 }
-"""What to do, by error number."""
+"""Advice by error number."""
 
 SYSTEM_LIMITS = {errno.EMFILE, errno.ENFILE, errno.ENOMEM}
 """Limits of the machine, not of the disk: the command line explains them."""

@@ -1,4 +1,4 @@
-"""Files appear whole or not at all, and never outside the folder that they belong to."""
+"""Writes files atomically, and never outside the folder to which they belong."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ __all__ = [
 ]  # fmt: skip
 
 TRIES = 100
-"""Another process may remove an empty folder, or clear a half-written file, between two steps of writing."""
+"""Number of attempts to write, since another process may remove an empty folder or a half-written file between two
+steps of writing.
+"""
 
 
 def sha256(data: bytes) -> str:
@@ -31,10 +33,10 @@ def sha256(data: bytes) -> str:
 
 
 def write_whole(root: Path, relative: str, data: bytes) -> None:
-    """Writes `root/relative`: into a half-written file first, which is synced and renamed into place.
+    """Writes `root/relative` atomically: a temporary file is written, synced and renamed.
 
     Raises:
-        DatasetError: the disk refuses, or the path leaves the root or leads through a link.
+        DatasetError: a file cannot be written, or the path leaves the root or leads through a link.
     """
     target = root / relative
     with explained(target):
@@ -55,10 +57,10 @@ def write_whole(root: Path, relative: str, data: bytes) -> None:
 
 
 def write_alone(path: Path, data: bytes) -> None:
-    """Writes a file that belongs to no dataset, whole or not at all.
+    """Writes a file that belongs to no dataset, atomically.
 
     Raises:
-        DatasetError: the disk refuses, or the path is a folder.
+        DatasetError: a file cannot be written, or the path is a folder.
     """
     with streamed_alone(path) as stream:
         stream.write(data)
@@ -66,12 +68,13 @@ def write_alone(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def streamed_alone(path: Path) -> Iterator[BinaryIO]:
-    """Writes a file that belongs to no dataset piece by piece; it appears, whole, when the block ends.
+    """A context to write a file that belongs to no dataset piece by piece; the complete file appears when the context
+    ends.
 
-    Until then it lies under a hidden name beside its place.
+    Until then it has a hidden name in the same folder.
 
     Raises:
-        DatasetError: the disk refuses, or the path is a folder.
+        DatasetError: a file cannot be written, or the path is a folder.
     """
     refuse_folder(path)
     with explained(path):
@@ -100,7 +103,7 @@ def refuse_folder(path: Path) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Makes renames inside a folder last through a power cut, where the system can."""
+    """Syncs a folder, so that renames in it survive a power failure, if the system supports it."""
     with contextlib.suppress(OSError):
         descriptor = os.open(path, os.O_RDONLY)
         try:
@@ -113,7 +116,7 @@ def read_bytes(path: Path) -> bytes:
     """The bytes of a regular file.
 
     Raises:
-        DatasetError: it is missing, no regular file, or cannot be read.
+        DatasetError: the file is missing, not a regular file, or cannot be read.
     """
     try:
         return read_regular(path)

@@ -1,6 +1,6 @@
-"""The only place in gear that deletes or renames inside a user's folder, and that opens files there for writing.
+"""The only module that deletes, renames or opens files for writing in folders of the user.
 
-A folder may come from a stranger, with links in it that lead elsewhere. Two guards keep what lies elsewhere untouched:
+A folder may come from another person and contain links that lead elsewhere. Two guards protect files outside of it:
 
 1. `refuse_links` searches an output folder for links before a command changes anything in it.
 2. Every change walks from the folder's root to the file through folder descriptors, and none of these steps follows a
@@ -39,7 +39,7 @@ def parts_of(root: Path, relative: str) -> tuple[str, ...]:
 
 
 def inside(root: Path, relative: str) -> Path:
-    """`root/relative`, for reading: links are followed as long as they stay below the root.
+    """The path `root/relative` for reading. Links are followed if they stay below the root.
 
     Raises:
         DatasetError: the path leaves the root, as text or through a link.
@@ -55,7 +55,7 @@ def inside(root: Path, relative: str) -> Path:
 
 
 def owned(root: Path, relative: str) -> Path:
-    """`root/relative`, for writing and deleting: no component below the root may be a link.
+    """The path `root/relative` for writing and deleting. No component below the root may be a link.
 
     Raises:
         DatasetError: a component is a link, or the path leaves the root as text.
@@ -96,9 +96,9 @@ def opened_parent(root: Path, relative: str, *, make: bool = False) -> Iterator[
     """The folder of `root/relative` as an open descriptor, and the name of the file in it.
 
     Args:
-        root: is opened as it is, even through a link.
-        relative: walked component by component, without following links.
-        make: creates the folders that are missing below the root.
+        root: folder that is opened even through a link.
+        relative: path that is walked component by component, without following links.
+        make: whether missing folders below the root are created.
 
     Raises:
         DatasetError: a component is a link, or the path leaves the root as text.
@@ -128,10 +128,10 @@ def opened_parent(root: Path, relative: str, *, make: bool = False) -> Iterator[
 
 
 def remove_file(root: Path, relative: str) -> None:
-    """Deletes a file below the root; a file that is not there is no error.
+    """Deletes a file below the root; a missing file is not an error.
 
     Raises:
-        DatasetError: a component of the path is a link, or the disk refuses.
+        DatasetError: a component of the path is a link, or a file cannot be written.
     """
     with (
         explained(root / relative),
@@ -145,7 +145,7 @@ def remove_files(root: Path, relatives: Iterable[str]) -> None:
     """Deletes files below the root, all of whose paths are checked before the first of them is deleted.
 
     Raises:
-        DatasetError: a component of a path is a link, or the disk refuses.
+        DatasetError: a component of a path is a link, or a file cannot be written.
     """
     checked = list(relatives)
     for relative in checked:
@@ -155,10 +155,10 @@ def remove_files(root: Path, relatives: Iterable[str]) -> None:
 
 
 def remove_tree(root: Path, relative: str) -> None:
-    """Deletes a folder below the root with all that is in it; links in it are deleted and not followed.
+    """Deletes a folder below the root with its content; links in it are deleted and not followed.
 
     Raises:
-        DatasetError: a component of the path is a link, or the disk refuses.
+        DatasetError: a component of the path is a link, or a file cannot be written.
     """
     with (
         explained(root / relative),
@@ -169,7 +169,7 @@ def remove_tree(root: Path, relative: str) -> None:
 
 
 def remove_empty_folders(root: Path, relative: str) -> None:
-    """Deletes all empty folders at and below `root/relative`, those inside first; others stay as they are.
+    """Deletes all empty folders at and below `root/relative`, from the inside out.
 
     Raises:
         DatasetError: a component of the path is a link.

@@ -1,4 +1,4 @@
-"""Hashes of many files: several at a time, each read piece by piece."""
+"""Hashes many files, several at a time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from gear.values.regular_file import check_regular
 
 PIECE_BYTES = 1 << 20
 MOST_THREADS = 8
-"""Beyond that the disk decides: `hashlib` releases Python's lock, so threads hash side by side."""
+"""Largest number of threads; with more the disk is the limit. `hashlib` releases Python's lock, so that threads hash in
+parallel.
+"""
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -24,7 +26,7 @@ def file_hash(path: Path) -> str:
     """The SHA-256 of a file, as 64 hexadecimal digits.
 
     Raises:
-        DatasetError: it is missing, no regular file, or cannot be read.
+        DatasetError: the file is missing, not a regular file, or cannot be read.
     """
     digest = hashlib.sha256()
     try:

@@ -14,7 +14,7 @@ WIDTH_PX = 320
 """Width of a picture in a notebook."""
 
 QUALITY = 85
-"""Of the JPEG files that the page holds."""
+"""JPEG quality of the embedded pictures."""
 
 
 def preview_table(title: str, rows: Iterable[tuple[str, Mapping[str, UInt8Image]]]) -> str:

@@ -1,4 +1,4 @@
-"""JSON text as gear writes and reads it: finite numbers and whole characters only."""
+"""JSON text as gear writes and reads it: only finite numbers and no lone surrogates."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gear.values.serial import Json
 
 
 def dump_json(value: Json) -> bytes:
-    """JSON as gear writes it: one key a line, keys in the order given, a newline at the end."""
+    """JSON text with one key per line, keys in the given order, and a final newline."""
     return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
@@ -21,7 +21,7 @@ def load_json(path: Path) -> Json:
     """Reads a JSON file.
 
     Raises:
-        DatasetError: it is missing or not JSON, as `parse_json` has it.
+        DatasetError: the file is missing or refused by `parse_json`.
     """
     data = read_bytes(path)
     try:
@@ -34,8 +34,8 @@ def parse_json(data: bytes | str) -> Json:
     """The value of a JSON text.
 
     Raises:
-        ValueError, RecursionError: it is no JSON, or holds what `dump_json` never writes: numbers that are not finite,
-            or half characters (lone surrogates), which cannot be printed, drawn or used in names of files.
+        ValueError, RecursionError: the text is not JSON, or holds values that `dump_json` never writes: numbers that
+            are not finite, or lone surrogates, which cannot be printed, drawn or used in file names.
     """
     value = json.loads(data, parse_constant=_no_number, parse_float=_number, parse_int=_integer)
     text = data if isinstance(data, str) else data.decode("latin-1")
@@ -45,7 +45,7 @@ def parse_json(data: bytes | str) -> Json:
 
 
 def _no_number(word: str) -> Json:
-    """Refuses the words for numbers that Python's reader accepts beyond JSON.
+    """Refuses the words for numbers (NaN, Infinity) that Python's reader accepts beyond JSON.
 
     Raises:
         ValueError: always.

@@ -11,7 +11,7 @@ def split_folder(split: str) -> str:
 
 
 def sidecar_path(split: str, index: int) -> str:
-    """The sidecar of one sample; it is written last, so a sample that has one is whole."""
+    """Path of the sidecar of one sample; it is written last, so that a sample with a sidecar is complete."""
     return f"{split_folder(split)}/samples/{index:06d}.json"
 
 
@@ -21,20 +21,22 @@ def auxiliary_path(split: str, kind: str, index: int, name: str) -> str:
 
 
 def plan_path(split: str) -> str:
-    """The plan of a split: what decides its bytes. Written first."""
+    """Path of the plan of a split, which holds everything that decides its bytes; written first."""
     return f"{split_folder(split)}/plan.json"
 
 
 def begun_path(split: str, what: str) -> str:
-    """A note that lists the files being written of a sample or of the indexes, deleted when they are complete."""
+    """Path of a note with the files of a sample, or of the indexes, that are being written; deleted when they are
+    complete.
+    """
     return f"{split_folder(split)}/begun/{what}.json"
 
 
 def manifest_path(split: str) -> str:
-    """The manifest: lists all files of a finished split. Written last."""
+    """Path of the manifest, which lists all files of a finished split; written last."""
     return f"{split_folder(split)}/manifest.json"
 
 
 def patch_path(label: str, name: str) -> str:
-    """The copy of a picture of the patch that a split shows."""
+    """Path of the copy of a patch that a split shows."""
     return f"{GEAR}/patches/{label}/{name}"

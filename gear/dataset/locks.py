@@ -1,6 +1,6 @@
-"""Locks on folders, by which runs know of each other. The system releases the locks of a run that is killed.
+"""Locks on folders, by which parallel runs detect each other. The system releases the locks of a killed run.
 
-On a file system without such locks every run proceeds as if it were the only one.
+On a file system without such locks every run proceeds as if there were no others.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ __all__ = ["alone_at_work", "at_work", "is_at_work", "turn"]
 
 @contextlib.contextmanager
 def turn(root: Path) -> Iterator[None]:
-    """Waits until no other run starts or removes splits of a dataset, and locks it. Creates a missing root.
+    """Locks a dataset against other runs that start or remove splits; waits for them. Creates a missing root.
 
     Raises:
-        DatasetError: the root cannot be made.
+        DatasetError: the root cannot be created.
     """
     while True:
         with explained(root):
@@ -40,7 +40,7 @@ def turn(root: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def at_work(folder: Path) -> Iterator[None]:
-    """Shares a lock on a split's own folder while a run writes samples; several runs of one plan may."""
+    """Holds a shared lock on a split's folder while a run writes samples; several runs of one plan may hold it."""
     with _locked(folder, alone=False, wait=True):
         yield
 
@@ -50,7 +50,7 @@ def alone_at_work(root: Path) -> Iterator[None]:
     """Locks a folder of results for one run. Creates a missing folder.
 
     Raises:
-        DatasetError: another run is at work there, or the folder cannot be made.
+        DatasetError: another run is writing there, or the folder cannot be created.
     """
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
@@ -74,7 +74,7 @@ def is_at_work(folder: Path) -> bool:
 
 @contextlib.contextmanager
 def _locked(folder: Path, *, alone: bool, wait: bool) -> Iterator[int | None]:
-    """Locks a folder and yields its descriptor, or None where it cannot be locked.
+    """Locks a folder and yields its descriptor; None if the file system has no locks.
 
     Raises:
         BlockingIOError: another run holds the lock, and `wait` is False.

@@ -17,7 +17,8 @@ def check_encoded(given: Any, method: str) -> Encoded:
     """Checks the return value of a task's `method` and returns it.
 
     Raises:
-        TypeError: it is no `Encoded`, a file in it is not bytes, or its facts hold values that JSON cannot represent.
+        TypeError: the value is not an `Encoded`, a file in it is not bytes, or its facts hold values that JSON cannot
+            represent.
         ValueError: its facts hold numbers that JSON cannot represent.
     """
     if not isinstance(given, Encoded):
@@ -36,8 +37,8 @@ def check_previews(given: Any) -> dict[str, UInt8Image]:
     """Checks the return value of a task's `preview` and returns it as a dictionary of (H, W, 3) uint8 pictures.
 
     Raises:
-        TypeError: one is no (H, W, 3) uint8 picture, or they are no mapping.
-        ValueError: they are no mapping.
+        TypeError: the value is not a mapping, or a picture in it is not (H, W, 3) uint8.
+        ValueError: the value cannot be read as a mapping.
     """
     pictures = dict(given)
     for name, pixels in pictures.items():
@@ -52,7 +53,7 @@ def check_metrics(given: Any, method: str) -> dict[str, float]:
     """Checks the return value of an evaluator's `method` and returns it as a dictionary.
 
     Raises:
-        TypeError: it is no mapping of names to numbers.
+        TypeError: the value is not a mapping of names to numbers.
     """
     if not isinstance(given, Mapping):
         raise TypeError(f"{method} must give metrics by name, got {type(given).__name__}")

@@ -1,11 +1,14 @@
-"""Probes: a surface's reach in one view with the surface white and with it black, as files beside a sample.
+"""Probes: the pixels that a surface lights in one view, rendered with the surface white and black, as files of a
+sample.
 
-Light is linear. With B seen with all surfaces black and W_i with only surface i white, a view with patches on them is
+Light is linear. With B the view with all surfaces black and W_i the view with only surface i white, a view with patches
+is
 
     I = B + sum over i of w_i (W_i - B)
 
-where w_i is what surface i's texture shows at a pixel, 0..1 (`gear.camera.response.face_light`). Shading, shadows,
-air, occluders in front and soft edges are all in W_i - B. Probes hold neither noise nor the response; both come after.
+where w_i is the linear colour of surface i's texture at a pixel, 0..1 (`gear.camera.response.face_light`). W_i - B
+contains shading, shadows, air, occluders and soft edges. Noise and the response of the camera are applied later and are
+not in probes.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ from gear.values.frames import UInt16Image
 from gear.values.serial import from_json
 
 AuxiliaryFiles = Mapping[str, tuple[Auxiliary, bytes]]
-"""What is written beside a sample, by name."""
+"""Auxiliary files of a sample with their bytes, by name."""
 
 KIND = "probes"
 _SHADES = ("black", "white")
@@ -40,15 +43,15 @@ _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 6, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Probe:
-    """One surface's reach in one view.
+    """The pixels that one surface lights in one view.
 
     Attributes:
-        surface: its name.
+        surface: name of the surface.
         view: name of the camera.
-        left_px, top_px: index pixel of the crop's first pixel.
-        black: (h, w, 3) uint16, linear light 0..`LINEAR_FULL_SCALE`, every surface black.
-        white: (h, w, 3) uint16, the same with this surface white; beyond full scale where a frame would end.
-        response: what makes pictures of such frames; the pictures of the sample were made with it.
+        left_px, top_px: column and row of the crop's first pixel.
+        black: (h, w, 3) uint16, linear light 0..`LINEAR_FULL_SCALE`, with all surfaces black.
+        white: (h, w, 3) uint16, the same with this surface white; not clipped at full scale.
+        response: the camera's response with which the pictures of the sample were made.
     """
 
     surface: str
@@ -61,12 +64,12 @@ class Probe:
 
     @property
     def name(self) -> str:
-        """In a sidecar's list, without the shade."""
+        """Name in the sidecar, without `black` or `white`."""
         return f"probe/{self.view}/{self.surface}"
 
 
 def crop_probe(surface: str, view: str, black: UInt16Image, white: UInt16Image, response: Response) -> Probe | None:
-    """The smallest crop of two (H, W, 3) frames that holds all pixels in which they differ; None where none does."""
+    """The smallest crop of two (H, W, 3) frames that holds all pixels in which they differ; None if they are equal."""
     reach = (black != white).any(axis=2)
     rows, columns = np.flatnonzero(reach.any(axis=1)), np.flatnonzero(reach.any(axis=0))
     if not rows.size:
@@ -84,7 +87,7 @@ def crop_probe(surface: str, view: str, black: UInt16Image, white: UInt16Image, 
 
 
 def probe_files(probes: Sequence[Probe], split: str, index: int) -> AuxiliaryFiles:
-    """Two 16-bit RGB PNG files a probe."""
+    """Encodes each probe as two 16-bit RGB PNG files."""
     files = {}
     for probe in probes:
         response = {name: getattr(probe.response, name) for name in _RESPONSE}
@@ -96,10 +99,10 @@ def probe_files(probes: Sequence[Probe], split: str, index: int) -> AuxiliaryFil
 
 
 def demand_probes(dataset: Dataset[Any]) -> None:
-    """Whether a split was collected with probes.
+    """Checks that a split was collected with probes.
 
     Raises:
-        DatasetError: it was not.
+        DatasetError: the split has no probes.
     """
     if KIND not in dataset.plan.auxiliary:
         raise DatasetError(
@@ -110,7 +113,7 @@ def demand_probes(dataset: Dataset[Any]) -> None:
 
 
 def probes_of(dataset: Dataset[Any], index: int, view: str) -> tuple[Probe, ...]:
-    """The probes of one sample in one view, in order of surfaces; a surface that does not reach the picture has none.
+    """Reads the probes of one sample in one view, in order of surfaces; a surface that lights no pixel has none.
 
     Raises:
         DatasetError: the split was collected without probes, or a file is missing or broken.
@@ -127,7 +130,7 @@ def probes_of(dataset: Dataset[Any], index: int, view: str) -> tuple[Probe, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Setting:
-    """A `Response`, as it is written."""
+    """A `Response` as it is stored."""
 
     exposure: float
     contrast: float
@@ -136,7 +139,7 @@ class _Setting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Facts:
-    """What a sidecar says of a probe's file."""
+    """The facts on a probe's file in a sidecar."""
 
     left_px: int
     top_px: int

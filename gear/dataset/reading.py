@@ -20,7 +20,7 @@ from gear.values.serial import Json, from_json
 T = TypeVar("T")
 
 SHOWN = 4
-"""Samples that a notebook shows of a dataset."""
+"""Number of samples of a dataset that a notebook shows."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -50,7 +50,7 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         )
 
     def _repr_html_(self) -> str:
-        """The first samples as pictures; notebooks show it."""
+        """The first samples as pictures, for notebooks."""
         shown = ((f"{i:06d}", self.task.preview(self[i])) for i in range(min(len(self), SHOWN)))
         return preview_table(repr(self), shown)
 
@@ -86,7 +86,7 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         """Checks the files that a sample is decoded from against the hashes in its sidecar.
 
         Raises:
-            DamagedError: one is missing, or is not the one that was written.
+            DamagedError: a file is missing, or its bytes are not those that were written.
         """
         auxiliary = {file.path for file in sidecar.auxiliary.values()}
         for relative, digest in sidecar.files.items():
@@ -110,7 +110,7 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         """A value in the `content` of the plan, by its path of keys.
 
         Raises:
-            DatasetError: there is no such value of that type: the plan was edited.
+            DatasetError: there is no such value of that type, because the plan was edited.
         """
         value, name = self.plan.content, ".".join(("content", *keys))
         try:
@@ -135,16 +135,16 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
 
 
 def check_hash(root: Path, relative: str, digest: str) -> bytes:
-    """The bytes of a dataset's file, which must be those that were written.
+    """Reads a file of a dataset and checks its hash.
 
     Args:
-        root: of the dataset.
-        relative: path of the file in it.
+        root: root of the dataset.
+        relative: path of the file relative to the root.
         digest: SHA-256 of the file as it was written.
 
     Raises:
-        DamagedError: it is missing, or has other bytes.
-        DatasetError: it cannot be read, or lies outside the root.
+        DamagedError: the file is missing, or has other bytes.
+        DatasetError: the file cannot be read, or lies outside the root.
     """
     path = inside(root, relative)
     if not path.exists():
@@ -216,7 +216,7 @@ class Twins(Sequence[tuple[SampleT, SampleT]], Generic[SampleT]):
         return f"Twins({self.first!r}, {self.second!r})"
 
     def _repr_html_(self) -> str:
-        """The first pairs as pictures; notebooks show it."""
+        """The first pairs as pictures, for notebooks."""
         rows = []
         for i in range(min(len(self), SHOWN)):
             for one in (self.first, self.second):

@@ -1,9 +1,9 @@
-"""Half-written files: where they lie, how their writers hold them, and how those of killed runs are cleared.
+"""Temporary files: their folder, the locks of their writers, and the removal of those that killed runs left.
 
-A file is written in `gear/scratch` under a name that nobody else uses, and renamed into its place. Meanwhile its
-writer holds a lock on it. The system releases the lock when a process is killed, also in another container and, on most
-network file systems, on another machine. If a file is cleared by mistake while it is written, its writer fails to
-rename it and writes it again: clearing costs time at worst, and never data.
+A file is written in `gear/scratch` under a unique name, and then renamed. Meanwhile its writer holds a lock on it. The
+system releases the lock when a process is killed, also in another container and, on most network file systems, on
+another machine. If a file is removed while it is written, its writer fails to rename it and writes it again, so that no
+data are lost.
 """
 
 from __future__ import annotations
@@ -24,13 +24,15 @@ if sys.platform != "win32":
     import fcntl
 
 SCRATCH = "gear/scratch"
-"""Half-written files lie here, away from the folders that loaders of a format list."""
+"""Folder of temporary files, outside the folders that loaders of a format list."""
 
 SUFFIX = ".part"
-"""Ends the names of files whose writers hold a lock; earlier versions of gear held none."""
+"""Suffix of files whose writers hold a lock; earlier versions of gear held none."""
 
 OLD_S = 3600.0
-"""Where neither a lock nor a process number tells, a file that nobody has written to for so long is abandoned."""
+"""Seconds since the last write after which a file counts as abandoned, if neither a lock nor a process number shows
+whether its writer lives.
+"""
 
 NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
@@ -40,7 +42,7 @@ def half_written(folder: int, data: bytes) -> Iterator[str]:
     """Writes and syncs a new file in an open folder, and yields its name; removes it unless it is renamed.
 
     Raises:
-        OSError: the disk refuses.
+        OSError: a file cannot be written.
     """
     name = f"{_host()}-{os.getpid()}-{secrets.token_hex(8)}{SUFFIX}"
     descriptor = os.open(name, NEW, 0o666, dir_fd=folder)
@@ -58,9 +60,9 @@ def half_written(folder: int, data: bytes) -> Iterator[str]:
 
 
 def clear_scratch(root: Path) -> None:
-    """Removes what killed runs left half-written, and the folder `gear` where nothing else is in it.
+    """Removes the temporary files of killed runs, and the folder `gear` if it is empty.
 
-    Files that other runs, or other threads, are writing stay.
+    Files that other runs or threads are writing are kept.
 
     Raises:
         DatasetError: the folder of half-written files, or `gear`, is a link.
@@ -76,10 +78,10 @@ def clear_scratch(root: Path) -> None:
 
 
 def _is_abandoned(folder: int, name: str) -> bool:
-    """Whether nobody is writing a file any more.
+    """Whether the writer of a file has ended.
 
     Raises:
-        OSError: it is gone, or cannot be opened.
+        OSError: the file is missing, or cannot be opened.
     """
     status = os.stat(name, dir_fd=folder, follow_symlinks=False)
     if not stat.S_ISREG(status.st_mode):
@@ -98,7 +100,9 @@ def _is_abandoned(folder: int, name: str) -> bool:
 
 
 def _lock(descriptor: int) -> bool | None:
-    """Takes the lock of an open file: False where another process or thread has it, None where there are no locks."""
+    """Tries to lock an open file: False if another process or thread holds the lock, None if the file system has no
+    locks.
+    """
     if sys.platform == "win32":
         return None
     try:
@@ -111,7 +115,9 @@ def _lock(descriptor: int) -> bool | None:
 
 
 def _is_alive(name: str) -> bool | None:
-    """Whether the process that a file is named after is another one that runs; None where this machine cannot know."""
+    """Whether the process that a file is named after is running and not the current one; None if this machine cannot
+    know.
+    """
     host, _, number = name.rpartition("-")[0].rpartition("-")
     if not number.isdecimal():
         return None

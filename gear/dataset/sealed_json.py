@@ -20,7 +20,7 @@ DIGITS = 64
 LENGTH = len(HEAD) + DIGITS + len(TAIL)
 
 MOST_CHANGED = 4
-"""A seal of which so many characters have changed is still recognised, as a damaged one."""
+"""Largest number of changed characters with which a seal is still recognised, as a damaged one."""
 
 REPAIR = "`gear verify DIR --repair` makes it again"
 
@@ -36,14 +36,14 @@ def sealed_json(content: dict[str, Json]) -> bytes:
 
 
 def load_sealed(path: Path) -> Json:
-    """Reads a sidecar, a plan or a manifest, and checks its seal where it has one.
+    """Reads a sidecar, a plan or a manifest, and checks its seal if it has one.
 
     Returns:
         The content without the seal.
 
     Raises:
         DamagedError: it does not match its seal, or is no JSON.
-        DatasetError: it cannot be read.
+        DatasetError: the file cannot be read.
     """
     data = read_bytes(path)
     if not is_whole(data):

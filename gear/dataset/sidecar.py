@@ -14,7 +14,7 @@ from gear.values.serial import from_json, to_json
 
 
 def sidecar_bytes(sidecar: Sidecar) -> bytes:
-    """The bytes of a sidecar. The entry of auxiliary files is only there where a sample has any."""
+    """The bytes of a sidecar. Auxiliary files have an entry only if the sample has any."""
     content = {
         "record": to_json(sidecar.record),
         "surfaces": to_json(sidecar.surfaces),
@@ -30,7 +30,7 @@ def read_sidecar(path: Path) -> Sidecar:
     """Reads a sidecar back.
 
     Raises:
-        DatasetError: it is missing, broken, of another version of gear, or cannot be true.
+        DatasetError: the sidecar is missing, damaged, of another version of gear, or holds impossible values.
     """
     data = load_sealed(path)
     try:
@@ -54,7 +54,7 @@ def read_sidecar(path: Path) -> Sidecar:
 
 
 def no_sidecar(path: Path, error: Exception) -> DatasetError:
-    """The error of a sidecar that cannot be read."""
+    """The error for a sidecar that cannot be read."""
     said = f"{error} is missing" if isinstance(error, KeyError) else str(error)
     remedy = "delete it and run the same collection again"
     return DatasetError(path, f"is not a sidecar of this version of gear ({said}); {remedy}")

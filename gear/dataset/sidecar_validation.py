@@ -1,7 +1,7 @@
 """Checks of a sidecar's values beyond their types.
 
-Files on disk may be damaged, edited or written by other programs. A picture without width, or an outline of two
-corners, is refused here with the name of the file, and does not fail later in the code that draws, measures or attacks.
+Files on disk may be damaged, edited or written by other programs. Impossible values, such as a picture without width or
+an outline of two corners, are refused here with the name of the file, so that later code does not fail on them.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from gear.values.serial import Json
 
 MOST_SIDE_PX = 8192
 LARGEST = 1e12
-"""Far above every number of metres, pixels, degrees or seconds in a scene; its cube is still finite."""
+"""Largest accepted number, far above all metres, pixels, degrees and seconds in scenes; its cube is still finite."""
 
 SEED = "seed"
-"""The only number without an upper limit."""
+"""Key of the only number without an upper limit."""
 
 QUATERNION_TOLERANCE = 1e-3
 

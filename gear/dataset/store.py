@@ -1,4 +1,4 @@
-"""Writes a split: knows which samples are complete, writes the files of a sample, closes the split."""
+"""Writes a split: finds the missing samples, writes the files of a sample, and closes the split."""
 
 from __future__ import annotations
 
@@ -66,7 +66,9 @@ class Store:
             self._keep_patch(patch_path(self.plan.info.patch_label, name), data)
 
     def _refuse_changed(self) -> None:
-        """Refuses sidecars that were changed: the manifest that is written at the end would vouch for them."""
+        """Refuses sidecars that were changed, because the manifest that is written at the end would hold
+        their hashes.
+        """
         try:
             there = load_sealed(inside(self.root, manifest_path(self.split)))
         except DatasetError:  # missing, or damaged and written anew when the split is closed
@@ -79,7 +81,9 @@ class Store:
                 raise DamagedError(path, f"is not what the manifest says that was collected; {REPAIR}")
 
     def _keep_patch(self, relative: str, data: bytes) -> None:
-        """Copies a picture of the patch into the dataset, unless another split shows another one of that name."""
+        """Copies a picture of the patch into the dataset; refuses it if another split shows a different patch of that
+        name.
+        """
         self._refuse_other_patch(relative, data)
         target = inside(self.root, relative)
         if not (target.exists() and target.read_bytes() == data):
@@ -187,7 +191,7 @@ class Store:
         remove_files(self.root, incomplete)
 
     def _damage_of(self, index: int) -> tuple[list[str], list[str]]:
-        """Files of a sample that are missing, and files that are not those that its sidecar names."""
+        """The missing files of a sample, and the files whose hash is not that in its sidecar."""
         path = inside(self.root, sidecar_path(self.split, index))
         hashes = read_sidecar(path).files
         lacking = [relative for relative in hashes if not inside(self.root, relative).is_file()]
@@ -205,7 +209,7 @@ class Store:
             auxiliary: further files of the sample, such as probes, with their bytes, by name.
 
         Raises:
-            DatasetError: the disk refuses.
+            DatasetError: a file cannot be written.
         """
         further = auxiliary or {}
         hashes: dict[str, str] = {}
@@ -229,7 +233,7 @@ class Store:
         """The sidecars of all samples, in order of index.
 
         Raises:
-            DatasetError: one is missing or damaged.
+            DatasetError: a sidecar is missing or damaged.
         """
         return [read_sidecar(inside(self.root, sidecar_path(self.split, i))) for i in range(self.plan.samples)]
 
@@ -238,7 +242,7 @@ class Store:
         return {relative: sha256(read_bytes(inside(self.root, relative))) for relative in paths}
 
     def _patches(self) -> dict[str, Json]:
-        """The manifest's entry of the copies of the patches; none where the split shows no patch."""
+        """The manifest's entry for the copies of the patches; empty if the split shows no patch."""
         folder = inside(self.root, patch_path(self.plan.patch["label"], "patch_0.png")).parent
         paths = [path for path in sorted(folder.glob("patch_*.png")) if path.is_file()]
         return {"patches": {_relative(self.root, path): sha256(read_bytes(path)) for path in paths}} if paths else {}
@@ -252,7 +256,7 @@ class Store:
             facts: entries of the manifest on versions, renderer and configuration.
 
         Raises:
-            DatasetError: the disk refuses, or a sample is missing.
+            DatasetError: a file cannot be written, or a sample is missing.
         """
         there = read_plan(self.root, self.split)
         if there is not None and there.samples > self.plan.samples:
@@ -393,19 +397,19 @@ def _relative(root: Path, path: Path) -> str:
 
 
 def _files_named(there: Json) -> list[str]:
-    """The files that a sidecar, a manifest or a note of what was being written names; none where it is damaged."""
+    """The files that a sidecar, a manifest or a note of unfinished files names; none if it is damaged."""
     named = there if isinstance(there, list) else _names(there, "files") + _names(there, "indexes")
     return [name for name in named if isinstance(name, str)]
 
 
 def _files_of_samples(there: Json) -> list[str]:
-    """The files that a manifest lists of its samples; none where it is damaged."""
+    """The files of samples that a manifest lists; none if it is damaged."""
     samples = there.get("samples") if isinstance(there, dict) else None
     return [name for one in (samples if isinstance(samples, list) else ()) for name in _names(one, "files")]
 
 
 def _load_if_json(path: Path) -> Json:
-    """The content of a JSON file; None where it is missing or no JSON."""
+    """The content of a JSON file; None if it is missing or not JSON."""
     try:
         return load_json(path)
     except DatasetError:
@@ -419,7 +423,7 @@ def _names(value: Json, key: str) -> list[str]:
 
 
 def _patch_label(root: Path, split: str) -> str:
-    """The label of a split's patch; empty where its plan is damaged."""
+    """The label of a split's patch; empty if its plan is damaged."""
     try:
         plan = read_plan(root, split)
     except DatasetError:
@@ -431,7 +435,7 @@ def splits_of(root: Path) -> Sequence[str]:
     """Names of the splits of a dataset, finished or not.
 
     Raises:
-        DatasetError: the folder is not a dataset of gear's.
+        DatasetError: the folder is not a dataset.
     """
     folder = root / "gear"
     names = sorted(p.parent.name for p in folder.glob("*/plan.json")) if folder.is_dir() else []

@@ -1,4 +1,4 @@
-"""Checks every file that gear wrote into a dataset: is it there, and are its bytes those that were written?
+"""Checks that every file of a dataset exists and has the bytes that gear wrote.
 
 Every byte is covered: pictures, labels and probes by the hashes in their sample's sidecar; sidecars, indexes and
 patches by those in the manifest; sidecars, manifest and plan by their own seals (`gear.dataset.sealed_json`).
@@ -27,13 +27,13 @@ Problem = Literal["damaged", "missing", "unexpected"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, order=True)
 class Finding:
-    """One file that is not as it should be.
+    """One file that is damaged, missing or unexpected.
 
     Attributes:
         path: relative to the dataset's root.
-        problem: `damaged`: other bytes than were written; `missing`; `unexpected`: not of the dataset, in a folder that
-            readers of the format list.
-        detail: more, for a person.
+        problem: `damaged` if the bytes are not those that were written; `missing`; or `unexpected` for a file that does
+            not belong to the dataset, in a folder that readers of the format list.
+        detail: further explanation as text.
     """
 
     path: str
@@ -41,22 +41,22 @@ class Finding:
     detail: str = ""
 
     def line(self) -> str:
-        """One line for a person."""
+        """The finding as one line of text."""
         return f"{self.problem:<10} {self.path}" + f" ({self.detail})" * bool(self.detail)
 
 
 @dataclass(slots=True, kw_only=True)
 class SplitCheck:
-    """What a check of one split found.
+    """The result of the check of one split.
 
     Attributes:
-        split: its name.
-        plan: its plan; None where that is missing or damaged.
-        manifest: its manifest; None where that is missing or damaged.
-        samples: how many samples it should hold.
+        split: name of the split.
+        plan: plan of the split; None if it is missing or damaged.
+        manifest: manifest of the split; None if it is missing or damaged.
+        samples: number of samples that it should hold.
         broken_samples: indices of samples of which a file or the sidecar is missing or damaged.
         known: paths of all files that belong to the split.
-        findings: the files that are not as they should be.
+        findings: files that are damaged, missing or unexpected.
     """
 
     split: str
@@ -68,7 +68,7 @@ class SplitCheck:
     findings: list[Finding] = field(default_factory=list)
 
     def found(self, path: str, problem: Problem, detail: str = "") -> None:
-        """Notes a file that is not as it should be."""
+        """Adds a finding."""
         self.findings.append(Finding(path=path, problem=problem, detail=detail))
 
 
@@ -76,7 +76,7 @@ def splits_in(root: Path) -> list[str]:
     """Names of the splits of a dataset, also of those whose plan is missing.
 
     Raises:
-        DatasetError: there is none.
+        DatasetError: the folder has no split.
     """
     entries = [*root.glob(f"{GEAR}/*/plan.json"), *root.glob(f"{GEAR}/*/manifest.json")]
     names = {path.parent.name for path in entries} | {path.parent.name for path in root.glob(f"{GEAR}/*/samples")}
@@ -89,7 +89,7 @@ def check_split(root: Path, split: str, on_progress: Progress | None = None) -> 
     """Checks all files of one split.
 
     Args:
-        root: of the dataset.
+        root: root of the dataset.
         split: its name.
         on_progress: called with (samples checked, samples) after every sample.
 
@@ -111,10 +111,10 @@ def check_split(root: Path, split: str, on_progress: Progress | None = None) -> 
 
 
 def unexpected_files(root: Path, checks: Iterable[SplitCheck]) -> list[Finding]:
-    """Files that belong to no split, in the folders that hold files of splits; hidden ones are left out.
+    """Files that belong to no split, in folders with files of splits; hidden files are skipped.
 
-    Files in the root itself, and folders of which gear wrote nothing, are the user's own. Where a manifest is missing
-    or damaged, it is not known which index files belong to its split, and only leftovers are reported.
+    Files in the root itself, and folders into which gear wrote nothing, belong to the user. If a manifest is missing or
+    damaged, the index files of its split are unknown, and only leftovers are reported.
     """
     checks = list(checks)
     known = {path for check in checks for path in check.known}
@@ -196,7 +196,7 @@ def _check_samples(root: Path, check: SplitCheck, on_progress: Progress | None) 
 def _sample_findings(
     root: Path, check: SplitCheck, index: int, hashes: dict[str, str], listed: dict[str, str]
 ) -> Iterator[Finding]:
-    """The damaged and missing files of a sample, by its sidecar or, where that is damaged, by the manifest."""
+    """The damaged and missing files of a sample, by its sidecar or, if that is damaged, by the manifest."""
     relative = sidecar_path(check.split, index)
     path = inside(root, relative)
     files = dict(listed)

@@ -1,1 +1,1 @@
-"""What verbs share when they measure a model: guarded models, runs over datasets, scores and statistics."""
+"""Shared parts of the verbs that measure models: guarded models, runs over datasets, scores and statistics."""

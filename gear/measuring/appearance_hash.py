@@ -29,15 +29,15 @@ from gear.world.weather.light import lighting_of
 from gear.world.weather.presets import PRESETS, wetness
 
 SKY_FACE_PX = 8
-"""A small sky says as much about the light as a large one."""
+"""Size of the sky map that is hashed; a small map is enough to detect changes of the light."""
 
 HASH_LENGTH = 16
 
 PLANNED = (("town",), ("assets",), ("renderer", "name"), ("versions", "mujoco"))
-"""What `look_of` reads in the content of plans, by key, and key in key: names and hashes."""
+"""Keys in the content of plans that `look_of` reads: names and hashes."""
 
 ALIKE = {"raster": "filament"}
-"""Renderers that no network has been found to tell apart, and the name that their look goes by (docs/rendering.md)."""
+"""Common name of renderers for which no network was found to give different results (docs/explanation/rendering.md)."""
 
 RAMP = (0.01, 0.05, 0.2, 0.5, 0.8)
 
@@ -64,7 +64,7 @@ class Look:
         return _digest(to_json(self))[:HASH_LENGTH]
 
     def differences(self, other: Look) -> list[str]:
-        """What differs between two looks, in words; empty for equal looks."""
+        """The differences between two looks, as words; empty for equal looks."""
         towns = sorted(
             town for town in self.assets.keys() | other.assets.keys() if self.assets.get(town) != other.assets.get(town)
         )
@@ -108,7 +108,7 @@ def current_look(trained: Look, digests: dict[str, str] | None = None) -> Look:
 
 
 def read_look(value: Json) -> Look | None:
-    """A look from JSON; None where the JSON is none."""
+    """Reads a look from JSON; None if the JSON is not a look."""
     try:
         return from_json(Look, value, "look")
     except FieldError:

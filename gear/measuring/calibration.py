@@ -1,4 +1,4 @@
-"""The data that a defense is calibrated on."""
+"""The data on which a defense is calibrated."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class Calibration:
     """The calibration data of a defense.
 
     Attributes:
-        clean: dataset without patches; None where none was given.
-        patched: the same dataset with patches; None where none was given.
+        clean: dataset without patches; None if none was given.
+        patched: the same dataset with patches; None if none was given.
         on_fit_progress: called with (samples read for the first time, samples of both datasets).
     """
 
@@ -42,7 +42,7 @@ class Calibration:
         """The defense's state after calibration for a model with these cameras; None without calibration data.
 
         Raises:
-            GearError: the data do not suit the defense, or a third party's code fails.
+            GearError: the data do not fit the defense, or code of another package fails.
         """
         if self.clean is None:
             return None
@@ -84,7 +84,7 @@ class Calibration:
         return lines
 
     def note(self, measured: Dataset[Any]) -> str | None:
-        """One line where a defense is measured on scenes that it was calibrated on; otherwise None."""
+        """A note if a defense is evaluated on scenes of its calibration data; otherwise None."""
         if self.clean is None or scenes_of(self.clean) != scenes_of(measured):
             return None
         return f"{measured.root}: the defense learnt from scenes that it is measured on; other scenes are harder for it"
@@ -108,11 +108,12 @@ def opened_calibration(
         clean, patched: roots of datasets; None for none.
         models: models that the defense guards.
         defense: name of the defense.
-        flag: how the user sets one of the models' options.
+        flag: flag of the models' options, for messages.
         on_fit_progress: called with (samples that the defense has read for the first time, samples of both).
 
     Raises:
-        GearError: a dataset cannot be read or does not suit a model, both are swapped, or there is no defense.
+        GearError: a dataset cannot be read or does not fit a model, the two datasets are swapped, or there is no
+            defense.
     """
     if clean is None and patched is None:
         return NOTHING

@@ -1,4 +1,4 @@
-"""A defense in use: built from its options, its results checked against the contract at every sample."""
+"""A built defense, whose result for every sample is checked against the contract."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NUMBERS = (int, float, np.floating, np.integer)
 
 
 class CheckedDefense:
-    """A defense whose failures name its plugin."""
+    """A defense whose errors name its plugin."""
 
     def __init__(
         self,
@@ -31,7 +31,7 @@ class CheckedDefense:
         learn: Callable[[], Any] = lambda: None,
     ) -> None:
         """Args:
-        found: the defense's plugin.
+        found: plugin of the defense.
         defense: the built defense.
         model: the guarded model, for a defense that uses its feature maps or predictions.
         learn: calibrates the defense and returns its state; called once, before the first sample.
@@ -44,7 +44,9 @@ class CheckedDefense:
         return self._learn()
 
     def fit_report(self) -> FitReport | None:
-        """What the defense learnt, if it has learnt and says so; None otherwise. Starts no calibration."""
+        """The fit report of the calibrated defense; None if it is not calibrated or gives none. Does not start a
+        calibration.
+        """
         state = self.__dict__.get("state")
         return state.fit_report() if isinstance(state, ReportsFit) else None
 
@@ -65,7 +67,7 @@ class CheckedDefense:
         return result if result.score is None else dataclasses.replace(result, score=float(result.score))
 
     def _problem(self, result: Any, views: Mapping[str, UInt8Image]) -> str:
-        """The problem of a result as text; empty where there is none."""
+        """The problem of a result as text; empty if there is none."""
         if not isinstance(result, DefenseResult):
             return f"apply returns a DefenseResult, got {type(result).__name__}"
         sizes = {name: picture.shape[:2] for name, picture in views.items()}
@@ -95,7 +97,7 @@ class CheckedDefense:
 
 
 def _of_camera(given: object, name: str) -> Any:
-    """A defense's result for one camera; None where the result has no entry of that name."""
+    """The entry of a defense's result for one camera; None if it is missing."""
     return given.get(name) if isinstance(given, Mapping) else None
 
 

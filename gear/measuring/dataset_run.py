@@ -1,5 +1,5 @@
-"""Runs a model over one dataset: samples are read ahead, predicted in batches, measured and written beside the
-next batch.
+"""Runs a model over one dataset: samples are read in advance and predicted in batches; metrics and files of a batch are
+made while the next one is predicted.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from gear.readers import TorchDataset, read_ahead
 from gear.values.errors import DatasetError
 
 SampleDone = Callable[[], None]
-"""Called after every sample whose files are all written."""
+"""Called after every sample, when all of its files are written."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,14 +41,14 @@ class Row:
 def evaluate_row(
     dataset: Dataset[Any], scorer: Scorer, guarded: GuardedModel, *, batch: int, workers: int, done: SampleDone
 ) -> Row:
-    """Reads the predictions of an earlier run and makes the others.
+    """Reads the predictions of an earlier run, and makes the missing ones.
 
-    Batches are always the same samples, those that are finished already among them, and there are as many lanes as the
-    whole dataset has work for: networks round a batch otherwise than one sample, and on several threads otherwise than
-    on one, and a run that was interrupted is to end with the same bytes. Each of several lanes takes a batch from its
-    files to its metrics, since what changes hands less is done sooner; threads beside them wait for the disk. Else
-    pictures are decoded, and predictions measured and written, in threads beside the model. What waits is bounded, so
-    memory does not grow with the dataset.
+    The rounding of a network depends on the batch size and on the number of threads, and an interrupted run must end
+    with the same bytes. So batches always consist of the same samples, including finished ones, and the number of lanes
+    depends on the whole dataset. With several lanes, each lane processes its batches completely, from reading to
+    metrics, because handing them over takes time; further threads write the files. With one lane, other threads decode
+    pictures, compute metrics and write files. The number of waiting samples is bounded, so that memory does not grow
+    with the dataset.
     """
     items = TorchDataset(dataset)
     with ThreadPoolExecutor(workers) as scorers:
@@ -83,7 +83,7 @@ def _in_lanes(
     count: int,
     desk: _BoundedQueue,
 ) -> dict[int, Future[Note]]:
-    """Several batches side by side, each in one thread up to the writing of its files."""
+    """Processes several batches in parallel, each in one thread up to the writing of its files."""
 
     def worked_out(indices: Sequence[int]) -> dict[int, Future[Note]]:
         found = [items[index] for index in indices]
@@ -111,16 +111,16 @@ class _BoundedQueue:
 
     def __init__(self, pool: ThreadPoolExecutor, most: int, done: SampleDone) -> None:
         """Args:
-        pool: threads that measure and write.
-        most: jobs that may wait for one of them.
-        done: called after every sample whose files are all written.
+        pool: threads that compute metrics and write files.
+        most: number of jobs that may wait for a thread.
+        done: called after every sample, when all of its files are written.
         """
         self._pool = pool
         self._waiting, self._reporting, self._done = threading.Semaphore(most), threading.Lock(), done
         self._failed = list[BaseException]()
 
     def submit(self, job: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Adds a job, after waiting for a free place."""
+        """Adds a job; waits while the queue is full."""
         self._waiting.acquire()
         future = self._pool.submit(job, *arguments)
         future.add_done_callback(self._tell)
@@ -145,7 +145,7 @@ class _BoundedQueue:
 
 
 def _taken_up(scorer: Scorer, desk: _BoundedQueue) -> tuple[dict[int, Note], list[DatasetError]]:
-    """The samples that an earlier run finished, and a line per stored prediction that cannot be read."""
+    """The samples that an earlier run finished, and one line for each stored prediction that cannot be read."""
     futures: dict[int, Future[Note | DatasetError]] = {}
     for index in sorted(scorer.kept()):
         futures[index] = desk.submit(scorer.again, index)

@@ -35,10 +35,10 @@ class Guard:
         calibration: str | Path | None = None,
         calibration_patched: str | Path | None = None,
     ) -> Guard | None:
-        """From the keywords of a verb; None without a defense.
+        """Makes a guard from the arguments of a verb; None without a defense.
 
         Raises:
-            GearError: options or calibration data are given, and no defense.
+            GearError: options or calibration data are given without a defense.
         """
         options = tuple(settings)
         if defense:
@@ -79,14 +79,15 @@ def open_guard(
     """Finds the defense, opens its calibration data, and checks that both suit the models and the task.
 
     Args:
-        guard: what was asked for; None for no defense.
-        models: that the defense guards, one after the other.
-        task: of the data.
-        flag: how the user sets one of the models' options.
+        guard: the request; None for no defense.
+        models: models that the defense guards, one after the other.
+        task: task of the data.
+        flag: flag of the models' options, for messages.
         on_fit_progress: called with (calibration samples that the defense has read, their number).
 
     Raises:
-        GearError: there is no such defense, an option does not fit, the data cannot be read, or it does not suit.
+        GearError: there is no such defense, an option does not fit, the data cannot be read, or the defense does not
+            fit the models or the task.
     """
     if guard is None:
         return UNGUARDED

@@ -1,4 +1,4 @@
-"""A model guarded by its defense: pictures in, predictions and their cost out."""
+"""A model guarded by a defense: predicts from pictures, and measures the time."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ from gear.values.errors import PluginError
 from gear.values.rng import derive_rng
 
 SMALL_PX, MOST_TOGETHER = 1_400_000, 4
-"""More pixels at a time make no network of ours quicker on a CPU, and several slower."""
+"""Limits of a default batch: with more pixels per batch none of gear's networks is faster on a CPU, and some are
+slower.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -41,7 +43,8 @@ class Answer:
 
     Attributes:
         prediction: prediction in the task's format.
-        model_s, defense_s: wall time in seconds; a batch's time is shared among its samples and the batches beside it.
+        model_s, defense_s: wall time in seconds; the time of a batch is divided by its samples and by the number of
+            parallel batches.
         mask: the defense's patch mask by camera name, (H, W) float32 in 0..1.
         score: the defense's score for "the sample shows a patch".
     """
@@ -54,7 +57,7 @@ class Answer:
 
 
 class GuardedModel:
-    """A built model with its defense, which is calibrated where it needs that.
+    """A built model with its defense, which is calibrated if it needs calibration.
 
     Attributes:
         plugin: plugin of the model.
@@ -70,10 +73,10 @@ class GuardedModel:
         *,
         seed: int = 0,
     ) -> None:
-        """Builds and wraps; a defense learns before the first sample.
+        """Builds the model, and wraps it by its defense. Calibration is done before the first sample.
 
         Raises:
-            GearError: options or weights do not fit, or a third party's code fails.
+            GearError: options or weights do not fit, or code of another package fails.
         """
         spec = model.found.spec
         assert isinstance(spec, ModelSpec)
@@ -94,7 +97,7 @@ class GuardedModel:
         self._at_work, self._counting = 0, threading.Lock()
 
     def fit_report(self) -> FitReport | None:
-        """What the defense learnt in this run, if it learnt and says so."""
+        """The fit report of the defense, if it was calibrated in this run and gives one."""
         return None if self._guard is None else self._guard.fit_report()
 
     def _guarded(self, defense: Chosen, bare: Model, calibration: Calibration) -> tuple[CheckedDefense, Model]:
@@ -122,7 +125,7 @@ class GuardedModel:
         """Cleans and predicts a batch of samples.
 
         Raises:
-            PluginError: a third party's model or defense fails.
+            PluginError: a model or defense of another package fails.
         """
         if self._guard is not None:
             _ = self._guard.state  # learns now, not on the first sample's time

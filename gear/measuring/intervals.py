@@ -1,17 +1,16 @@
-"""Intervals of 95 % by the jackknife: how far a metric moves when one street is left out.
+"""95 % confidence intervals by the jackknife: the change of a metric when one street is left out.
 
-A metric of a dataset is computed again without each cluster of samples in turn (samples of one street are a cluster,
-since they are not independent). The spread of these replicates gives the standard error (Tukey, 1958; Efron and
-Stein, Annals of Statistics 1981), and Student's t the width, with the degrees of freedom that suit replicates of
-unequal weight (Satterthwaite, Biometrics 1946).
+A metric is computed without each cluster of samples in turn; the samples of one street are a cluster, because they are
+not independent. The spread of these replicates gives the standard error (Tukey, 1958; Efron and Stein, Annals of
+Statistics 1981). Student's t gives the width, with degrees of freedom for replicates of unequal weight (Satterthwaite,
+Biometrics 1946).
 
-Why no bootstrap: a mean over classes, such as mIoU or mAP, leaves out classes that no drawn sample shows. Resamples
-show fewer classes than the dataset does, so their percentiles are biased, and they are too narrow for few streets. In
-simulations with a known truth (docs/results/intervals.md, `benchmarks/coverage.py`) percentiles of 95 % cover 80 to
-94 % for mIoU, BCa 75 to 93 %, and these intervals 95 to 97 % for mIoU and 92 to 97 % for other metrics.
+The bootstrap is not used, because a mean over classes, such as mIoU or mAP, leaves out classes that no drawn sample
+shows. Resamples show fewer classes than the dataset, so bootstrap percentiles are biased, and they are too narrow for
+few streets. In simulations with a known truth (docs/results/intervals.md, `benchmarks/coverage.py`) percentiles of 95 %
+cover 80 to 94 % for mIoU, BCa 75 to 93 %, and these intervals 95 to 97 % for mIoU and 92 to 97 % for other metrics.
 
-What such an interval is of: the metric over the classes that the dataset shows. A class that is in no sample cannot be
-known.
+The interval is for the metric over the classes that the dataset shows; nothing is known about other classes.
 """
 
 from __future__ import annotations
@@ -25,18 +24,20 @@ import numpy.typing as npt
 from gear.contracts.evaluation import Draws
 
 LEFT_OUT = -1
-"""Fills the rows of `leave_one_out`, in place of a sample's number."""
+"""Value with which the rows of `leave_one_out` are padded."""
 
 MOST_GROUPS = 500
-"""More clusters than this are left out several at a time (delete-a-group jackknife), which bounds the cost."""
+"""Largest number of replicates. If there are more clusters, several are left out at a time (delete-a-group
+jackknife).
+"""
 
 CONFIDENCE = 0.95
 
 REAL = (-math.inf, math.inf)
-"""Least and largest value of a metric that can be any number."""
+"""Smallest and largest value of a metric without bounds."""
 
 NEGLIGIBLE = 1e-12
-"""Replicates that differ by less than this share of their size differ by rounding alone."""
+"""Largest relative difference of replicates that is attributed to rounding."""
 
 Values = npt.NDArray[np.float64]
 Interval = tuple[float, float]
@@ -49,14 +50,14 @@ def numbered(clusters: Sequence[Hashable]) -> npt.NDArray[np.int64]:
 
 
 def leave_one_out(clusters: Sequence[Hashable]) -> Draws:
-    """(C, N) numbers of samples: row c holds those outside cluster c, filled up with `LEFT_OUT`.
+    """(C, N) indices of samples: row c holds those outside cluster c, padded with `LEFT_OUT`.
 
     Args:
-        clusters: of each of the N samples, the cluster that it belongs to.
+        clusters: the cluster of each of the N samples.
 
     Returns:
-        One row for each of C clusters, or for each of `MOST_GROUPS` groups of clusters; no row for fewer than two
-        clusters, since one cluster does not show how far others lie from it.
+        One row per cluster, or per group of clusters if there are more than `MOST_GROUPS`; no rows for fewer than two
+        clusters, whose spread is unknown.
     """
     owners = numbered(clusters) % MOST_GROUPS
     count = int(owners.max(initial=-1)) + 1
@@ -68,18 +69,17 @@ def leave_one_out(clusters: Sequence[Hashable]) -> Draws:
 
 
 def jackknife_interval(value: float, replicates: Values, limits: Interval = REAL) -> Interval | None:
-    """The interval of 95 % around a metric.
+    """The 95 % interval of a metric.
 
-    Where all replicates are equal, the interval is the value alone: no sample differs from another.
+    If all replicates are equal, both ends are the value itself.
 
     Args:
         value: the metric over all samples.
         replicates: (C,) the metric without each cluster in turn.
-        limits: least and largest value that the metric can have; the interval is cut there.
+        limits: smallest and largest possible value of the metric, to which the interval is clipped.
 
     Returns:
-        Lower and upper end; None for fewer than two clusters, or where the metric is not known without one of them, so
-        that it rests on that cluster alone.
+        Lower and upper end; None for fewer than two clusters, or if the metric is undefined without one of them.
     """
     count = len(replicates)
     if count < 2 or not math.isfinite(value) or not np.isfinite(replicates).all():
@@ -94,10 +94,11 @@ def jackknife_interval(value: float, replicates: Values, limits: Interval = REAL
 
 
 def _degrees_of_freedom(squares: Values) -> float:
-    """Satterthwaite's, from (C,) squared deviations d² of replicates, at most C - 1.
+    """Satterthwaite's degrees of freedom from (C,) squared deviations d² of replicates; at most C - 1.
 
-    The variance is the sum of d²; its own variance is, for normal d, two thirds of the sum of d⁴. So the degrees,
-    2 variance² / Var(variance), are 3 (sum of d²)² / (sum of d⁴); 3 fewer, since deviations from a mean are not free.
+    The variance is the sum of d²; its own variance is, for normal d, two thirds of the sum of d⁴. So the degrees of
+    freedom, 2 variance² / Var(variance), are 3 (sum of d²)² / (sum of d⁴), minus 3 because deviations from a mean are
+    not independent.
     """
     effective = float(squares.sum() ** 2 / np.square(squares).sum())
     return min(len(squares) - 1.0, max(1.0, 3 * (effective - 1)))
@@ -110,11 +111,11 @@ def _students_t(degrees: float) -> float:
 
 
 def separated_interval(value: float, clusters: int) -> Interval:
-    """The interval around an area under the ROC curve of 0 or 1, where every replicate is the same.
+    """The interval of an area under the ROC curve of 0 or 1, for which all replicates are equal.
 
-    Samples that happen to be separated do not show that all are. The ends solve |A - a| = z sqrt(V(A)) with Hanley and
-    McNeil's variance, as many samples on both sides as there are clusters (Newcombe, Statistics in Medicine 2006,
-    method 5).
+    The scores of these samples are separated, but those of other samples may not be. The ends solve |A - a| = z
+    sqrt(V(A)) with Hanley and McNeil's variance, in which both sample sizes are the number of clusters (Newcombe,
+    Statistics in Medicine 2006, method 5).
     """
     from scipy import optimize, stats
 

@@ -14,7 +14,7 @@ def said_of(plan: Plan, given: Any, method: str) -> dict[str, float]:
     """The metrics that `method` of an evaluator returned, by name; `plan` is the dataset's.
 
     Raises:
-        PluginError: they are no mapping of names to numbers; names the task's plugin.
+        PluginError: the return value is not a mapping of names to numbers; the error names the task's plugin.
     """
     try:
         return check_metrics(given, method)

@@ -1,4 +1,4 @@
-"""Notes on datasets, each said once."""
+"""Notes on datasets, with equal notes combined."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 
 def grouped(notes: Iterable[str | None]) -> list[str]:
-    """Notes of the form `ROOT: text`, with one line per text, which names the first root and counts the others."""
+    """Combines notes of the form `ROOT: text` to one line per text, with the first root and the number of others."""
     roots: dict[str, dict[str, None]] = {}
     for note in notes:
         if note is not None:

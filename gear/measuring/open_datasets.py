@@ -19,12 +19,12 @@ def opened(paths: Sequence[str | Path], split: str | None, model: Chosen, report
 
     Args:
         paths: roots, folders of roots, or `DIR:SPLIT`.
-        split: split of paths that name none; None where each has only one.
-        model: model that must suit the datasets.
+        split: split for paths that name none; None if each has only one.
+        model: model that must fit the datasets.
         reports: names of reports that must be available for them.
 
     Raises:
-        GearError: there is no dataset, one is empty or of another task, or the model or a report does not suit it.
+        GearError: there is no dataset, one is empty or of another task, or the model or a report does not fit it.
     """
     if not paths:
         raise GearError("there is nothing to evaluate on; give at least one dataset")

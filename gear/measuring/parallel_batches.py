@@ -1,4 +1,4 @@
-"""Several batches through one network at a time: on a CPU faster than one batch on all cores."""
+"""Runs several batches through one network in parallel, which is faster on a CPU than one batch on all cores."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 Submit = Callable[..., "Future[Any]"]
-"""Takes a function and its arguments; gives what will come of it."""
+"""A function that takes another function with its arguments and returns a future."""
 
 MOST = 4
-"""Each lane holds the activations of its batch, so more cores give each lane more threads instead."""
+"""Largest number of lanes, because each lane holds the activations of its batch; with more cores each lane gets more
+threads.
+"""
 
 
 def lanes_of(model: Any) -> int:
@@ -31,7 +33,7 @@ def lanes_of(model: Any) -> int:
 def lanes(count: int) -> Iterator[Submit]:
     """Runs submitted functions in a number of threads that share torch's cores.
 
-    Output printed meanwhile goes to stderr, as everywhere where a plugin runs.
+    Output that is printed meanwhile is redirected to stderr, as always when a plugin runs.
     """
     import torch
 

@@ -1,4 +1,4 @@
-"""The true patch area of a sample, and how well a defense's mask agrees with it."""
+"""The true patch area of a sample, and its agreement with a defense's mask."""
 
 from __future__ import annotations
 
@@ -15,13 +15,17 @@ from gear.formats import rle
 Mask = npt.NDArray[np.bool_]
 
 MARGIN_PX = 5
-"""What lies this near to the patch is left out with it: its light and the network's smoothing reach that far."""
+"""Distance in pixels from the patch up to which pixels are excluded with it, because of the patch's light and the
+network's smoothing.
+"""
 
 MASK_METRICS = ("mask_iou", "mask_precision", "mask_recall", "mask_area")
-"""The last one is the share of the pictures that a mask covers; the others compare it with the patch."""
+"""Names of the metrics of masks. The last one is the share of the pictures that a mask covers; the others compare the
+mask with the patch.
+"""
 
 SURE = 0.5
-"""A soft mask counts as the patch from here on."""
+"""Threshold at which a soft mask is binarised."""
 
 
 def patch_masks(sample: Sample) -> dict[str, Mask]:

@@ -16,7 +16,7 @@ def check_patches(patches: Any, surfaces: int, found: PluginEntry) -> None:
     """Checks that an attack returned one patch per surface.
 
     Raises:
-        PluginError: it did not; names the attack.
+        PluginError: the attack returned something else; the error names the attack.
     """
     names = [f"patch_{n}" for n in range(surfaces)]
     if not isinstance(patches, tuple) or not all(isinstance(patch, Patch) for patch in patches):

@@ -1,4 +1,4 @@
-"""Looks up models and defenses by name, and checks that they suit the data, before anything is loaded."""
+"""Looks up models and defenses by name, and checks that they fit the data, before anything is loaded."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from gear.values.errors import GearError
 from gear.values.serial import Json
 
 CAMERA = ("hfov_deg", "baseline_m")
-"""Options that a model shares with its task, because pictures do not say them."""
+"""Options that a model and its task must have in common, because pictures do not contain them."""
 
 OWN_PINHOLE = ("focal_px", "focal_y_px", "principal_px")
-"""Options of tasks for pinholes that `hfov_deg` does not describe."""
+"""Options of tasks for cameras that `hfov_deg` does not describe."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chosen:
-    """A plugin with the options that it will be built with."""
+    """A plugin with the options with which it is built."""
 
     found: PluginEntry
     options: Node
@@ -40,12 +40,12 @@ class Chosen:
 
 
 def chosen_model(name: str, settings: Iterable[str], flag: str = "--set") -> Chosen:
-    """A model by name.
+    """Looks up a model by name.
 
     Args:
-        name: of the plugin.
+        name: name of the plugin.
         settings: `KEY=VALUE` texts.
-        flag: that the settings were given with; errors name it.
+        flag: flag with which the settings were given, for messages.
 
     Raises:
         GearError: there is no such model, or an option does not fit.
@@ -72,7 +72,7 @@ def chosen_defense(name: str | None, settings: Iterable[str]) -> Chosen | None:
 
 
 def check_model(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> None:
-    """Checks that the model can do the dataset's task and sees its cameras.
+    """Checks that the model supports the dataset's task and cameras.
 
     Args:
         model: the model with its options.
@@ -80,7 +80,7 @@ def check_model(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> N
         flag: flag of the model's options, for messages.
 
     Raises:
-        GearError: it cannot.
+        GearError: the model does not support the task or a camera.
     """
     spec, task = model.found.spec, dataset.plan.task["name"]
     assert isinstance(spec, ModelSpec)
@@ -132,7 +132,8 @@ def check_optics(model: Chosen, options: Json, collected: str, flag: str) -> Non
 
 
 def check_defense(defense: Chosen, model: Chosen, task: str, *, is_calibrated: bool) -> None:
-    """Checks that the defense is for the task, finds its feature maps, and has the calibration data that it needs.
+    """Checks that the defense supports the task, that the model has its feature maps, and that required calibration
+    data are given.
 
     Raises:
         GearError: one of these does not hold.

@@ -1,8 +1,8 @@
-"""What an evaluation measures on a dataset: the task's own metric, its reports, and metrics of plugins.
+"""The reports of an evaluation: the task's own metric, further reports of the task, and metrics of plugins.
 
-A report is asked for by name. `outside_patch` is the task's own metric with the ground truth on and next to the patch
-left out; the task may have reports of its own, such as `reference`; any other name is that of a metric plugin
-(`gear_metrics`), with options after a colon: `boundary_iou:width_share=0.01`.
+A report is requested by name. `outside_patch` is the task's own metric without the ground truth on and next to the
+patch. A task may have further reports, such as `reference`. Any other name is that of a metric plugin (`gear_metrics`),
+with options after a colon: `boundary_iou:width_share=0.01`.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ TASK = "task"
 OUTSIDE_PATCH = "outside_patch"
 
 NEXT_OPTION = re.compile(r",(?=[\w.]+=)")
-"""The comma before another `KEY=VALUE`; commas in a value stay."""
+"""Pattern of a comma that is followed by another `KEY=VALUE`; other commas belong to a value."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Report:
-    """One metric of an evaluation.
+    """One report of an evaluation.
 
     Attributes:
-        name: as the user asked for it.
-        make: a fresh, empty evaluator.
-        plan: of the dataset that is measured.
+        name: name as given by the user.
+        make: function that returns a new, empty evaluator.
+        plan: plan of the evaluated dataset.
         plugin: the metric plugin with its options; None for the task's own metric and reports.
     """
 
@@ -55,10 +55,10 @@ class Report:
     plugin: Chosen | None = None
 
     def checked(self, given: Any, method: str) -> dict[str, float]:
-        """Metrics by name, as `method` of the evaluator returned them.
+        """Checks the metrics that `method` of the evaluator returned.
 
         Raises:
-            PluginError: they are no mapping of names to numbers; says which plugin's they are.
+            PluginError: the return value is not a mapping of names to numbers; the error names the plugin.
         """
         try:
             return check_metrics(given, method)
@@ -68,7 +68,7 @@ class Report:
 
     @contextlib.contextmanager
     def blamed(self, method: str) -> Iterator[None]:
-        """Around an evaluator's code, in any thread: what a third party's metric raises says which plugin's it is.
+        """A context for an evaluator's code, in any thread: errors of another package's metric name its plugin.
 
         Raises:
             PluginError: the evaluator of another package's metric raised something other than a `GearError`.
@@ -83,7 +83,7 @@ class Report:
             raise plugin_error(self.plugin.found, f"{method} of its evaluator", one_line(error)) from error
 
     def facts(self) -> Json:
-        """What a plugin's metric is, for the results; None for the task's own."""
+        """Facts about a plugin's metric for the results; None for the task's own reports."""
         if self.plugin is None:
             return None
         spec = self.plugin.found.spec
@@ -98,10 +98,10 @@ def task_report(dataset: Dataset[Any]) -> Report:
 
 
 def reports_of(names: Iterable[str], dataset: Dataset[Any]) -> dict[str, Report]:
-    """The task's own metric and the reports that are asked for, by name.
+    """The task's own metric and the requested reports, by name.
 
     Raises:
-        UnknownNameError: neither the task nor a plugin has one of such a name.
+        UnknownNameError: neither the task nor a plugin has a report of this name.
         GearError: a metric is for other tasks, or an option of it does not fit.
     """
     found = {TASK: task_report(dataset)}

@@ -1,4 +1,4 @@
-"""Scores predictions: metrics, result files, and a note per sample that marks it as finished."""
+"""Scores predictions: computes metrics, writes result files, and writes a note per sample that marks it as finished."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ KEPT: Any = {
     "facts": Any, "sha256": dict[str, str], "model_s": float, "defense_s": float, "score": float | None,
     "mask": dict[str, float | None] | None,
 }  # fmt: skip
-"""What of a note is read again."""
+"""Keys of a note that are read again."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -59,7 +59,7 @@ class Note:
     sha256: Mapping[str, str]
 
     def as_json(self) -> Json:
-        """As written beside the predictions."""
+        """The note as JSON, which is written next to the predictions."""
         return {
             "index": self.index,
             "metrics": {name: known_json(one) for name, one in self.metrics.items()},
@@ -94,7 +94,7 @@ class Scorer:
         dataset: the samples.
         root: folder of the evaluation.
         folder: name of this dataset's folder in it.
-        reports: names of further metrics.
+        reports: names of further reports.
         model: plugin of the model that predicts.
         """
         self._dataset, self._root, self._folder, self._model = dataset, root, folder, model
@@ -103,7 +103,7 @@ class Scorer:
         self.reports: dict[str, Report] = reports_of(reports, dataset)
 
     def kept(self) -> set[int]:
-        """The finished samples, whose predictions are not made again."""
+        """Indices of the finished samples, whose predictions are not made again."""
         folder = inside(self._root, f"{self._folder}/samples")
         if self._keeper is None or not folder.is_dir():
             return set()
@@ -142,7 +142,7 @@ class Scorer:
         return self.write(self.measured(index, sample, answer))
 
     def again(self, index: int) -> Note | DatasetError:
-        """Measures the stored prediction of an earlier run; or returns the problem of its note or its files.
+        """Measures the stored prediction of an earlier run, or returns the problem with its note or files as text.
 
         Raises:
             DatasetError: the sample itself cannot be read.
@@ -218,7 +218,7 @@ def _read_note(path: Path) -> dict[str, Any]:
     """The note of a sample, as JSON with checked types.
 
     Raises:
-        DatasetError: the file is no note that gear wrote.
+        DatasetError: the file is not a note that gear wrote.
     """
     there = load_json(path)
     if not isinstance(there, dict) or not there.keys() >= KEPT.keys():

@@ -1,5 +1,4 @@
-"""Notes on pictures whose size is not the task's default, on which a network sees objects at another size than in
-training.
+"""Notes on pictures whose size is not the task's default, in which objects have another size than in training.
 
 Weights record the input scale for pictures of the task's default size. A network applies this scale to any picture, so
 objects in smaller pictures become smaller still. Weights without a record were trained on the default size, at the
@@ -24,13 +23,13 @@ from gear.values.errors import ConfigError
 
 
 def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str | None:
-    """One line where the dataset's pictures are not of the size that the weights' share belongs to; None where all is
-    well, nothing is known, or the user said the share.
+    """A note if the dataset's pictures have another size than the input scale of the weights is for; None if they fit,
+    if nothing is known, or if the user gave the scale.
 
     Args:
-        model: with its options.
-        dataset: whose pictures it is shown.
-        flag: how the user sets one of the model's options.
+        model: the model with its options.
+        dataset: dataset whose pictures the model predicts from.
+        flag: flag of the model's options, for messages.
     """
     spec = model.found.spec
     assert isinstance(spec, ModelSpec)

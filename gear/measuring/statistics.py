@@ -1,6 +1,6 @@
-"""How sure a metric of a dataset is: intervals by the jackknife, and a permutation test for pairs of samples.
+"""Uncertainty of metrics: intervals by the jackknife, and a permutation test for pairs of samples.
 
-Samples that show the same street are a cluster: they are left out, and the signs of their differences are flipped,
+Samples of the same street are a cluster: they are left out together, and the signs of their differences are flipped
 together.
 """
 
@@ -28,13 +28,13 @@ from gear.measuring.intervals import (
 from gear.values.rng import derive_rng
 
 FLIPS = 9_999
-"""Sign patterns that are drawn where there are more than can all be tried: the smallest p is 0.0001."""
+"""Number of sign patterns that are drawn if there are too many to try all; the smallest p is then 0.0001."""
 
 FLIPS_AT_ONCE = 1_000
-"""Sign patterns that are tried together, which bounds the memory of a test."""
+"""Number of sign patterns that are processed at a time, which bounds the memory of a test."""
 
 ROUNDING = 1e-9
-"""Sums that differ by less than this share of their terms' sizes are equal."""
+"""Relative difference below which two sums count as equal."""
 
 AnyEvaluator = Evaluator[Any, Any]
 
@@ -44,10 +44,10 @@ class Metrics:
     """The metrics of one report over one dataset.
 
     Attributes:
-        overall: over all samples, by name.
-        replicates: (C,) without each cluster in turn, by name, for the metrics that have any.
-        ceilings: what perfect predictions of the same samples would get, where that is less than 1.
-        limits: least and largest value that a metric can have, where the evaluator says so.
+        overall: metrics over all samples, by name.
+        replicates: (C,) values without each cluster in turn, by name, for the metrics that have intervals.
+        ceilings: metrics that perfect predictions of the same samples would reach, for those below 1.
+        limits: smallest and largest possible value of a metric, if the evaluator states them.
     """
 
     overall: Mapping[str, float]
@@ -56,14 +56,14 @@ class Metrics:
     limits: Mapping[str, Interval] = field(default_factory=dict)
 
     def interval(self, name: str) -> Interval | None:
-        """Ends of the 95 % interval, or None where there is none (`jackknife_interval`)."""
+        """Ends of the 95 % interval by `jackknife_interval`; None if it is undefined."""
         if name not in self.replicates:
             return None
         return jackknife_interval(self.overall[name], self.replicates[name], self.limits.get(name, REAL))
 
 
 def difference_interval(one: Metrics, other: Metrics, name: str) -> Interval | None:
-    """The 95 % interval of a metric of one dataset minus that of its twin.
+    """The 95 % interval of the difference of a metric between a dataset and its twin.
 
     The same cluster is left out of both, so the interval is that of the paired difference.
     """
@@ -82,13 +82,13 @@ def gather(
     draws: Draws,
     held: Callable[[Any], dict[str, float]] = dict,
 ) -> Metrics:
-    """Metrics over evaluators that have seen one sample each.
+    """Metrics over evaluators that have gathered one sample each.
 
     Args:
-        fresh: makes an empty evaluator.
+        fresh: returns a new, empty evaluator.
         parts: one evaluator for each sample, in order.
-        draws: (R, N) numbers of samples, filled up with `LEFT_OUT`; each row is measured as a dataset of its own.
-        held: checks what an evaluator says of all parts against its contract.
+        draws: (R, N) indices of samples, padded with `LEFT_OUT`; metrics are computed for each row.
+        held: checks the metrics of an evaluator against its contract.
     """
     whole = fresh()
     for part in parts:
@@ -114,7 +114,7 @@ def _replicates(
     draws: Draws,
     names: Iterable[str],
 ) -> Mapping[str, Values]:
-    """(R,) metrics over each draw, by the quickest way that the evaluator of all parts has."""
+    """(R,) metrics over each draw, by the fastest method that the evaluator supports."""
     if isinstance(whole, Resampled):
         return whole.resampled(draws)
     if isinstance(whole, Additive):
@@ -129,7 +129,7 @@ def _replicates(
 
 
 def _added(parts: Sequence[Any], draws: Draws) -> dict[str, npt.NDArray[Any]]:
-    """The sums over each draw: how often it has a sample, times the sample's own."""
+    """The sums over each draw: the sums of each sample times its frequency in the draw."""
     often = np.zeros((len(draws), len(parts)))
     np.add.at(often, (np.arange(len(draws))[:, None], draws), 1)
     every = [part.totals() for part in parts]
@@ -139,7 +139,9 @@ def _added(parts: Sequence[Any], draws: Draws) -> dict[str, npt.NDArray[Any]]:
 
 
 def auroc(positives: Sequence[float], negatives: Sequence[float]) -> float:
-    """Area under the ROC curve: how often a positive's score is above a negative's, ties half; NaN without either."""
+    """Area under the ROC curve: the share of pairs in which the positive's score is above the negative's, where ties
+    count half; NaN without positives or negatives.
+    """
     if not len(positives) or not len(negatives):
         return float("nan")
     ranked = np.sort(np.asarray(negatives))
@@ -151,11 +153,11 @@ def auroc(positives: Sequence[float], negatives: Sequence[float]) -> float:
 def auroc_interval(
     positives: Sequence[float], negatives: Sequence[float], clusters: Sequence[Hashable]
 ) -> Interval | None:
-    """The 95 % interval of the area over pairs of twins, of which one of a cluster is left out with all of the cluster.
+    """The 95 % interval of the area under the ROC curve over pairs of twins, by the jackknife over clusters of pairs.
 
     Args:
         positives, negatives: (N,) scores of the pairs.
-        clusters: of each pair, the cluster that it belongs to.
+        clusters: the cluster of each pair.
     """
     high, low = np.asarray(positives, np.float64), np.asarray(negatives, np.float64)
     kept = [row[row != LEFT_OUT] for row in leave_one_out(clusters)]
@@ -168,7 +170,7 @@ def auroc_interval(
 def clustered(differences: Values, clusters: Sequence[Hashable]) -> Values:
     """(C, F) sums over the clusters of (N, F) differences, for `paired_p`: the signs of one cluster flip together.
 
-    NaN where no difference of a cluster is known; what only rounding keeps from 0 is 0.
+    NaN if all differences of a cluster are NaN. Sums that differ from 0 only by rounding are 0.
     """
     owners = numbered(clusters)
     known = np.where(np.isnan(differences), 0.0, differences)
@@ -179,21 +181,21 @@ def clustered(differences: Values, clusters: Sequence[Hashable]) -> Values:
 
 
 def paired_p(differences: Values, seed: int) -> Values:
-    """Two-sided p of the mean of paired differences, by flipping their signs.
+    """Two-sided p-value of the mean of paired differences, by a sign-flip permutation test.
 
-    Were it all the same which of two twins a sample is of, each difference would be as likely with the other sign. p is
-    the share of all sign patterns that bring the mean at least as far from 0 as it is (Fisher, The Design of
-    Experiments, 1935, sec. 21). Up to 13 pairs every pattern is tried: p is exact. Beyond, `FLIPS` are drawn, and the
-    pattern that was found is counted with them, so that p is never 0 and never too small (Phipson and Smyth 2010).
-    Unlike Wilcoxon's test this looks at the mean, which is what is reported, and has no trouble with ties.
+    Under the null hypothesis each difference is equally likely with either sign. p is the share of all sign patterns
+    for which the mean is at least as far from 0 as the observed one (Fisher, The Design of Experiments, 1935, sec. 21).
+    With up to 13 pairs all patterns are tried and p is exact. With more, `FLIPS` patterns are drawn and the observed
+    pattern is counted with them, so that p is never too small (Phipson and Smyth, 2010). Unlike Wilcoxon's test it
+    tests the mean, which is reported, and handles ties.
 
     Args:
-        differences: (N, F), one column per metric; NaN where a sample has none. Where samples are not independent, the
-            sums over clusters (`clustered`).
-        seed: of the drawn patterns.
+        differences: (N, F) differences, one column per metric; NaN if a sample has none. If samples are not
+            independent, sums over clusters (`clustered`).
+        seed: seed of the drawn patterns.
 
     Returns:
-        (F,) in 0..1; NaN where no difference is known.
+        (F,) p-values in 0..1; NaN if all differences are NaN.
     """
     is_known = ~np.isnan(differences)
     pairs = is_known.sum(axis=0)
@@ -206,7 +208,9 @@ def paired_p(differences: Values, seed: int) -> Values:
 
 
 def _as_far(known: Values, seed: int) -> Values:
-    """(F,) shares of the sign patterns of (N, F) numbers that bring their sums at least as far from 0 as they are."""
+    """(F,) shares of the sign patterns of (N, F) numbers for which the sums are at least as far from 0 as the observed
+    ones.
+    """
     least = np.abs(known.sum(axis=0)) - ROUNDING * np.abs(known).sum(axis=0)
     as_far, tried = np.zeros(known.shape[1]), 0
     for signs in _sign_patterns(len(known), seed):
@@ -216,12 +220,12 @@ def _as_far(known: Values, seed: int) -> Values:
 
 
 def _is_exact(count: int) -> bool:
-    """Whether so many pairs have few enough sign patterns to try them all."""
+    """Whether a number of pairs is small enough for all sign patterns to be tried."""
     return count < FLIPS.bit_length()
 
 
 def _sign_patterns(count: int, seed: int) -> Iterator[Values]:
-    """Blocks of (R, count) of -1 and 1: all patterns, or the one without a flip and `FLIPS` drawn ones."""
+    """Yields blocks of (R, count) values -1 and 1: all patterns, or the one without a flip and `FLIPS` drawn ones."""
     if _is_exact(count):
         flipped = np.arange(2**count)[:, None] >> np.arange(count) & 1
         yield np.asarray(1 - 2 * flipped, np.float64)

@@ -6,25 +6,25 @@ import io
 from collections.abc import Sequence
 
 WIDTH = 100
-"""Characters a line, where the output is no terminal."""
+"""Width of a line in characters, if the output is not a terminal."""
 
 GAP = 2
 """Spaces between columns."""
 
 SHORTEST = 20
-"""Characters that the last column of a list has at least."""
+"""Smallest width of the last column of a list in characters."""
 
 
 def text_table(
     head: Sequence[str], rows: Sequence[Sequence[str]], *, width: int = WIDTH, wrap: bool = False
 ) -> list[str]:
-    """A table for lists of things with a description in the last column.
+    """A table for lists with a description in the last column.
 
     Args:
         head: titles of the columns.
-        rows: cells, one sequence as long as `head` per row. The last column takes the room that the others leave.
-        width: most characters of a line, where the other columns leave room for `SHORTEST` of the last one.
-        wrap: continue a long description on the next line instead of cutting it.
+        rows: cells, one sequence as long as `head` per row. The last column takes the remaining width.
+        width: largest number of characters per line, unless the last column would be narrower than `SHORTEST`.
+        wrap: whether long descriptions are continued on the next line instead of cut.
 
     Returns:
         Lines without trailing spaces.
@@ -50,8 +50,8 @@ def number_table(cells: Sequence[Sequence[str]], *, width: int = WIDTH) -> list[
     """A table of numbers that is never wrapped: columns that do not fit follow in further blocks.
 
     Args:
-        cells: the titles, then the rows, all of one length. The first column names the row and begins each block.
-        width: most characters of a line; a single column may be wider.
+        cells: the titles and the rows, all of one length. The first column names the row and is repeated in each block.
+        width: largest number of characters per line; a single column may be wider.
 
     Returns:
         Lines without trailing spaces; blocks are separated by an empty line.

@@ -28,7 +28,7 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
 
     Args:
         path: root of the dataset.
-        split: its name; may be left out where there is only one.
+        split: its name; optional if there is only one.
 
     Returns:
         A sequence of samples, decoded one by one: `dataset[0].images["left"]`, `.record`, `.surfaces` and

@@ -1,4 +1,4 @@
-"""Readers: datasets of any task as torch wants them.
+"""Readers: datasets of any task as torch datasets and batches.
 
 They need torch; `gear.plugins.datasets` opens a dataset without it.
 """

@@ -1,1 +1,1 @@
-"""How verbs show that they work: bars on a terminal and in notebooks, plain lines everywhere else."""
+"""Progress of the verbs: bars in terminals and notebooks, plain lines elsewhere."""

@@ -1,7 +1,7 @@
-"""The display of a running verb: bars where somebody looks at a terminal or a notebook, plain lines in logs.
+"""The progress display of a verb: bars in terminals and notebooks, plain lines in logs.
 
-Bars are tqdm's. Without a terminal a thread writes one line at least every `EVERY_S` seconds, also while a single step
-takes longer than that, so that a log always says whether the job works and how long it still takes.
+Bars are drawn by tqdm. Without a terminal a thread writes one line every `EVERY_S` seconds, even during a longer step,
+so that a log always shows the state and the remaining time of the job.
 """
 
 from __future__ import annotations
@@ -18,14 +18,16 @@ from gear.reporting.pace import Pace, duration_text
 from gear.values.progress import Callbacks
 
 EVERY_S = 30.0
-"""Seconds between two plain lines; twice as often as once a minute, for threads that wait for the interpreter."""
+"""Seconds between two plain lines: half a minute, so that there is a line every minute even if the thread has to wait
+for the interpreter.
+"""
 
 FIT_UNIT = "picture"
-"""What a defense that learns counts."""
+"""Unit of the progress of a calibration."""
 
 
 class _Backend(Protocol):
-    """Bars or lines."""
+    """The protocol of both kinds of display: bars and lines."""
 
     def update(self, channel: str, unit: str, done: int, total: int) -> None: ...
 
@@ -42,14 +44,14 @@ class Display:
     """Shows progress and warnings of one verb on stderr; a context manager.
 
     Attributes:
-        callbacks: to be given to the verb.
+        callbacks: callbacks for the verb.
     """
 
     def __init__(self, verb: str, *, unit: str = "sample", python: bool = False) -> None:
         """Args:
-        verb: its name, with which plain lines begin.
-        unit: what `on_progress` counts, in the singular.
-        python: whether a script asked for it, perhaps in a notebook, and not the command line.
+        verb: name of the verb, with which plain lines begin.
+        unit: unit that `on_progress` counts, in the singular.
+        python: whether a Python call, perhaps in a notebook, shows the progress, and not the command line.
         """
         self._unit = unit
         has_bars = sys.stderr.isatty() or (python and _is_notebook())
@@ -65,15 +67,15 @@ class Display:
         self._backend.write(line)
 
     def detail(self, text: str) -> None:
-        """Shows a few words beside the progress, such as the loss."""
+        """Shows a few words next to the progress, such as the loss."""
         self._backend.detail(text)
 
     def begin(self, title: str, unit: str = "sample") -> None:
         """Begins the next step of several; its progress is counted from its first report.
 
         Args:
-            title: of the step.
-            unit: what `on_progress` counts from now on.
+            title: title of the step.
+            unit: unit that `on_progress` counts in this step.
         """
         self._unit = unit
         self._backend.begin(title)
@@ -89,7 +91,7 @@ class Display:
 
 @contextlib.contextmanager
 def displayed(callbacks: Callbacks, verb: str, *, progress: bool, unit: str = "sample") -> Iterator[Callbacks]:
-    """The callbacks of a Python call, and those of a display as well where `progress` asks for one."""
+    """The callbacks of a Python call, combined with those of a display if `progress` is True."""
     if not progress:
         yield callbacks
         return
@@ -98,7 +100,7 @@ def displayed(callbacks: Callbacks, verb: str, *, progress: bool, unit: str = "s
 
 
 class _Bars:
-    """A tqdm bar per channel."""
+    """A display with one tqdm bar per channel."""
 
     def __init__(self, *, is_notebook: bool) -> None:
         self._is_notebook = is_notebook
@@ -144,7 +146,7 @@ class _Bars:
 
 
 class _Lines:
-    """Plain lines, written by a thread."""
+    """A display with plain lines, written by a thread."""
 
     def __init__(self, verb: str) -> None:
         self._verb, self._title, self._detail = verb, "", ""

@@ -1,4 +1,4 @@
-"""The callbacks that every long-running verb takes: how far it is, and what the user may not have meant."""
+"""The callbacks that every long-running verb takes: how far it is, and settings that may be unintended."""
 
 from __future__ import annotations
 

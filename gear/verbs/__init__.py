@@ -1,1 +1,1 @@
-"""The verbs: each is one call of the Python API, shows progress and can be taken up again."""
+"""The verbs: each is one call of the Python API, shows progress, and resumes an interrupted run."""

@@ -16,12 +16,12 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RendererCheck:
-    """What one renderer did with a small reference frame.
+    """The result of one renderer for a small reference frame.
 
     Attributes:
         name: raster, filament or classic.
         works: whether it returned the frame.
-        facts: what it is, and either its device, driver and times in seconds, or `problem` and `remedy`; JSON.
+        facts: JSON with a description, and either device, driver and times in seconds, or `problem` and `remedy`.
     """
 
     name: str
@@ -31,7 +31,7 @@ class RendererCheck:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DoctorReport:
-    """What was found.
+    """The results of all renderers on this machine.
 
     Attributes:
         machine: Python, packages, system and the number of usable cores; JSON.
@@ -64,7 +64,7 @@ def doctor(renderer: str | None = None) -> DoctorReport:
     """Renders a reference frame with each renderer.
 
     Args:
-        renderer: only this one: raster, filament or classic.
+        renderer: name of the only renderer to check: raster, filament or classic; all by default.
 
     Raises:
         UnknownNameError: there is no renderer of that name.

@@ -19,7 +19,7 @@ class ShippedWeights:
 
     Attributes:
         file: metadata of the file.
-        stale: parts of the appearance that changed since the training; None where the file does not record it.
+        stale: parts of the appearance that changed since the training; None if the file does not record the appearance.
     """
 
     file: WeightsFile
@@ -46,7 +46,7 @@ class ModelFacts:
 
     Attributes:
         found: its plugin.
-        missing: modules that it needs and that are not installed.
+        missing: required modules that are not installed.
         shipped: its reference weights, if an installed package has them.
     """
 

@@ -1,6 +1,4 @@
-"""From a dataset to the parts of its page: one entry per sample, made in parallel; a damaged sample does not stop
-the others.
-"""
+"""Makes the parts of a dataset's page: one entry per sample, in parallel; a damaged sample does not stop the others."""
 
 from __future__ import annotations
 
@@ -29,7 +27,7 @@ from gear.view.encoding import Picture, encode, largest_scale
 from gear.view.rows import detail, finite, row
 
 PROBES = 6
-"""Samples, spread over the split, that decide how large the pictures may be."""
+"""Number of samples, spread over the split, from which the scale of the pictures is estimated."""
 
 PICTURE_FILES = (".png", ".jpg", ".jpeg", ".webp")
 
@@ -42,8 +40,8 @@ class Entry:
         row: its entry in the index.
         detail: all other facts, as deflated JSON.
         pictures: encoded pictures by channel.
-        cameras: name of the view that a channel is aligned with, where there is one.
-        originals: link to the file with a channel at full size, where the dataset has one and the page has not.
+        cameras: name of the view with which a channel is aligned, if there is one.
+        originals: link to the file with a channel at full size, if the dataset has one and the page does not.
         problem: why pictures or labels are missing; empty where nothing is missing.
     """
 

@@ -38,7 +38,7 @@ class Shown:
 
 
 class PreviewError(Exception):
-    """A task's preview failed or returned something that is no picture."""
+    """A task's preview failed or returned something else than pictures."""
 
 
 def images(sample: Sample) -> dict[Channel, Shown]:

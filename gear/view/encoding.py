@@ -1,4 +1,4 @@
-"""Encodes pictures so small that a page with all of them opens quickly."""
+"""Encodes pictures for the page; small files, so that a page with all of them opens quickly."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from gear.values.frames import UInt8Image
 MEDIA_TYPE = "image/webp"
 QUALITY = 80
 SCALES = (1.0, 0.8, 0.65, 0.5, 0.45, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.1)
-"""Sides of an embedded picture as shares of the original's; one for the whole page, so that samples compare."""
+"""Possible scales of embedded pictures; one scale is used for the whole page, so that samples can be compared."""
 
 MOST_PX = 16383
-"""WebP's longest side."""
+"""Largest side of a WebP picture in pixels."""
 
 LEAST_WIDTH_PX = 160
-"""Nothing is made narrower than this, whatever the budget."""
+"""Smallest width of an embedded picture in pixels, for any budget."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

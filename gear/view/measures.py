@@ -12,7 +12,7 @@ from gear.values.serial import Json
 from gear.view.counts import is_label, is_number
 
 MEASURES = ("_fraction", "distance_m")
-"""Ends of the names of fields that say how much of an object is seen, and how far it is."""
+"""Suffixes of fields with the visible share of an object and with its distance."""
 
 
 def measures(facts: Json) -> Json:

@@ -1,4 +1,4 @@
-"""The page's index as JSON: what the overview needs of every sample before one is opened."""
+"""The page's index as JSON: the facts of every sample that the overview needs."""
 
 from __future__ import annotations
 

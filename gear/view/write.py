@@ -22,7 +22,7 @@ from gear.view.rows import finite
 
 MEGABYTE = 1_000_000
 BASE64 = 4 / 3
-"""Characters that a byte becomes inside the page."""
+"""Characters per byte of a picture in the page."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,21 +66,22 @@ def write_view(
 ) -> ViewReport:
     """Writes one self-contained HTML page of a dataset; it opens from disk, without a server or a network.
 
-    Pictures and previews are embedded, at full size if they fit `max_mb`, else all at the same smaller scale; a
-    sample's own page then shows the dataset's files themselves as long as they lie where they did when it was written.
+    Pictures and previews are embedded, at full size if they fit `max_mb`, otherwise all at the same smaller scale. In
+    the second case the page of a sample shows the files of the dataset, as long as these are not moved relative to the
+    page.
 
     Args:
         path: root of a dataset of any task.
         out: HTML file to write.
-        split: the split to show; may be left out where there is only one.
-        samples: only the first so many.
-        max_mb: about how large the page may get, in megabytes.
+        split: the split to show; optional if there is only one.
+        samples: number of samples from the first one on; all by default.
+        max_mb: approximate limit for the size of the page in megabytes.
         progress: shows a progress bar.
         on_progress: called after every sample.
 
     Raises:
         DatasetError: there is no finished split to show, or `out` cannot be written.
-        UnknownNameError: its task's plugin is not installed.
+        UnknownNameError: the plugin of the dataset's task is not installed.
     """
     with displayed(Callbacks.of(on_progress=on_progress), "view", progress=progress) as shown:
         dataset = open_dataset(path, split)
@@ -95,7 +96,7 @@ def write_page(
     max_mb: float = 48.0,
     on_progress: Progress | None = None,
 ) -> ViewReport:
-    """As `write_view`, for an opened dataset."""
+    """Writes the page of an opened dataset; see `write_view`."""
     target = Path(out)
     refuse_folder(target)
     with explained(target):

@@ -131,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check_rendered(args: argparse.Namespace, request: AttackRequest, facts: Json) -> None:
-    """Renders the patches on held-out samples and prints what they do there."""
+    """Renders the patches in held-out samples and prints their effect."""
     import json
 
     from gear.cli.requests import request_of

@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Checks the renderers; 0 if at least one works (or the one asked for does), else 2."""
+    """Checks the renderers; the exit code is 0 if at least one (or the requested one) works, otherwise 2."""
     from gear.verbs.doctor import doctor
 
     report = doctor(args.renderer)

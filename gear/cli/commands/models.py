@@ -59,11 +59,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def the_one(models: Sequence[ModelFacts], name: str | None) -> ModelFacts:
-    """The network of a name.
+    """The network with the given name.
 
     Raises:
         GearError: no name was given.
-        UnknownNameError: nothing answers to it.
+        UnknownNameError: there is no model of this name.
     """
     from gear.values.errors import GearError, UnknownNameError
 
@@ -76,7 +76,7 @@ def the_one(models: Sequence[ModelFacts], name: str | None) -> ModelFacts:
 
 
 def row(model: ModelFacts) -> list[str]:
-    """A network's cells in the list."""
+    """The cells of a network in the list."""
     spec = model.spec
     size = f"{spec.parameters / 1e6:.1f} M" if spec.parameters else "-"
     weights = "shipped" if model.shipped else "published" if spec.published else "-"
@@ -87,7 +87,7 @@ def row(model: ModelFacts) -> list[str]:
 
 
 def details(model: ModelFacts) -> list[str]:
-    """Everything that is known of one network, as lines."""
+    """All facts about one network, as lines."""
     spec = model.spec
     size = f"{spec.parameters / 1e6:.1f} M parameters" if spec.parameters else "size not stated"
     facts = [("tasks", ", ".join(spec.tasks)), ("size", size)]

@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def show_all(found: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
-    """Lists what works, what is broken and what clashes."""
+    """Lists the plugins that work, those that are broken, and clashes of names."""
     from gear.plugins.describe import summary
 
     rows = [summary(plugin) for kind in kinds for plugin in found.of_kind(kind)]
@@ -97,12 +97,12 @@ def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) ->
 
 
 def the_one(found: Catalogue, kinds: tuple[Kind, ...], name: str | None) -> PluginEntry:
-    """The plugin that answers to a name, whatever its kind.
+    """The plugin with the given name, of any kind.
 
     Raises:
-        GearError: no name was given, or it is that of plugins of several kinds.
-        UnknownNameError: nothing answers to it.
-        DuplicateNameError: two packages claim it.
+        GearError: no name was given, or plugins of several kinds have it.
+        UnknownNameError: there is no plugin of this name.
+        DuplicateNameError: plugins of two packages have this name.
     """
     from gear.values.errors import GearError, UnknownNameError
 

@@ -26,7 +26,7 @@ SECONDS = {"s": 1, "m": 60, "h": 3600, "": 60}
 
 
 def budget(text: str) -> float:
-    """`90s`, `10m`, `1.5h`, or minutes, in seconds; for argparse."""
+    """Parses `90s`, `10m`, `1.5h` or a number of minutes to seconds; for argparse."""
     match = re.fullmatch(r"(\d+(?:\.\d*)?)([smh]?)", text.strip())
     if not match or not float(match[1]):
         raise argparse.ArgumentTypeError(f"a time is written 90s, 10m or 1.5h, got {text!r}")
@@ -97,16 +97,16 @@ def run(args: argparse.Namespace) -> int:
 
 
 class TrainingLog:
-    """Loss and learning rate beside the progress; a line after every validation."""
+    """Shows loss and learning rate next to the progress, and prints a line after every validation."""
 
     SHOWN = 3
-    """Metrics of a validation, beside the loss."""
+    """Number of metrics of a validation that are shown, besides the loss."""
 
     def __init__(self, display: Display) -> None:
         self._display = display
 
     def __call__(self, state: TrainingState, share: float, metrics: dict[str, float] | None) -> None:
-        """After a step, or, with metrics, after a validation."""
+        """Called after a step, or, with metrics, after a validation."""
         if state.steps:
             point = state.steps[-1]
             self._display.detail(f"loss {point['loss']:.3f}, lr {point['rate']:.1e}")

@@ -1,1 +1,1 @@
-"""Executors: where the missing items of a job are made. Each engine is one module that implements `Executor`."""
+"""Executors, which run the items of a job. Each engine is one module that implements `Executor`."""

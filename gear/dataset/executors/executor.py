@@ -1,4 +1,4 @@
-"""The contract of an engine that makes the missing items of a job, and the engine that is this process itself."""
+"""The contract of engines, which make the missing items of a job, and the engine that uses the calling process."""
 
 from __future__ import annotations
 
@@ -6,26 +6,27 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
 Done = Callable[[int], None]
-"""Called with the index of an item when its last file is in place."""
+"""Called with the index of an item when all of its files are written."""
 
 Work = Callable[[Iterator[int], Done], None]
-"""Makes the items whose indices it is given, one after the other, and reports each finished one. It is a function of a
-module, or a `functools.partial` of one, so that it can be sent to another process; what it opens, it opens once."""
+"""A function that makes the items with the given indices, one after the other, and reports each finished one. It can be
+pickled, so that it can be sent to another process. Resources are opened once for all items.
+"""
 
 
 class Executor(Protocol):
-    """An engine: this process, several processes, a cluster."""
+    """An engine, such as the calling process, several processes, or a cluster."""
 
     def run(self, work: Work, indices: Sequence[int], done: Done) -> None:
-        """Makes all items. Which worker makes which item changes nothing in its bytes.
+        """Makes all items. The bytes of an item do not depend on the worker.
 
         Args:
             work: called once in each worker.
-            indices: of the items that are missing, each to be made once.
-            done: called in this process, in the order in which items are finished.
+            indices: indices of the missing items; each is made once.
+            done: called in the calling process, in the order in which items are finished.
 
         Raises:
-            GearError: the first one of a worker, or a worker died or hung. What was finished before it stays.
+            GearError: a worker raised an error, died or hung. Finished items are kept.
         """
 
 
@@ -33,6 +34,6 @@ class InThisProcess:
     """One worker, which is the calling process."""
 
     def run(self, work: Work, indices: Sequence[int], done: Done) -> None:
-        """As `Executor.run`."""
+        """Runs all items; see `Executor.run`."""
         if indices:
             work(iter(indices), done)

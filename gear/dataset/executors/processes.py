@@ -20,11 +20,12 @@ from gear.dataset.executors.executor import Done, Executor, Work
 from gear.values.errors import BackendError, GearError
 
 SILENCE_S = 600.0
-"""Seconds without a finished item after which the workers are taken for hung: graphics drivers do hang, and the slowest
-machines need less than a minute per item."""
+"""Seconds without a finished item after which the workers are considered hung. Graphics drivers can hang, and the
+slowest machines need less than a minute per item.
+"""
 
 INTERRUPTED = 130
-"""Exit code of a worker that was interrupted before it had finished its item."""
+"""Exit code of a worker that was interrupted while it was making an item."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,18 +33,18 @@ class Processes:
     """Several worker processes on this machine.
 
     Attributes:
-        workers: their number.
-        backend: name of what may make a worker die or hang, such as a renderer; errors name it.
+        workers: number of processes.
+        backend: name of the renderer, which may make a worker die or hang, for error messages.
     """
 
     workers: int
     backend: str
 
     def run(self, work: Work, indices: Sequence[int], done: Done) -> None:
-        """As `Executor.run`.
+        """Runs all items; see `Executor.run`.
 
         Raises:
-            GearError: the first one that a worker reports.
+            GearError: a worker reported an error.
             BackendError: a worker died or hung.
         """
         context = multiprocessing.get_context("spawn")
@@ -67,13 +68,13 @@ class Processes:
 
 
 def executor(*, workers: int, backend: str) -> Executor:
-    """The engine, as `open_engine` asks for it."""
+    """Makes the engine; called by `open_engine`."""
     return Processes(workers=workers, backend=backend)
 
 
 @contextlib.contextmanager
 def _no_interrupts() -> Iterator[None]:
-    """Keeps Ctrl-C waiting, where the system can."""
+    """A context in which Ctrl-C is deferred, if the system supports it."""
     if sys.platform != "win32":
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -142,7 +143,7 @@ def _work(work: Work, indices: list[int], position: Any, reports: Queue[tuple[st
 
 
 def _follow_parent() -> None:
-    """Ends this process when its parent has ended: no worker may write beside a second run of the same command."""
+    """Ends this process when its parent has ended, so that no worker writes during a second run of the same command."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()

@@ -32,8 +32,8 @@ class SampleEffect:
 
     Attributes:
         index: index of the sample.
-        clean: its metrics without a patch, as far as single samples have metrics.
-        change: their changes, by name of the compositor and `rendered`; NaN where either value is NaN.
+        clean: its metrics without a patch, if they are defined for single samples.
+        change: changes of these metrics, by name of the compositor and `rendered`; NaN if either value is NaN.
     """
 
     index: int
@@ -61,12 +61,12 @@ class Effect:
 
     @staticmethod
     def of(request: GapRequest, dataset: Dataset[Any], callbacks: Callbacks) -> Effect:
-        """The effect for the model of a request, guarded by its defense if there is one; warns of what may be
+        """Opens the model of a request, guarded by its defense if there is one; warns of settings that may be
         unintended.
 
         Raises:
             UnknownNameError: there is no such model or defense.
-            GearError: the model is of another task, or the defense does not suit it.
+            GearError: the model is for another task, or the defense does not fit it.
             ConfigError: an option cannot be read.
         """
         assert request.model is not None

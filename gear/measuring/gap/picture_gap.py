@@ -25,9 +25,9 @@ class PictureGap:
 
     Attributes:
         psnr_db: peak signal-to-noise ratio over the pixels that show a patch, on sRGB bytes; at most `PERFECT_DB`.
-        worst: largest difference there, in levels of 255.
+        worst: largest difference in these pixels, in levels of 0..255.
         outside_rms: root mean square difference over all other pixels, in levels.
-        outside_worst: largest difference there.
+        outside_worst: largest difference in all other pixels, in levels.
         outside_px: number of other pixels that differ.
     """
 

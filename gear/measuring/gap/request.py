@@ -1,4 +1,4 @@
-"""What a comparison of digital and rendered patches is asked to do."""
+"""The request of a comparison of composed and rendered patches."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GapRequest:
-    """As the keywords of `gear.gap`, where they are explained; `guard` is the defense with what it learns from.
+    """The arguments of `gear.gap`, which documents them; `guard` is the defense with its calibration data.
 
     Raises:
         GearError: the values contradict each other.
@@ -52,7 +52,7 @@ class GapRequest:
 
     @property
     def folder(self) -> Path | None:
-        """Where the report goes; None for nowhere."""
+        """Folder of the report; None if it is not written."""
         return None if self.out is None else Path(self.out)
 
     @property

@@ -1,7 +1,7 @@
-"""The comparison of digital patches with the same patches rendered: check, open, measure, write.
+"""The comparison of composed patches with the same patches rendered: check, open, measure, write.
 
-No patch has to be adversarial here: a gap is a fact about pictures. With a model, the task's metric is measured on the
-clean pictures, on the composed ones and on the rendered ones.
+The patches need not be adversarial, because the pictures themselves are compared. With a model, the task's metric is
+also measured on the clean, the composed and the rendered pictures.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ TABLE = "gap.txt"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Comparison:
-    """What is compared.
+    """The datasets, compositors, patches and model of a comparison.
 
     Attributes:
         pairs: the clean dataset and its rendered twin.
         engines: compositors by name.
         images: the patches that the twin shows, (h, w, 3) uint8, one per surface.
-        effect: what the patches do to a model; None without a model.
+        effect: measures the effect of the patches on a model; None without a model.
     """
 
     pairs: Twins[Any]
@@ -53,10 +53,10 @@ class _Comparison:
 
 
 def measure_gap(request: GapRequest, callbacks: Callbacks) -> GapReport:
-    """As `gear.gap`.
+    """Runs a request; `gear.gap` documents it.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     clean = open_dataset(request.dataset, request.split)
     if request.folder is not None:
@@ -75,7 +75,7 @@ def measure_gap(request: GapRequest, callbacks: Callbacks) -> GapReport:
 
 
 def _opened(request: GapRequest, clean: Dataset[Any], callbacks: Callbacks) -> _Comparison:
-    """Opens everything, and renders the twin last: what does not suit the dataset must be found before that."""
+    """Opens everything. The twin is rendered last, so that errors are found before."""
     from gear.compositor.registry import open_compositor
 
     split = clean.plan.info.split
@@ -161,12 +161,12 @@ def sample_gaps(
 
 
 def composed_picture(engine: BaseCompositor, images: Sequence[UInt8Image], index: int, view: str) -> UInt8Image:
-    """One view of a sample with patches in it, (H, W, 3) uint8 sRGB.
+    """Composes patches into one view of a sample; returns (H, W, 3) uint8 sRGB.
 
     Args:
-        engine: a compositor that rounds as the camera does.
+        engine: compositor that rounds to bytes.
         images: patches, (h, w, 3) uint8 sRGB, one per surface.
-        index, view: which picture.
+        index, view: index of the sample and name of the camera.
     """
     import torch
 
@@ -177,10 +177,11 @@ def composed_picture(engine: BaseCompositor, images: Sequence[UInt8Image], index
 
 
 def shown_patches(twin: Dataset[Any], surfaces: int) -> list[UInt8Image]:
-    """The patches that a twin shows, from the copy that it keeps.
+    """The patches that a twin shows, read from the copy in its dataset.
 
     Raises:
-        DatasetError: it shows none, or fewer than there are surfaces, or the copy is not what was shown.
+        DatasetError: the twin shows no patch or fewer patches than surfaces, or the copy differs from the patches that
+            were shown.
     """
     label = twin.plan.patch["label"]
     paths = [inside(twin.root, patch_path(label, f"patch_{i}.png")) for i in range(surfaces)]

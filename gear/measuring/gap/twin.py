@@ -23,7 +23,7 @@ def check_clean(clean: Dataset[Any]) -> None:
     """Checks that a split shows no patch.
 
     Raises:
-        DatasetError: it shows one.
+        DatasetError: the split shows a patch.
     """
     label = clean.plan.patch["label"]
     if label != NO_PATCH:
@@ -39,7 +39,7 @@ def collect_twin(
     town: str | Path | None = None,
     scenes: str | Path | None = None,
 ) -> None:
-    """Collects the twin of a split with a patch, or completes it.
+    """Collects the twin of a split with a patch; completes an existing one.
 
     Args:
         clean: the split without a patch.

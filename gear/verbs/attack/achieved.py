@@ -1,4 +1,4 @@
-"""What an attack achieved: the objective with its patches beside the objective with random ones."""
+"""The effect of an attack: its objective with the optimised patches, compared with random patches."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from gear.values.serial import Json
 from gear.verbs.attack.scenes import Scenes
 
 MOST_SAMPLES = 8
-"""Training samples on which the objective is compared; more would take longer and say little more."""
+"""Largest number of training samples on which the objectives are compared; more would hardly change the result."""
 
 
 def random_patches(patches: Sequence[Patch], seed: int) -> tuple[Patch, ...]:
-    """Patches of the same sizes whose pixels are drawn evenly from 0..1."""
+    """Patches of the same sizes whose values are drawn uniformly from 0..1."""
     rng = derive_rng(seed, "attack", "baseline")
     return tuple(Patch(name=one.name, rgb=rng.random(one.rgb.shape, dtype=np.float32)) for one in patches)
 
@@ -25,18 +25,19 @@ def random_patches(patches: Sequence[Patch], seed: int) -> tuple[Patch, ...]:
 def compared(
     scenes: Scenes, network: Model, objective: Objective, patches: Sequence[Patch], seed: int, most: int | None = None
 ) -> Json:
-    """The mean objective over samples with random patches and with these.
+    """Mean objective over samples with random patches, and with the given patches.
 
     Args:
         scenes: the samples.
         network: the attacked model.
-        objective: what the attack makes large.
-        patches: those of the attack.
-        seed: of the random ones.
+        objective: the objective that the attack maximises.
+        patches: patches of the attack.
+        seed: seed of the random patches.
         most: number of samples, evenly spaced; all by default.
 
     Returns:
-        `samples`, `random` and `patch`; a value is None where nothing can be measured.
+        `samples`, the number of samples, and the objectives `random` and `patch`, which are None if they cannot be
+        measured.
     """
     count = len(scenes.samples)
     chosen = np.unique(np.linspace(0, count - 1, min(count, most or count)).round().astype(int)).tolist()
@@ -48,5 +49,5 @@ def compared(
 
 
 def plain(value: float) -> float | None:
-    """A number of six digits for JSON; None where it is not finite."""
+    """A number rounded to six digits for JSON; None if it is not finite."""
     return float(f"{value:.6g}") if np.isfinite(value) else None

@@ -24,15 +24,15 @@ from gear.values.serial import Json, from_json
 from gear.verbs.attack.monitor import CHECKPOINT
 
 VERIFY = "verify"
-"""Folder of the rendered check, in that of the patches."""
+"""Folder of the rendered check, inside the patch folder."""
 
 NOTES = "attack.json"
 
 BEGUN = "begun.json"
-"""The plan of an attack that is not finished: its checkpoint has no more than the hash."""
+"""File with the plan of an unfinished attack, because the checkpoint only has the hash of the plan."""
 
 FED = {"data", "validation", "calibration", "calibration_samples"}
-"""What of a plan says from what patches are made; the rest says how."""
+"""Keys of a plan that describe the samples; the other keys describe the method."""
 
 EXACT = "patch.safetensors"
 
@@ -44,16 +44,16 @@ TOLD: Any = {
     "steps_done": int, "steps_per_s": float | None, "stopped": str, "masking": dict[str, float] | None,
     "patches": dict[str, str],
 }  # fmt: skip
-"""What finished notes say that is read again, beside the plan."""
+"""Keys of a finished record, besides the plan, that are read again."""
 
 
 def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
-    """The record of patches that are there already and whole; or None, after the plan is recorded as begun.
+    """Returns the record of finished patches in the folder; if there are none, writes the plan and returns None.
 
     Raises:
-        OutdatedError: the folder has patches made, or begun, in the same way from other samples.
-        ReplaceableError: the folder has something else, or something damaged.
-        DatasetError: the disk refuses to write.
+        OutdatedError: the folder has finished or unfinished patches of the same method for other samples.
+        ReplaceableError: the folder has patches of another attack, or damaged files.
+        DatasetError: a file cannot be written.
     """
     check_output(root, "make patches in a folder of their own")
     finished, wanted = root / NOTES, json.loads(json.dumps(plan))
@@ -100,12 +100,12 @@ def tidy(root: Path) -> None:
 
 
 def _check_begun(root: Path, wanted: Json) -> None:
-    """Checks that the checkpoint is not of patches begun in the same way from other samples.
+    """Checks that an unfinished attack in the folder does not differ only in its samples.
 
     Any other difference is found by `Recorder.resume`, which compares the hash of the plan.
 
     Raises:
-        OutdatedError: the samples are others.
+        OutdatedError: the attack in the folder differs only in its samples.
     """
     try:
         there = json.loads(read_bytes(root / BEGUN))
@@ -133,7 +133,7 @@ def _check_whole(root: Path, notes: Json) -> None:
     """Checks that the record has the fields of finished patches, and that the pictures have the recorded hashes.
 
     Raises:
-        ReplaceableError: a field is missing, or a picture is missing or another one.
+        ReplaceableError: a field or a picture is missing, or a picture was changed.
     """
     try:
         for key, kind in TOLD.items():

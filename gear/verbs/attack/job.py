@@ -54,7 +54,7 @@ class Job:
         steps, queries: the budget.
         every, patience: steps between validations, and validations without improvement before the attack stops.
         seed: seed of all random draws.
-        weights: of the terms that lower what the defense says.
+        weights: weights of the terms that lower the defense's score and mask.
     """
 
     datasets: Sequence[Dataset[Any]]
@@ -76,8 +76,8 @@ class Job:
     weights: DefenseWeights
 
     def plan(self, weights_sha256: str | None, product: Any) -> Json:
-        """Everything that decides the patches: a run with an equal plan finds them made. Weights are those of the
-        built network.
+        """Everything that decides the patches; a later run with an equal plan reuses them. It includes the hash of the
+        network's weights.
         """
         learnt = self.guard.calibration
         read = product.read_sha256() if isinstance(product, WithInputFiles) else None
@@ -111,7 +111,7 @@ def resolve(request: AttackRequest, on_fit_progress: Progress) -> Job:
     """Opens, looks up and checks everything that a request names.
 
     Raises:
-        GearError: something does not exist, or does not fit together.
+        GearError: something does not exist, or two inputs do not fit together.
     """
     allowed = request.allow_test_data
     datasets = open_all(request.data, _task_of(request.data), names=TRAINING, allow_test_data=allowed)
@@ -153,7 +153,8 @@ def resolve(request: AttackRequest, on_fit_progress: Progress) -> Job:
 
 
 def _usable(compositor: str, spec: AttackSpec[Any], datasets: Sequence[Dataset[Any]]) -> str:
-    """The compositor of the request; homography where transport lacks probes that the attack does not need.
+    """The compositor of the request; `homography` if `transport` was requested, probes are missing, and the attack does
+    not need them.
 
     Raises:
         DatasetError: the attack needs probes and there are none.

@@ -26,7 +26,7 @@ from gear.values.errors import GearError
 from gear.values.rng import derive_rng
 
 FLAG = "--model-set "
-"""How the user sets one of the models' options; `--set` is for the attack's."""
+"""Flag for options of the models; `--set` is for options of the attack."""
 
 
 def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Sequence[Dataset[Any]]) -> list[Chosen]:
@@ -47,10 +47,10 @@ def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Seque
 
 
 def check_gradient(defense: Chosen | None, attack: AttackSpec[Any]) -> None:
-    """Checks that the defense, if there is one, passes on the gradient that the attack needs.
+    """Checks that the defense, if there is one, passes the gradient that the attack needs.
 
     Raises:
-        GearError: it does not.
+        GearError: the defense passes no gradient.
     """
     if defense is None:
         return
@@ -66,7 +66,7 @@ def check_gradient(defense: Chosen | None, attack: AttackSpec[Any]) -> None:
 def check_attack(
     found: PluginEntry, models: Sequence[Chosen], task: str, surfaces: int, queries: int | None
 ) -> AttackSpec[Any]:
-    """Checks that the attack supports what is asked of it.
+    """Checks that the attack supports the task, the surfaces, the models and the budget.
 
     Raises:
         GearError: the attack is for other tasks or for fewer surfaces, needs gradients that a model does not give, or
@@ -98,13 +98,13 @@ def build_model(
     """The model for `Attack.optimise`. A defense that needs calibration is calibrated for each model separately.
 
     Args:
-        models: the attacked ones.
-        guard: the defense that the attack is adaptive to.
-        seed: of the calibration.
-        weights: of the terms that lower the defense's score and mask.
+        models: the attacked models.
+        guard: the defense to which the attack is adaptive.
+        seed: seed of the calibration.
+        weights: weights of the terms that lower the defense's score and mask.
 
     Raises:
-        GearError: nothing of the defense can reach an attack.
+        GearError: the defense has neither cleaned pictures nor a differentiable score or mask that an attack could use.
     """
     built: dict[str, Model] = {}
     short = [chosen.found.spec.name for chosen in models]

@@ -30,7 +30,7 @@ NOTED: Any = {
     "key": str, "done": int, "queries_left": float | None, "curves": dict[str, tuple[float, ...]],
     "judged": tuple[tuple[int, float], ...], "seconds": float,
 }  # fmt: skip
-"""What a checkpoint's notes say; its arrays are the attack's own."""
+"""Keys of the notes in a checkpoint; the arrays of a checkpoint are those of the attack."""
 
 Judge = Callable[[tuple[Patch, ...]], float]
 
@@ -43,7 +43,7 @@ class Recorder:
         root: the folder.
         key: hash of the plan; a checkpoint with another key is refused.
         steps: budget of steps.
-        judge: computes the harm of patches on samples that the attack does not see; None without validation.
+        judge: computes the harm of patches on validation samples; None without validation.
         every: steps between two validations.
         patience: validations without improvement after which the attack stops; 0 for never.
         queries: budget of queries, for attacks that count queries.
@@ -51,7 +51,7 @@ class Recorder:
         curves: values by name, one per step.
         judged: (step, harm) of every validation.
         best: patches with the largest harm in a validation.
-        is_asked: whether the attack reads the answer of `step`.
+        is_asked: whether the attack uses the return value of `step`.
         done: finished steps, over all runs.
         stopped: why the attack ended before its budget.
         seconds: time spent so far, over all runs.
@@ -136,7 +136,9 @@ class Recorder:
             self.on_progress(0 if queries_left is None else self.queries - int(queries_left), self.queries)
 
     def finish(self, done: int, last: tuple[Patch, ...]) -> None:
-        """Validates the last patches if the attack ended between two validations, as a budget of queries may end it."""
+        """Validates the last patches if the attack ended between two validations, for example because its queries were
+        used up.
+        """
         if self.judge is not None and (not self.judged or self.judged[-1][0] != done):
             self._validate(done, last)
 
@@ -179,7 +181,7 @@ def _best(arrays: State, *, is_judged: bool) -> tuple[Patch, ...]:
     """The patches of a checkpoint with the largest harm; none before the first validation.
 
     Raises:
-        ValueError: the arrays are no such checkpoint.
+        ValueError: the arrays are not those of such a checkpoint.
     """
     names = sorted((name for name in arrays if name.startswith(BEST)), key=surface_of)
     if is_judged and not names:

@@ -18,13 +18,13 @@ from gear.values.frames import UInt8Image
 from gear.values.serial import Json
 
 SHOWN_PX = 1024
-"""Width of a picture in the figure at most: three pairs of 2048 pixels each were a file of 14 MB."""
+"""Largest width of a picture in the figure; three pairs of pictures with 2048 pixels make a file of 14 MB."""
 
 BLUE, RED, GREY = "#1f5fa8", "#b3402a", "0.55"
 
 
 def write_patches(root: Path, patches: Sequence[Patch], notes: Json) -> None:
-    """Writes `patch_0.png`, …, `patch.safetensors` and, last, `attack.json`, which says that the folder is whole."""
+    """Writes `patch_0.png`, …, `patch.safetensors` and, last, `attack.json`, which marks the folder as complete."""
     for patch in patches:
         write_whole(root, f"{patch.name}.png", encode_rgb(as_picture(patch)))
     exact = {patch.name: np.ascontiguousarray(patch.rgb, np.float32) for patch in patches}

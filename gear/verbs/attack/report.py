@@ -20,7 +20,7 @@ class AttackReport:
         out: the patch folder.
         patches: patches, one per surface.
         facts: content of `attack.json`.
-        made: whether this run made the patches; False where they were there already.
+        made: whether this run made the patches; False if they existed already.
     """
 
     out: Path
@@ -60,7 +60,7 @@ class AttackReport:
         return shlex.join([*words, *where, "--patch", str(self.out)])
 
     def _achieved(self) -> list[str]:
-        """The objective with these patches beside the objective with random ones."""
+        """A line with the objective for these patches and for random ones."""
         lines = []
         for name, found in (self.facts.get("achieved") or {}).items():
             if found is not None and None not in (found["random"], found["patch"]):

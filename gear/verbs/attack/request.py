@@ -1,4 +1,4 @@
-"""What an attack, and the rendered check of one, are asked to do."""
+"""The requests of an attack and of its rendered check."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttackRequest:
-    """As the keywords of `gear.attack`, where they are explained; `guard` is the defense with what it learns from.
+    """The arguments of `gear.attack`, which documents them; `guard` is the defense with its calibration data.
 
     Raises:
         GearError: a number is out of range.
@@ -55,13 +55,13 @@ class VerifyRequest:
 
     Attributes:
         out: the patch folder.
-        data: root of a dataset of the scene with probes, or `DIR:SPLIT`; not one that the patches were made on, or
-            by which the best of them were chosen.
+        data: root of a dataset of the scene with probes, or `DIR:SPLIT`; not a dataset on which the patches were
+            optimised or validated.
         models: names of model plugins.
         model_settings: `KEY=VALUE` texts for their options.
-        guard: the defense behind which they stand.
+        guard: the defense that guards the models; None for no defense.
         samples: number of samples, counted from the first one; all by default.
-        town, scenes: files of its town and of that town's scene library, where they are not gear's own.
+        town, scenes: files of the town and of its scene library, for towns that are not part of gear.
     """
 
     out: str | Path

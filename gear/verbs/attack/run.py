@@ -99,41 +99,42 @@ def attack(
     on_fit_progress: Progress | None = None,
     on_warning: Warn | None = None,
 ) -> AttackReport:
-    """Makes patches for the surfaces of a scene; takes up again what was begun.
+    """Optimises patches for the surfaces of a scene; resumes an interrupted run.
 
-    Under `out` lie `patch_0.png`, … to print and to collect with (`gear collect --patch OUT`), their exact values in
-    `patch.safetensors`, `attack.json` with everything that it was done with, and figures.
+    The folder `out` gets `patch_0.png`, … for printing and for `gear collect --patch OUT`, the exact values in
+    `patch.safetensors`, `attack.json` with all inputs and results, and figures.
 
     Args:
-        data: datasets with probes (`gear collect --probes`), of one task; several make one patch for all of them.
-        model: name of a model plugin; several are attacked at once.
+        data: datasets with probes (`gear collect --probes`), all of one task; with several datasets one patch is
+            optimised for all of them.
+        model: name of a model plugin, or several names for an attack on all of them at once.
         out: the patch folder.
         attack: name of an attack plugin.
-        steps: of optimisation, at most; 300 unless given, and without an end where queries are counted.
-        queries: forward passes, for attacks without gradients.
+        steps: largest number of optimisation steps; 300 by default, and unlimited if `queries` is given.
+        queries: largest number of forward passes, for attacks without gradients.
         settings: `KEY=VALUE` texts for the attack's options.
-        model_settings: for the models' options.
-        defense: that the attack looks through.
-        defense_settings: for its options.
-        calibration: dataset from which the defense learns.
-        calibration_patched: the same with patches.
-        val: datasets on whose samples patches are judged; the best are kept.
-        every: steps between two looks at them.
-        patience: looks without a better one until the attack ends; 0 for never.
+        model_settings: `KEY=VALUE` texts for the models' options.
+        defense: name of a defense plugin that the attack takes into account.
+        defense_settings: `KEY=VALUE` texts for the defense's options.
+        calibration: dataset without patches on which the defense is calibrated.
+        calibration_patched: the same dataset with patches.
+        val: datasets for validation; the patches that do best on them are kept.
+        every: number of steps between two validations.
+        patience: number of validations without improvement after which the attack ends; 0 for never.
         compositor: `transport`, or `homography`, which needs no probes.
-        seed: of everything that is drawn.
-        score_weight: weight of the term that lowers the defense's score; 0 leaves it out.
-        mask_weight: weight of the term that uncovers the patch in the defense's mask; 0 leaves it out.
-        allow_test_data: whether `test` splits may be optimised on.
-        force: start afresh where something else is.
+        seed: seed of all random draws.
+        score_weight: weight of the term that lowers the defense's score; 0 for no such term.
+        mask_weight: weight of the term that lowers the defense's mask on the patch; 0 for no such term.
+        allow_test_data: whether `test` splits are accepted as training data.
+        force: whether existing files of another attack in `out` are replaced.
         progress: shows a progress bar.
-        on_progress: called after every step; with queries done and allowed where queries are counted.
+        on_progress: called after every step with the finished and the allowed steps, or queries if these are limited.
         on_fit_progress: called after every calibration sample that the defense reads for the first time.
-        on_warning: called, before anything is made, with what the user may not have meant: a model that sees these
-            pictures at another size than it was trained on, doubtful calibration data.
+        on_warning: called before the attack with lines on settings that may be unintended, such as pictures of another
+            size than the model was trained on, or doubtful calibration data.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     request = AttackRequest(
         data=as_tuple(data),
@@ -166,10 +167,10 @@ def unit_of(request: AttackRequest) -> str:
 
 
 def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
-    """As `attack`.
+    """Runs a request; `attack` documents it.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     job = resolve(request, callbacks.on_fit_progress)
     _warn(job, callbacks.on_warning)
@@ -201,8 +202,8 @@ def as_tuple(paths: Paths) -> tuple[str | Path, ...]:
 
 
 def _warn(job: Job, on_warning: Warn) -> None:
-    """Warns of models that see the pictures, which are all of one size, larger or smaller than in their training, and
-    of doubtful calibration data.
+    """Warns of pictures that are larger or smaller than those that a model was trained on, and of doubtful calibration
+    data.
     """
     sizes = (size_note(model, job.datasets[0], FLAG) for model in job.models)
     for note in (*sizes, *job.guard.calibration.doubts()):
@@ -220,7 +221,7 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
 
     Raises:
         PluginError: the attack breaks its contract.
-        GearError: there are no samples to begin with.
+        GearError: there are no samples.
     """
     cache, device = Cache[Prepared](CACHE_BYTES), device_name(network)
     seen, held = (Scenes(group, job.compositor, device, cache) for group in (job.datasets, job.validation))
@@ -272,10 +273,10 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
 
 
 def _calibrated(network: Model, on_warning: Warn) -> tuple[float, Json]:
-    """Makes the defenses learn before any step, so that the time of the steps is theirs alone.
+    """Calibrates the defenses before the first step, so that the time of the steps does not include it.
 
     Returns:
-        Seconds of the calibration, and what each model's defense learnt, as far as it says so.
+        Seconds of the calibration, and the fit report of each model's defense, if it gives one.
     """
     begun, fits = time.monotonic(), {}
     for name, member in members_of(network).items():

@@ -29,18 +29,18 @@ RANDOM_PX = (32, 64)
 
 KEPT_BYTES = 2 << 30
 SHOWN = 3
-"""Samples of the figure, and of the look at masking."""
+"""Number of samples in the figure and in the check for masked gradients."""
 
 
 class Scenes:
-    """Samples with the compositor that puts patches into them."""
+    """Samples with the compositor that composes patches into them."""
 
     def __init__(self, datasets: Sequence[Dataset[Any]], compositor: str, device: str, cache: Cache[Prepared]) -> None:
         """Args:
-        datasets: of the samples.
-        compositor: name of one.
-        device: where it computes.
-        cache: what it works out is kept in, for all datasets together.
+        datasets: datasets of the samples.
+        compositor: name of the compositor.
+        device: device of the compositor.
+        cache: cache for prepared samples, shared by all datasets.
         """
         samples = all_of(tuple(datasets))
         self.samples = Kept(samples, KEPT_BYTES)
@@ -75,7 +75,7 @@ class Scenes:
             return promised_and_kept(lambda changed: self.value(model, objective, changed, indexes), tensors)
 
     def check_adaptive(self, model: Model, surfaces: int, rng: np.random.Generator) -> None:
-        """Checks that a gradient of what the defenses say reaches random patches.
+        """Checks that the scores or masks of the defenses have a gradient with respect to random patches.
 
         Raises:
             GearError: a term of a defense has a gradient of 0, so an attack would not be adaptive to it.
@@ -100,7 +100,7 @@ class Scenes:
                 )
 
     def _gradients(self, member: Defended, patches: Sequence[Tensor], index: int) -> dict[str, float]:
-        """The largest entry of the gradient of each term of a defense to the patches in one sample."""
+        """Largest entry of the gradient of each term of a defense with respect to the patches, in one sample."""
         asked = [patch.clone().requires_grad_(True) for patch in patches]
         sample = self.samples[index]
         views = {view: self.compositor.compose(asked, [index], view) for view in sample.images}

@@ -1,4 +1,4 @@
-"""The rendered check of an attack: its patches rendered in the world, on samples that the attack did not see."""
+"""The rendered check of an attack: its patches are rendered in the world, in samples that the attack did not use."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def verify(request: VerifyRequest, callbacks: Callbacks) -> dict[str, GapReport]
     A defense draws its random numbers from the seed of the attack, so that a calibrated defense is the one that was
     attacked.
 
-    Under `out/verify/<scene>-<split>-<hash>`, one folder per dataset, lie for each model `<model>/gap.json` and
-    `gap.txt`, and beside those of the first model the rendered twin.
+    The folder `out/verify/<scene>-<split>-<hash>`, one per dataset, gets `<model>/gap.json` and `gap.txt` of each
+    model, and the rendered twin in the folder of the first model.
 
     Returns:
         Reports by model.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     root, split = root_and_split(request.data)
     notes = load_json(Path(request.out) / "attack.json")

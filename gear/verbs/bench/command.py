@@ -1,4 +1,4 @@
-"""A step of a bench as the command line that does the same."""
+"""The command line that is equivalent to a step of a bench."""
 
 from __future__ import annotations
 

@@ -19,10 +19,12 @@ from gear.values.errors import FieldError
 LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 WORD = re.compile(r"[-+]?[\w./](?:[\w./+=, -]*[\w./+=,-])?")
-"""Texts that are the same to YAML without quotes, null apart: numbers, names and paths above all."""
+"""Pattern of texts that need no quotes in YAML, except null: mainly numbers, names and paths."""
 
 TAKEN = frozenset(CONTROLS)
-"""Kinds of pictures: those with a network's patch have the network's name."""
+"""Names of kinds of pictures, which networks cannot have: pictures with a network's patch are named after
+the network.
+"""
 
 MOST_SAMPLES = 100_000
 
@@ -33,11 +35,11 @@ def _nothing() -> Node:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contestant:
-    """A network or a defense with its options, under a name that the bench gives it.
+    """A network or a defense with its options; the bench config gives it a name.
 
     Attributes:
-        plugin: name of the plugin; the contestant's own name unless given.
-        set: its options (`gear plugins show NAME` lists them), such as `weights`.
+        plugin: name of the plugin; by default the name in the bench config.
+        set: options of the plugin, such as `weights`; `gear plugins show NAME` lists them.
     """
 
     plugin: str = ""
@@ -46,7 +48,7 @@ class Contestant:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskBench:
-    """What is compared in one task.
+    """The networks and defenses that are compared in one task.
 
     Attributes:
         models: networks, by the names that tables show.
@@ -74,10 +76,11 @@ class Samples:
     """Number of pictures of each scene in each weather, by purpose.
 
     Attributes:
-        attack: pictures on which patches are optimised.
-        choose: pictures on which the best step of an attack is chosen.
-        measure: pictures on which networks are measured: without a patch, with a random one, and with each patch made.
-        calibrate: pictures on which defenses are calibrated.
+        attack: number of pictures on which patches are optimised.
+        choose: number of pictures on which the best step of an attack is chosen.
+        measure: number of pictures on which networks are measured: without a patch, with a random patch, and with each
+            optimised patch.
+        calibrate: number of pictures on which defenses are calibrated.
     """
 
     attack: int = 24
@@ -93,12 +96,12 @@ class Samples:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttackBench:
-    """How patches are made.
+    """The attack that makes the patches.
 
     Attributes:
         plugin: name of the attack plugin.
         steps: optimisation steps.
-        queries: forward passes, for attacks without gradients; 0 for attacks with gradients.
+        queries: number of forward passes for attacks without gradients; 0 for attacks with gradients.
         compositor: `transport` (exact) or `homography`.
         set: options of the attack.
     """
@@ -134,14 +137,14 @@ class BenchConfig:
     """A whole bench.
 
     Attributes:
-        tasks: what is compared, by name of the task plugin.
+        tasks: networks and defenses to compare, by name of the task plugin.
         places: scenes by town; an empty list means every scene of the town that has a surface for patches.
         weathers: weather presets, or presets with changed fields; one patch is made for all weathers.
         samples: number of pictures of each scene in each weather.
-        attack: how patches are made.
+        attack: the attack that makes the patches.
         calibration: scene in which defenses are calibrated; needed if a defense requires calibration.
-        transfer: whether each network is also shown the patches made against the other networks.
-        adaptive: whether patches are also optimised through every defense that the attack can differentiate.
+        transfer: whether each network is also measured with the patches against the other networks.
+        adaptive: whether patches are also optimised against every defense that passes the gradients of the attack.
         seed: seed of all random draws.
         collect: further keys of the collections of all tasks (`gear show-config` prints them).
     """
@@ -166,7 +169,7 @@ class BenchConfig:
 
 
 def settings_of(node: Node, above: str = "") -> Iterable[str]:
-    """A tree of options as `KEY=VALUE` texts, one per option."""
+    """Nested options as `KEY=VALUE` texts, one per option."""
     if isinstance(node, MappingNode) and (node.entries or not above):
         for key, (_, below) in node.entries.items():
             yield from settings_of(below, f"{above}.{key}" if above else key)

@@ -23,7 +23,7 @@ from gear.verbs.bench.table import columns, legend, title
 from gear.verbs.bench.validation import Contest
 
 PICTURE_PX, PATCH_PX, QUALITY = 560, 220, 82
-"""Widths that pictures are shown at, and their JPEG quality."""
+"""Widths of the pictures in pixels, and their JPEG quality."""
 
 STYLE = """
 body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, "Noto Sans", sans-serif; color: #1b2027; background: #fff;
@@ -100,8 +100,8 @@ def _rows(titles: Sequence[str], rows: Iterable[tuple[bool, Sequence[str]]]) -> 
 
 
 def _pictures(plan: Plan, contest: Contest) -> Iterable[str]:
-    """For each scene the picture without a patch and with each network's patch, at the sample that shows the patch
-    largest.
+    """Pictures of each scene without a patch and with each network's patch, for the sample with the most visible patch
+    pixels.
     """
     for scene, weather in plan.places():
         clean = open_dataset(plan.pictures(contest, scene, weather, NO_PATCH))

@@ -21,17 +21,17 @@ from gear.verbs.bench.scenes import Scene
 from gear.verbs.bench.validation import Contest, Entrant
 
 RANDOM, PATCH, ADAPTIVE = RANDOM_PATCH, "patch", "adaptive patch"
-"""Kinds of patches beside none: one against the network itself, and one made through the defense before it."""
+"""Kinds of patches: one optimised against the network, and one optimised against the network with its defense."""
 
 SPLITS = {"attack": "train", "choose": "val", "measure": "test", "calibrate": "finetuning"}
-"""Of the pictures for each purpose."""
+"""Split of the pictures for each purpose."""
 
 Verb = Literal["collect", "attack", "evaluate"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """One call of a verb. A step resumes what an earlier run began, and returns quickly where everything is done.
+    """One call of a verb. A step resumes an interrupted run, and returns quickly if its results exist.
 
     Attributes:
         verb: name of the function of `gear`.
@@ -64,7 +64,7 @@ class Match:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weather:
-    """A weather with the name that its folders have."""
+    """A weather with its name in folders."""
 
     label: str
     settings: tuple[str, ...]
@@ -99,7 +99,7 @@ class Plan:
         self._calibration, self._attack, self._root, self._workers = calibration, attack, root, workers
 
     def steps(self) -> Iterator[Step]:
-        """All steps, in an order in which each step finds what it needs."""
+        """All steps; each comes after the steps whose results it needs."""
         for contest in self.contests:
             for scene in self.scenes:
                 yield from self._pictures(contest, scene)
@@ -137,7 +137,7 @@ class Plan:
         return [(scene, weather) for scene in self.scenes for weather in self.weathers]
 
     def pictures(self, contest: Contest, scene: Scene, weather: Weather, patch: str) -> Path:
-        """Root of the pictures with one patch that networks are measured on; a patch has its network's name."""
+        """Root of the pictures with one patch on which networks are measured; a patch is named after its network."""
         kind = patch if patch in (NO_PATCH, RANDOM) else f"patch-{patch}"
         return self._place(contest, scene) / weather.label / kind
 
@@ -146,7 +146,7 @@ class Plan:
         return self._root / "patches" / contest.folder / name / scene.label
 
     def looked_through(self, contest: Contest) -> tuple[Entrant | None, ...]:
-        """The guards through which patches are optimised against a network: none, and each differentiable defense."""
+        """The guards against which patches are optimised for a network: none, and each differentiable defense."""
         return (None, *(defense for defense in contest.defenses if self._is_adaptive(defense)))
 
     @staticmethod
@@ -176,7 +176,7 @@ class Plan:
                 yield self._collect(contest, scene, weather, "measure", out, patch=patch)
 
     def _grounds(self, contest: Contest, scene: Scene, weather: Weather) -> Iterator[Step]:
-        """The pictures on which a patch is optimised, and those on which its best step is chosen."""
+        """Roots of the pictures on which a patch is optimised, and of those on which its best step is chosen."""
         for purpose in ("attack", "choose"):
             yield self._collect(contest, scene, weather, purpose, self._ground(contest, scene, weather, purpose))
 
@@ -193,7 +193,9 @@ class Plan:
                 yield self._collect(contest, scene, weather, "measure", out, patch=patch)
 
     def _lessons(self, contest: Contest, scene: Scene) -> Iterator[Step]:
-        """Calibration data of defenses: clean pictures of another scene, and for each network its patch in them."""
+        """Makes the calibration data of defenses: clean pictures of another scene, and the same pictures with each
+        network's patch.
+        """
         weather = self.weathers[0]
         yield from self._grounds(contest, scene, weather)
         yield self._collect(contest, scene, weather, "calibrate", self._lesson(contest, NO_PATCH))
@@ -287,7 +289,7 @@ class Plan:
 
 
 def reports_of(contest: Contest) -> tuple[str, ...]:
-    """Names of the reports that the tables need: the one with the task's metric, and the one outside the patch."""
+    """Names of the reports that the tables need: the one with the task's metric, and `outside_patch`."""
     product = build(find("task", contest.name))
     metric_report, dot, _ = contest.task.metric.partition(".")
     wanted = [metric_report] if dot and isinstance(product, Reports) else []
@@ -308,7 +310,7 @@ def weathers(configs: tuple[WeatherConfig, ...]) -> Iterator[Weather]:
 
 
 def _keywords(guard: Guard | None) -> dict[str, Any]:
-    """The keywords of the verbs that stand for a guard."""
+    """Keyword arguments of the verbs for a guard."""
     if guard is None:
         return {}
     calibration = {"calibration": guard.calibration, "calibration_patched": guard.calibration_patched}

@@ -14,7 +14,7 @@ from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, Met
 from gear.verbs.evaluate.table import metric_title
 
 FOUND_SHARE = "found_share"
-"""Metric of single samples of tasks whose own metric no single sample has."""
+"""Metric of single samples for tasks whose main metric is not defined for single samples."""
 
 
 COLUMNS = (
@@ -31,7 +31,7 @@ COLUMNS = (
     "high",
     "ceiling",
 )
-"""Of bench.csv."""
+"""Columns of bench.csv."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +50,7 @@ class Metric:
 
     @classmethod
     def of(cls, metric: str, *, less_is_better: bool) -> Metric:
-        """The metric of a text such as `miou` or `reference.car_bev_moderate_r40`."""
+        """Parses a text such as `miou` or `reference.car_bev_moderate_r40`."""
         report, dot, name = metric.rpartition(".")
         return cls(report=report if dot else TASK, name=name, less_is_better=less_is_better)
 
@@ -60,7 +60,7 @@ class Metric:
         return metric_title(self.report, self.name)
 
     def among(self, metrics: Metrics) -> Estimate | None:
-        """The value of the metric among those measured, or None."""
+        """The value of this metric in the measured metrics; None if it is missing."""
         return metrics.get(self.report, {}).get(self.name)
 
 
@@ -120,7 +120,7 @@ class TaskResult:
 
     Attributes:
         name: name of the task.
-        metric: metric by which networks are compared; None where the task names none.
+        metric: metric by which networks are compared; None if the task has none.
         results: results in the order of the config.
     """
 
@@ -137,8 +137,8 @@ class TaskResult:
         return None if self.metric is None or one is None else self.metric.among(one.metrics)
 
     def outside_patch(self, one: Difference | None) -> tuple[str, PairedTest] | None:
-        """The paired test over single samples with the name of its metric, outside the patch where the task offers
-        that.
+        """The paired test over single samples with the name of its metric; outside the patch if the task supports that
+        report.
         """
         if one is None:
             return None

@@ -1,4 +1,4 @@
-"""What a bench is asked to do."""
+"""The request of a bench."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from gear.values.errors import GearError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BenchRequest:
-    """As the keywords of `gear.bench`, where they are explained.
+    """The arguments of `gear.bench`, which documents them.
 
     Raises:
-        GearError: the number of workers is not at least 1.
+        GearError: the number of workers is below 1.
     """
 
     config: str | Path

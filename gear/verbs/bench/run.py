@@ -45,7 +45,7 @@ OnStep = Callable[[Step, int, int], None]
 """Called with (step, its number from 1, number of steps)."""
 
 CONFIG = "bench.yml"
-"""The config of the reports beside it, with every default filled in."""
+"""File with the bench config, in which all defaults are filled in."""
 
 
 def bench(
@@ -62,28 +62,29 @@ def bench(
     on_fit_progress: Progress | None = None,
     on_warning: Warn | None = None,
 ) -> BenchReport:
-    """Compares networks and defenses over scenes and patches, the whole way; takes up again what was begun.
+    """Compares networks and defenses over scenes and patches: collects pictures, makes patches and evaluates. Resumes
+    an interrupted run.
 
-    Under `out` lie `report.html`, `table.txt`, `bench.csv` (one line a metric), `bench.json` and charts in `figures`;
-    `data`, `patches` and `evaluations`, as the other verbs write them; and `bench.yml`, the config with every default
-    filled in.
+    The folder `out` gets `report.html`, `table.txt`, `bench.csv` (one line per metric), `bench.json` and charts in
+    `figures`; the folders `data`, `patches` and `evaluations` of the other verbs; and `bench.yml`, the config with all
+    defaults filled in.
 
     Args:
         config: name (`gear bench quick`) or path of a bench config.
-        out: folder of everything.
+        out: folder of all results.
         settings: `KEY=VALUE` texts for any key of the config.
-        device: where networks run, whatever the config says.
-        workers: processes of each collection; they change nothing but time.
-        in_subprocess: whether a single worker is a process of its own, too. Each collection in this process keeps some
-            20 MB, so large benches should say yes; a script that does needs `if __name__ == "__main__":`.
+        device: device of the networks; overrides the config.
+        workers: number of processes of each collection; the results do not depend on it.
+        in_subprocess: whether a single worker runs in a process of its own. Each collection in the calling process
+            keeps about 20 MB, so True is better for large benches; a script then needs `if __name__ == "__main__":`.
         progress: shows a progress bar.
-        on_step: called with each step, its number (from 1) and the number of steps, before it begins.
-        on_progress: called after every sample, or step of an attack, of the current step.
+        on_step: called before each step with the step, its number (from 1) and the number of steps.
+        on_progress: called after every sample of a step, or after every step of an attack.
         on_fit_progress: called after every calibration sample that a defense reads for the first time.
-        on_warning: called with what the user may not have meant.
+        on_warning: called with settings that may be unintended.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     request = BenchRequest(
         config=config, out=out, settings=tuple(settings), device=device, workers=workers, in_subprocess=in_subprocess
@@ -94,10 +95,10 @@ def bench(
 
 
 def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | None = None) -> BenchReport:
-    """As `bench`.
+    """Runs a request; `bench` documents it.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     plan, root = prepared(request), Path(request.out)
     with explained(root):
@@ -155,7 +156,7 @@ def _carried_out(step: Step, root: Path, callbacks: Callbacks, *, in_subprocess:
 
 
 def _done(step: Step, root: Path, keywords: dict[str, Any], warn: Warn) -> Any:
-    """Carries out a step; results whose pictures or patches have changed since are made again."""
+    """Carries out a step; results for pictures or patches that were changed since are made again."""
     verb, again = VERBS[step.verb], f"{step.title}: is made again, for what is there"
     try:
         return verb(**step.arguments, **keywords)
@@ -172,7 +173,7 @@ def prepared(request: BenchRequest) -> Plan:
     """Reads and checks a config; nothing is written.
 
     Raises:
-        GearError: something in it does not exist, does not suit, or cannot be read.
+        GearError: something in the config does not exist, does not fit, or cannot be read.
     """
     root = Path(request.out)
     check_output(root, "write the bench into a folder of its own")

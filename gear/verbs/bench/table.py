@@ -20,7 +20,7 @@ def text(report: BenchReport) -> str:
 
 
 def title(task: TaskResult) -> str:
-    """Name of the task, its metric, and whether more or less is better."""
+    """Name of the task, its metric, and whether higher or lower values are better."""
     if task.metric is None:
         return task.name
     return f"{task.name}: {task.metric.title} ({'less' if task.metric.less_is_better else 'more'} is better)"
@@ -36,7 +36,7 @@ def legend() -> str:
 
 
 def columns(task: TaskResult) -> list[list[str]]:
-    """The head and all rows, without the columns that are empty in every row."""
+    """Titles and rows, without the columns that are empty in every row."""
     every = [head(task), *lines(task)]
     used = [i for i, cells in enumerate(zip(*every, strict=True)) if any(cells[1:])]
     return [[line[i] for i in used] for line in every]

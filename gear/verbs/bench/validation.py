@@ -1,4 +1,6 @@
-"""Checks before anything is rendered that networks, defenses and attack of a bench exist and suit each other."""
+"""Checks that the networks, defenses and the attack of a bench exist and fit each other, before anything is
+rendered.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ from gear.verbs.bench.scenes import located
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Entrant:
-    """A network or a defense of a bench, looked up.
+    """A network or a defense of a bench, with its plugin found.
 
     Attributes:
         label: name in tables and folders.
@@ -41,7 +43,7 @@ class Entrant:
         return isinstance(spec, DefenseSpec) and spec.needs_calibration
 
     def is_looked_through(self, attack: AttackSpec[object]) -> bool:
-        """Whether the entrant is a defense that changes pictures and that the attack can optimise through."""
+        """Whether the entrant is a defense that changes pictures and passes the gradients that the attack needs."""
         spec = self.chosen.found.spec
         if not isinstance(spec, DefenseSpec) or "images" not in spec.outputs:
             return False
@@ -101,11 +103,11 @@ def contests(
         node: its YAML tree, for places in errors.
         attack: plugin that makes the patches.
         surfaces: largest number of surfaces in a scene.
-        device: device of the networks, as their option `device`; None leaves the choice to them.
+        device: value for the networks' option `device`; None for its default.
 
     Raises:
-        ConfigError: a plugin does not exist, an option is unknown, a pair does not suit, or a defense needs calibration
-            and the config names no scene for it.
+        ConfigError: a plugin does not exist, an option is unknown, a network and a defense do not fit, or a defense
+            needs calibration and the config names no scene for it.
     """
     for name, bench in config.tasks.items():
         try:

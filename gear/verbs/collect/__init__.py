@@ -1,1 +1,1 @@
-"""The verb `collect`: a config becomes a dataset split on disk."""
+"""The verb `collect`: renders and writes a dataset split from a config."""

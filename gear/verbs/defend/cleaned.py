@@ -33,7 +33,7 @@ class Marker:
     Attributes:
         score: the defense's score, 0..1; None for a defense without one.
         source: sha256 of the dataset's pictures that were cleaned, by path in the dataset.
-        files: sha256 of what was written, by path in the folder of the cleaned pictures.
+        files: sha256 of the written files, by path in the folder of the cleaned pictures.
     """
 
     score: float | None
@@ -42,7 +42,7 @@ class Marker:
 
 
 def kept_marker(root: Path, dataset: Dataset[Any], index: int, spec: DefenseSpec[Any]) -> Marker | None:
-    """The marker of a cleaned sample; None where there is none, the source pictures changed, or a file is damaged."""
+    """The marker of a cleaned sample; None if there is none, the source pictures changed, or a file is damaged."""
     path = inside(root, marker_path(dataset.plan.info.split, index))
     if not path.is_file():
         return None
@@ -83,7 +83,7 @@ def marker_path(split: str, index: int) -> str:
 
 
 def _picture_files(dataset: Dataset[Any], sample: Any) -> dict[str, bytes]:
-    """Those of a sample's encoded files, by path, that change with its pictures; works for any task."""
+    """The encoded files of a sample that depend on its pictures, by path; works for any task."""
     info = dataset.plan.info
     inverted = {name: np.subtract(255, picture, dtype=np.uint8) for name, picture in sample.images.items()}
     other = dataset.task.encode(dataclasses.replace(sample, images=inverted), info).files

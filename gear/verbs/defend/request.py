@@ -1,4 +1,4 @@
-"""What the cleaning of a dataset is asked to do."""
+"""The request of `gear defend`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefendRequest:
-    """As the keywords of `gear.defend`, where they are explained.
+    """The arguments of `gear.defend`, which documents them.
 
     Raises:
         GearError: the seed is out of range.

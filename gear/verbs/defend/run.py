@@ -70,22 +70,22 @@ def defend(
 
     An interrupted run is resumed. Samples whose source pictures changed, or whose files are damaged, are cleaned again.
 
-    The cleaned pictures have the relative paths of the dataset's. Beside them lie, for each split,
-    `defense/<split>/masks/<index>_<camera>.png` (16 bits, 65535 is 1) and `defense/<split>/scores.json`, as far as the
-    defense gives masks and scores.
+    The cleaned pictures have the same relative paths as in the dataset. If the defense gives masks, they are written to
+    `defense/<split>/masks/<index>_<camera>.png` (16 bits, 65535 is 1); scores are written to
+    `defense/<split>/scores.json`.
 
     Args:
         dataset: root of a dataset of any task.
         defense: name of a defense plugin.
-        out: folder for the pictures; may hold other splits of the same.
-        split: of the dataset; may be left out where there is only one.
+        out: folder for the pictures; it may hold other splits of the same dataset.
+        split: split of the dataset; optional if there is only one.
         settings: `KEY=VALUE` texts for the defense's options.
-        seed: of the defense's own draws.
+        seed: seed of the defense's random draws.
         progress: shows a progress bar.
         on_progress: called after every sample.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     request = DefendRequest(dataset=dataset, defense=defense, out=out, split=split, settings=tuple(settings), seed=seed)
     with displayed(Callbacks.of(on_progress=on_progress), "defend", progress=progress) as shown:
@@ -93,10 +93,10 @@ def defend(
 
 
 def run_defend(request: DefendRequest, callbacks: Callbacks) -> DefendReport:
-    """As `defend`.
+    """Runs a request; `defend` documents it.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     found = find("defense", request.defense)
     options = with_overrides(NO_OPTIONS, request.settings)
@@ -138,7 +138,7 @@ def run_defend(request: DefendRequest, callbacks: Callbacks) -> DefendReport:
 
 
 def suitable(found: PluginEntry, task: str) -> DefenseSpec[Any]:
-    """The spec of a defense that needs pictures only.
+    """The spec of a defense, checked to need only pictures.
 
     Raises:
         GearError: the defense is not for the task, or needs a model or calibration data.
@@ -155,10 +155,10 @@ def suitable(found: PluginEntry, task: str) -> DefenseSpec[Any]:
 
 
 def begin(root: Path, split: str, plan: Json) -> None:
-    """Records what the run consists of, or checks that an existing record agrees in all that decides a sample.
+    """Writes the record of the run, or checks that an existing record agrees in everything on which a sample depends.
 
     Raises:
-        DatasetError: the record differs, or the disk refuses to write.
+        DatasetError: the record differs, or a file cannot be written.
     """
     relative = f"{FOLDER}/{split}/plan.json"
     with explained(root):

@@ -26,10 +26,10 @@ from gear.values.errors import DatasetError
 from gear.verbs.evaluate.report import ALARMS, Difference, Estimate, PairedTest, RowReport, Together
 
 ALARM = 0.5
-"""Scores above this are alarms."""
+"""Scores of a defense above this value are alarms."""
 
 Street = tuple[str, int, int]
-"""What a sample shows, in whatever weather: `town/scene`, the seed, the sample's number."""
+"""Identifies the scene of a sample independently of the weather: `town/scene`, seed, and number of the sample."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -44,7 +44,7 @@ class Measured:
         streets: the street that each sample shows; samples of one street are not independent.
         made: number of samples predicted in this run.
         damaged: one line per stored prediction that could not be read.
-        known: metrics gathered before, by report and number of samples, because gathering takes long.
+        known: cache of gathered metrics by report and number of samples, because gathering is slow.
     """
 
     name: str
@@ -76,8 +76,8 @@ class Measured:
 
 
 def streets_of(dataset: Dataset[Any]) -> list[Street]:
-    """The street of each sample. Weather, renderer and patch do not decide where the cars stand, so they are left
-    out.
+    """The street of each sample. Weather, renderer and patch are left out, because the positions of cars do not depend
+    on them.
     """
     return [(*scenes_of(dataset), number) for number in range(len(dataset))]
 
@@ -114,9 +114,9 @@ def mean_cost(notes: Sequence[Note]) -> dict[str, float]:
 
 
 def mask_means(notes: Sequence[Note], *, has_patch: bool) -> dict[str, float]:
-    """Mean metrics of the masks of a defense, and the share of pictures that raise its alarm, as far as it gives them.
+    """Mean metrics of a defense's masks, and the share of pictures that raise its alarm, if it gives masks and scores.
 
-    Without a patch there is nothing to find, and only what is masked by mistake counts.
+    Without a patch the only metric of masks is the share of the picture that is masked by mistake.
     """
     masks = [note.mask for note in notes if note.mask is not None]
     scores = [note.score for note in notes if note.score is not None]
@@ -126,7 +126,7 @@ def mask_means(notes: Sequence[Note], *, has_patch: bool) -> dict[str, float]:
 
 
 def drive_note(dataset: Dataset[Any]) -> str | None:
-    """One line about samples that are frames of drives, which intervals and tests treat as scenes of their own."""
+    """A note on samples that are frames of sequences: intervals and tests treat them as independent scenes."""
     last = dataset.sidecar(-1).record
     if not last.frame:
         return None
@@ -138,7 +138,7 @@ def drive_note(dataset: Dataset[Any]) -> str | None:
 
 
 def together(rows: Sequence[Measured]) -> Iterable[Together]:
-    """Datasets of several scenes or weathers with patches of one label, counted as one dataset."""
+    """Combines datasets of several scenes or weathers with patches of one label into one."""
     labelled: dict[str, list[Measured]] = {}
     for row in rows:
         labelled.setdefault(row.patch, []).append(row)
@@ -167,16 +167,14 @@ def metrics_of(row: Measured) -> dict[str, dict[str, Estimate]]:
 
 
 def as_one(name: str, members: Sequence[Measured]) -> Measured:
-    """Several datasets as one with the given name; what belongs to a dataset, not to a sample, is taken from the
-    first.
-    """
+    """Combines several datasets into one with the given name; properties of datasets are taken from the first one."""
     notes = [note for row in members for note in row.notes]
     streets = [street for row in members for street in row.streets]
     return replace(members[0], name=name, notes=notes, streets=streets, known={})
 
 
 def compared(rows: Sequence[Measured], seed: int) -> Iterable[Difference]:
-    """The differences of every patched dataset to its twins without a patch and with a random one."""
+    """Differences between every dataset with a patch and its twins without a patch and with a random patch."""
     for row in rows:
         for control in CONTROLS[: CONTROLS.index(row.patch) if row.patch in CONTROLS else len(CONTROLS)]:
             for other in rows:
@@ -185,7 +183,7 @@ def compared(rows: Sequence[Measured], seed: int) -> Iterable[Difference]:
 
 
 def difference(row: Measured, other: Measured, seed: int) -> Difference:
-    """The difference between twins over the samples that both have."""
+    """Difference between twins over the samples that both have."""
     count = min(len(row.notes), len(other.notes))
     here, there, streets = row.notes[:count], other.notes[:count], row.streets[:count]
     return Difference(
@@ -211,7 +209,7 @@ def _paired(one: Metrics, other: Metrics) -> dict[str, Estimate]:
 def _tested(
     here: list[Note], there: list[Note], streets: list[Street], report: str, seed: int
 ) -> dict[str, PairedTest]:
-    """Paired tests of every metric that single samples of the report have."""
+    """Paired tests of every metric of the report that is defined for single samples."""
     names = list(dict.fromkeys(name for note in here for name in note.metrics[report]))
     ours, theirs = (
         np.array([[note.metrics[report].get(name, np.nan) for name in names] for note in notes], np.float64)

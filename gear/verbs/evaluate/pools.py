@@ -1,4 +1,6 @@
-"""Pools: several datasets counted as one, whose patches differ from scene to scene but are of one kind."""
+"""Pools: several datasets that are evaluated as one, such as those with the patches of one attack in
+different scenes.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,7 @@ def check_pools(pools: Pools, roots: Iterable[Path]) -> None:
 
 
 def pooled(rows: Sequence[Measured], pools: Pools, seed: int) -> Iterable[Pool]:
-    """Each pool with its differences to the pools `none` and `random`, where these show the same scenes."""
+    """The report of each pool, with its differences to the pools `none` and `random` if these show the same scenes."""
     by_root = {row.dataset.root.resolve(): row for row in rows}
     found = {name: [by_root[Path(root).resolve()] for root in members] for name, members in pools.items()}
     wholes = {name: as_one(name, members) for name, members in found.items()}

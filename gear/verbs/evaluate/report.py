@@ -11,7 +11,7 @@ from gear.measuring.metric_json import known_json
 from gear.values.serial import Json
 
 ALARMS = "alarms"
-"""Share of a dataset's pictures whose score is an alarm: on clean pictures, the false alarms."""
+"""Metric: share of a dataset's pictures whose score is an alarm; for clean pictures the rate of false alarms."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,7 +19,7 @@ class Estimate:
     """A metric with its 95 % interval.
 
     Attributes:
-        value: the metric; NaN where there is nothing to measure.
+        value: value of the metric; NaN if it is undefined.
         interval: lower and upper bound, or None.
         ceiling: value of perfect predictions on the same samples, for metrics of at most 1.
     """
@@ -29,7 +29,7 @@ class Estimate:
     ceiling: float = 1.0
 
     def as_json(self) -> Json:
-        """As JSON; null for values that are not finite, and no ceiling where it is 1."""
+        """The estimate as JSON: null for values that are not finite, and without a ceiling of 1."""
         low, high = self.interval or (math.nan, math.nan)
         value = known_json({"value": self.value, "low": low, "high": high})
         return value | ({"ceiling": self.ceiling} if self.ceiling < 1 else {})
@@ -113,7 +113,7 @@ class Together:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairedTest:
-    """A paired test of a metric that single samples have, between twins.
+    """A paired test between twins of a metric that is defined for single samples.
 
     Attributes:
         mean: mean difference over the pairs; NaN without pairs.
@@ -139,7 +139,7 @@ class Difference:
         metrics: differences of the metrics.
         auroc: area under the ROC curve of the defense's score as a detector of `row` among both, or None without
             scores.
-        paired: tests of the metrics that single samples have, by report and metric.
+        paired: tests of the metrics that are defined for single samples, by report and metric.
     """
 
     row: str
@@ -163,7 +163,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pool:
-    """Several datasets counted as one at the user's request.
+    """Several datasets that are evaluated as one at the user's request.
 
     Attributes:
         name: name of the pool.
@@ -172,7 +172,8 @@ class Pool:
         metrics: metrics over all samples.
         cost: mean seconds per sample: `model_s`, `defense_s`.
         defense: mean metrics of the defense's masks; empty without a defense.
-        differences: to the pools `none` and `random`, where these show the same scenes; `row` and `against` name pools.
+        differences: differences to the pools `none` and `random`, if these show the same scenes; `row` and `against`
+            are names of pools.
     """
 
     name: str
@@ -232,7 +233,7 @@ class EvaluateReport:
         """The first dataset with a patch of this label.
 
         Raises:
-            KeyError: there is none.
+            KeyError: no dataset shows such a patch.
         """
         for row in self.rows:
             if row.patch == patch:

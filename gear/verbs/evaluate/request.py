@@ -1,4 +1,4 @@
-"""What an evaluation is asked to do."""
+"""The request of an evaluation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluateRequest:
-    """As the keywords of `gear.evaluate`, where they are explained; `guard` is the defense with what it learns from.
+    """The arguments of `gear.evaluate`, which documents them; `guard` is the defense with its calibration data.
 
     Raises:
         GearError: a number is out of range.
@@ -37,7 +37,7 @@ class EvaluateRequest:
             raise GearError(f"batch and workers must be at least 1; got {self.batch}, {self.workers}")
 
     def folder(self, task: str) -> Path:
-        """Where everything goes: what was asked for, or `evaluations/<task>/<model>[+<defense>]`."""
+        """Folder of the results: the requested one, or `evaluations/<task>/<model>[+<defense>]`."""
         if self.out is not None:
             return Path(self.out)
         guarded = "" if self.guard is None else f"+{self.guard.defense}"

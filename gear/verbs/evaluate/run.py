@@ -36,13 +36,13 @@ from gear.verbs.evaluate.request import EvaluateRequest
 from gear.verbs.evaluate.table import table
 
 FIT = "fit.json"
-"""What the defense of an evaluation learnt."""
+"""File with the fit report of the defense."""
 
 INTERVALS = "95 %: jackknife over streets, Student's t"
-"""What results.json says of its intervals."""
+"""The note on intervals in results.json."""
 
 LEARNT = {"calibration", "calibration_samples"}
-"""What of an evaluation's plan says from what its defense learnt."""
+"""Keys of an evaluation's plan that describe the calibration data of its defense."""
 
 
 class OtherLessonsError(DatasetError):
@@ -70,37 +70,37 @@ def evaluate(
     on_fit_progress: Progress | None = None,
     on_warning: Warn | None = None,
 ) -> EvaluateReport:
-    """Runs a model, with or without a defense, over datasets of its task; takes up again what was begun.
+    """Evaluates a model, with or without a defense, on datasets of its task; resumes an interrupted run.
 
-    Under `out` lie results.json, table.txt, and for each dataset a folder with the predictions in the format's own
-    result layout and a note of each sample. Samples that have one are never predicted again, unless what was kept of
-    them is damaged (`RowReport.damaged`). Datasets that differ in nothing but their patch are compared sample by
-    sample. Intervals are of 95 %, by the jackknife over streets (`gear.measuring.intervals`).
+    The folder `out` gets results.json, table.txt, and for each dataset a folder with the predictions in the result
+    layout of its format and a note per sample. Samples with a note are not predicted again, unless their files are
+    damaged (`RowReport.damaged`). Datasets that differ only in their patch are compared sample by sample. Intervals are
+    95 % intervals by the jackknife over streets (`gear.measuring.intervals`).
 
     Args:
-        data: roots of datasets, or folders of roots, all of one task; `DIR:SPLIT` says which split of one.
+        data: roots of datasets, or folders of such roots, all of one task; `DIR:SPLIT` selects a split.
         model: name of a model plugin.
         model_settings: `KEY=VALUE` texts for the model's options.
         defense: name of a defense plugin.
-        defense_settings: `KEY=VALUE` texts for its options.
-        split: of the datasets; may be left out where each has only one.
-        calibration: dataset from which the defense learns.
-        calibration_patched: the same with patches.
-        reports: further metrics: the task's own (`reference`); `outside_patch`, without the patch and 5 px around
-            it; or metric plugins, as `NAME` or `NAME:KEY=VALUE,KEY=VALUE`.
-        out: folder for everything; `evaluations/<task>/<model>[+<defense>]` by default.
-        batch: samples that go through the model together; one, or up to four small ones for gear's own, unless given.
-        workers: threads that read, and threads that measure and write, beside the model.
-        seed: of the defense's draws and of the permutation tests.
-        pools: roots among the data that are counted as one dataset, by a name; those that show the same scenes as the
-            pools `none` and `random` are compared with these, sample by sample.
+        defense_settings: `KEY=VALUE` texts for the defense's options.
+        split: split of the datasets; optional if each has only one.
+        calibration: dataset without patches on which the defense is calibrated.
+        calibration_patched: the same dataset with patches.
+        reports: names of further reports: one of the task (`reference`); `outside_patch`, which excludes the patch and
+            5 px around it; or a metric plugin, as `NAME` or `NAME:KEY=VALUE,KEY=VALUE`.
+        out: folder of the results; `evaluations/<task>/<model>[+<defense>]` by default.
+        batch: samples per batch; by default one, and up to four small ones for gear's own models.
+        workers: number of threads that read samples, and of threads that compute metrics and write files.
+        seed: seed of the defense's random draws and of the permutation tests.
+        pools: roots of datasets that are evaluated as one, by name of the pool. Pools with the same scenes as the pools
+            `none` and `random` are compared with these, sample by sample.
         progress: shows a progress bar.
         on_progress: called after every sample.
         on_fit_progress: called after every calibration sample that the defense reads for the first time.
-        on_warning: called with every stored prediction that was damaged and is made again.
+        on_warning: called with a line for every damaged prediction that is made again.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     request = EvaluateRequest(
         data=(data,) if isinstance(data, (str, Path)) else tuple(data),
@@ -121,10 +121,10 @@ def evaluate(
 
 
 def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateReport:
-    """As `evaluate`.
+    """Runs a request; `evaluate` documents it.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     chosen = chosen_model(request.model, request.model_settings)
     datasets = opened(request.data, request.split, chosen, request.reports)
@@ -171,9 +171,9 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
 
 
 def _fit_facts(root: Path, guarded: GuardedModel, request: EvaluateRequest, on_warning: Warn) -> Json:
-    """What the defense learnt, on its own calibration data; kept for runs that find all samples finished.
+    """The fit report of the defense on its calibration data; stored for later runs that need no calibration.
 
-    Every problem is a warning.
+    Every problem in the report is passed on as a warning.
     """
     report = guarded.fit_report()
     if report is not None:
@@ -224,8 +224,8 @@ def _measured(
 
 
 def _begin(root: Path, facts: Json) -> None:
-    """Records what the evaluation consists of, or checks that an existing record agrees in all that decides a
-    prediction.
+    """Writes the plan of the evaluation, or checks that an existing plan agrees in everything on which a prediction
+    depends.
     """
     clear_scratch(root)
     path = inside(root, "plan.json")

@@ -10,18 +10,19 @@ from gear.measuring.text_table import WIDTH, number_table
 from gear.verbs.evaluate.report import ALARMS, Difference, Estimate, EvaluateReport, RowReport
 
 COLUMNS, FURTHER = 4, 2
-"""Number of metrics shown: of the task's own, and of each further report. results.json has all of them."""
+"""Number of metrics shown of the task's own report, and of each further report. results.json has all metrics."""
 
 LABEL_LENGTH = 36
 """Characters of a row's label."""
 
 
 def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
-    """Datasets as rows, each report's first metrics as columns, twins' differences below the dataset.
+    """A table with one row per dataset and the first metrics of each report as columns; differences between twins are
+    below the dataset.
 
     Args:
-        report: what was found.
-        width: characters of a line of the table; columns that do not fit follow in further blocks.
+        report: results of the evaluation.
+        width: number of characters per line; columns that do not fit follow in further blocks.
     """
     columns = _columns(report)
     labels = row_labels(report.rows)
@@ -58,7 +59,7 @@ def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
 
 
 def _times(report: EvaluateReport) -> list[str]:
-    """What the seconds in the table are of."""
+    """A line that explains the seconds in the table."""
     if report.facts["defense"] is not None:
         return [
             "model s: the network alone on defended pictures, one batch at a time; defense s: all that the defense "
@@ -83,7 +84,7 @@ def _columns(report: EvaluateReport) -> list[tuple[str, str]]:
 
 
 def metric_title(report: str, metric: str) -> str:
-    """Title of a column: the metric's name, after the name of its report where that is not the task's own."""
+    """Title of a column: the metric's name, preceded by the name of its report unless that is the task's own."""
     return metric if report == TASK else f"{report}.{metric}"
 
 
@@ -102,10 +103,10 @@ def _difference(one: Difference, report: EvaluateReport, columns: Iterable[tuple
 
 
 def row_labels(rows: Sequence[RowReport]) -> dict[str, str]:
-    """What each row is called in the table: the folder that the user gave, with its split where one folder has several.
+    """Labels of the table's rows: the folder that the user gave, with its split if a folder has several.
 
     Args:
-        rows: of the table.
+        rows: rows of the table.
 
     Returns:
         Labels by the row's name; long paths keep their last `LABEL_LENGTH` characters.
@@ -136,7 +137,7 @@ def _paired(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
 
 
 def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
-    """A metric with its interval as text; empty where there is none."""
+    """A metric with its interval as text; empty if the metric is missing."""
     if one is None:
         return ""
     text = number(one.value, is_signed=is_signed)
@@ -144,7 +145,7 @@ def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
 
 
 def number(value: float | None, *, is_signed: bool = False) -> str:
-    """A number with three decimals, or with one if it is large; `-` where nothing was measured."""
+    """A number with three decimals, or with one if it is large; `-` for NaN."""
     if value is None or value != value:
         return "-"
     sign = "+" if is_signed else ""
@@ -152,7 +153,7 @@ def number(value: float | None, *, is_signed: bool = False) -> str:
 
 
 def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]], labels: Mapping[str, str]) -> list[str]:
-    """Lines about columns in which even perfect predictions stay below 1, because a dataset has too few objects."""
+    """Notes on metrics that stay below 1 even for perfect predictions, because a dataset has too few objects."""
     rows = [(labels[row.name], row.metrics) for row in report.rows]
     rows += [(f"all with patch {pooled.patch}", pooled.metrics) for pooled in report.together]
     lines = []
@@ -164,7 +165,7 @@ def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]], labels:
 
 
 def _absent(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
-    """Lines about metrics with nothing to measure; rows and reports that agree share a line."""
+    """Notes on metrics that are undefined; rows and reports with the same undefined metrics share a line."""
     where: dict[tuple[str, ...], list[str]] = {}
     for row in report.rows:
         for name, metrics in row.metrics.items():
@@ -177,7 +178,9 @@ def _absent(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
 
 
 def _families(missing: Sequence[str], every: Iterable[str]) -> tuple[str, ...]:
-    """The names of the metrics; several with one prefix, of which none has a value, become `prefix_*`."""
+    """Names of the metrics; several names with the same prefix, none of which has a value, are written as
+    `prefix_*`.
+    """
     there = {name.partition("_")[0] for name in set(every) - set(missing)}
     heads = Counter(name.partition("_")[0] for name in missing)
     short = [

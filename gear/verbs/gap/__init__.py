@@ -1,1 +1,1 @@
-"""The verb `gap`: patches put in digitally, held against the same patches rendered."""
+"""The verb `gap`: compares composed patches with the same patches rendered."""

@@ -1,4 +1,4 @@
-"""`gear.gap`: the whole verb as one call."""
+"""`gear.gap`: compares composed patches with the same patches rendered."""
 
 from __future__ import annotations
 
@@ -36,32 +36,32 @@ def gap(
     on_fit_progress: Progress | None = None,
     on_warning: Warn | None = None,
 ) -> GapReport:
-    """Compares digital patches with the same patches rendered, as pictures and by their effect on a model.
+    """Compares composed patches with the same patches rendered, as pictures and by their effect on a model.
 
     Args:
         dataset: root of a split that was collected with probes.
-        patch: what to show, as for `gear.collect`; its twin is collected into `out/twin`, or completed there.
-        twin: root of a twin that was collected before; instead of `patch`.
-        split: of the dataset; may be left out where there is only one.
-        model: a model plugin for the task's metric; without it only pictures are compared.
+        patch: the patch, as for `gear.collect`; the twin with the patch is collected into `out/twin`.
+        twin: root of an existing twin, instead of `patch`.
+        split: split of the dataset; optional if there is only one.
+        model: name of a model plugin, with which the task's metric is measured; without it only pictures are compared.
         model_settings: `KEY=VALUE` texts for the model's options.
-        defense: a defense plugin that guards the model.
-        defense_settings: `KEY=VALUE` texts for its options.
-        calibration: dataset from which the defense learns.
+        defense: name of a defense plugin that guards the model.
+        defense_settings: `KEY=VALUE` texts for the defense's options.
+        calibration: dataset without patches on which the defense is calibrated.
         calibration_patched: the same dataset with patches.
         compositors: names of compositors.
-        samples: number of samples, counted from the split's first one; only these are rendered. All by default.
-        town, scenes: with `patch`, files of the town and of its scene library, where they are not gear's own.
-        out: folder for `gap.json` and `gap.txt`; needed with `patch`.
-        seed: of what the defense draws.
+        samples: number of samples from the first one on; only these are rendered. All by default.
+        town, scenes: files of the town and of its scene library, for `patch` and towns that are not part of gear.
+        out: folder for `gap.json` and `gap.txt`; required with `patch`.
+        seed: seed of the defense's random draws.
         progress: shows a progress bar.
         on_progress: called after every sample.
         on_fit_progress: called after every calibration sample that the defense reads for the first time.
-        on_warning: called, before anything is rendered, with what the user may not have meant: a model that sees these
-            pictures at another size than it was trained on, doubtful calibration data.
+        on_warning: called before anything is rendered with lines on settings that may be unintended, such as pictures
+            of another size than the model was trained on, or doubtful calibration data.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     request = GapRequest(
         dataset=dataset,

@@ -1,4 +1,4 @@
-"""Writes the package."""
+"""Writes the package of `gear new`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gear.values.errors import GearError, UnknownNameError
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 TOKEN = re.compile(r"\{\{(\w+)\}\}")
 TAKEN = ("spec", "build", "hookimpl", *HOOK_OF.values())
-"""What the package itself calls something by: a module of that name would take its place."""
+"""Names that the package uses itself, so that a plugin's module cannot have them."""
 
 USE: dict[Kind, str] = {
     "task": "Use it: `gear collect --task {{name}}`, then `gear view` or `gear sheet` on what it wrote, and"
@@ -40,16 +40,16 @@ def new_package(kind: str, name: str, *, out: str | Path = ".") -> Path:
 
     Args:
         kind: `task`, `model`, `attack`, `defense` or `metric`.
-        name: the plugin's, such as `my_blur`; hyphens are taken for underscores.
-        out: folder in which the package's own folder, `gear-<kind>-<name>`, is made.
+        name: name of the plugin, such as `my_blur`; hyphens are replaced by underscores.
+        out: folder in which the folder of the package, `gear-<kind>-<name>`, is made.
 
     Returns:
-        The package's folder, which appears whole or not at all.
+        The folder of the package. If an error occurs, nothing is written.
 
     Raises:
         UnknownNameError: there is no such kind.
-        GearError: the name will not do, or the folder is there already.
-        DatasetError: the disk refuses.
+        GearError: the name is not valid, or the folder exists already.
+        DatasetError: a file cannot be written.
     """
     if kind not in KINDS:
         raise UnknownNameError("kind of plugin", kind, KINDS)
@@ -104,10 +104,10 @@ def contents(kind: Kind, words: dict[str, str]) -> dict[str, str]:
 
 
 def checked_name(name: str) -> str:
-    """The plugin's name.
+    """Checks the name of a plugin and returns it with underscores.
 
     Raises:
-        GearError: it will not do.
+        GearError: the name is not valid.
     """
     chosen = name.replace("-", "_")
     if not NAME.fullmatch(chosen) or "__" in chosen or chosen.endswith("_"):

@@ -26,8 +26,8 @@ class Town:
     Attributes:
         library: its MJCF and the folders of its assets.
         lanes: its lanes, walks and parking bays.
-        scenes: the scenes of its library that can be used; None where it has no library.
-        faulty: the error of each other scene of the library, by the scene's name.
+        scenes: the usable scenes of its library; None if it has no library.
+        faulty: the errors of the unusable scenes of the library, by name.
     """
 
     library: AssetLibrary
@@ -88,7 +88,7 @@ def read_town(town: str | Path, scenes: str | Path | None = None) -> Town:
     Raises:
         UnknownNameError: there is no such town or file.
         TownError: the town breaks the conventions.
-        ConfigError: no scene of the library can be used, or the library is another town's.
+        ConfigError: no scene of the library is usable, or the library is for another town.
     """
     library = AssetLibrary.for_town(town)
     usable, faulty = _scenes(library, scenes)
@@ -99,7 +99,7 @@ def read_lanes(path: Path) -> LaneGraph:
     """Reads the lane graph of a town's file. Only its custom fields are compiled, since meshes would take seconds.
 
     Raises:
-        TownError: it is no XML, MuJoCo cannot read it, or a lane is malformed.
+        TownError: the file is not XML, MuJoCo cannot read it, or a lane is malformed.
     """
     read_numbers(path)
     try:
@@ -115,7 +115,7 @@ def read_lanes(path: Path) -> LaneGraph:
 
 
 def _scenes(library: AssetLibrary, given: str | Path | None) -> tuple[SceneLibrary | None, dict[str, GearError]]:
-    """The scenes that can be used, and the errors of those that cannot be read or name assets that are not there."""
+    """The usable scenes, and the errors of scenes that cannot be read or that name missing assets."""
     try:
         file = find_scenes(library, "" if given is None else str(given))
     except UnknownNameError:

@@ -54,7 +54,7 @@ class TownGeometry:
     Attributes:
         path: the town's file.
         model: the compiled model.
-        data: with kinematics up to date.
+        data: data of the model after forward kinematics.
         classes: labels of the visible geoms.
     """
 
@@ -83,7 +83,7 @@ class TownGeometry:
         """(N, 3, 3) corners of a geom's triangles in the world, in metres; an infinite plane ends after 10 km.
 
         Raises:
-            TownError: it is a height field, or something else without triangles.
+            TownError: the geom has no triangles, such as a height field.
         """
         if self.model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
             half = np.where(self.model.geom_size[geom, :2] > 0, self.model.geom_size[geom, :2], 1e4)
@@ -165,7 +165,9 @@ def draw_ground(canvas: Canvas, geometry: TownGeometry, bounds_m: Bounds) -> Non
 
 
 def _underground(corners_m: Mapping[int, Array], ground: Sequence[int], bounds_m: Bounds) -> int | None:
-    """The geom that closes cracks from below: ground below every other cover and under the whole town, or None."""
+    """The geom that closes cracks: ground that lies below all other ground and under the whole town; None if there is
+    none.
+    """
     if len(corners_m) < 2:
         return None
     tops_m = {geom: float(corners[..., 2].max()) for geom, corners in corners_m.items()}
@@ -182,7 +184,7 @@ def _labelled(geometry: TownGeometry, names: tuple[str, ...]) -> list[int]:
 
 
 def _from_above(corners_m: Array) -> Array:
-    """(M, 3, 2) those of (N, 3, 3) triangles that have an area in the ground plan."""
+    """(M, 3, 2) projections on the ground of those of (N, 3, 3) triangles that have an area there."""
     flat = corners_m[:, :, :2]
     first, second = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     return flat[np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) > 1e-3]

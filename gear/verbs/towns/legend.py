@@ -112,7 +112,7 @@ def _ground_signs(canvas: Canvas, x: float, y: float) -> float:
 
 
 def _mixed(colour: Colour) -> Colour:
-    """The colour as it looks on the map, where it covers terrain with half opacity."""
+    """The colour on the map, where it is drawn over terrain with half opacity."""
     base = ground_layer.COVERS[0][2]
     return tuple((a + b) // 2 for a, b in zip(colour, base, strict=True))  # type: ignore[return-value]
 

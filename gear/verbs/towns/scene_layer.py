@@ -39,7 +39,7 @@ def scene_colours(scenes: Mapping[str, SceneSpec]) -> dict[str, Colour]:
 
 
 def draw_limits(canvas: Canvas, scene: SceneSpec, colour: Colour) -> None:
-    """Outlines where the ego car, vehicles and people of a scene may be."""
+    """Outlines the areas in which the ego car, vehicles and people of a scene may be."""
     board = scene.boards[0]
     outline = limits_outline_m(board, scene.npc_vehicles)
     if outline is not None:
@@ -131,7 +131,7 @@ def board_rectangle_m(board: BoardSpec, ahead_m: Range, lateral_m: Range) -> Arr
 
 
 def _face_width_m(library: AssetLibrary, board: BoardSpec) -> float:
-    """Width of a board's face: what its scene says, or the size in its file.
+    """Width of a board's face in metres: that of the scene, or the size in the board's file.
 
     Raises:
         TownError: the board's file cannot be compiled or has no face.

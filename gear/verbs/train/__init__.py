@@ -1,1 +1,1 @@
-"""`gear.train`: any task with any network that has losses."""
+"""`gear.train`: trains networks that have losses, for any task."""

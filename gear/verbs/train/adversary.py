@@ -1,8 +1,9 @@
 """Adversarial patch training: part of the training pictures show patches optimised against the network.
 
 As in meta adversarial training (Metzen et al., "Meta Adversarial Training against Universal Patches", 2021) a pool of
-patches is kept: after every epoch one new set of patches enters and the oldest leaves. A compositor puts the patches
-into pictures before augmentation, so that they are cropped, mirrored and recoloured like the rest of the picture.
+patches is kept: after every epoch a new set of patches is added and the oldest is removed. A compositor puts the
+patches into pictures before augmentation, so that they are cropped, mirrored and recoloured like the rest of the
+picture.
 """
 
 from __future__ import annotations
@@ -29,11 +30,11 @@ from gear.values.rng import derive_rng
 from gear.verbs.train.config import Adversarial
 
 CACHE_BYTES = 1 << 30
-"""Of the compositors of all scenes together."""
+"""Memory for the compositors of all scenes together, in bytes."""
 
 
 class Adversary:
-    """Makes patches against the network and puts them into samples."""
+    """Optimises patches against the network and composes them into samples."""
 
     def __init__(
         self,
@@ -47,9 +48,9 @@ class Adversary:
     ) -> None:
         """Args:
             samples: training samples; those of scenes with surfaces (and with probes, for `transport`) get patches.
-            config: which attack is run, how often and how long.
+            config: the attack with its settings.
             task: task that the attack must support.
-            seed: seed of all random draws here.
+            seed: seed of all random draws of this class.
             device: device of the compositor.
             cache_bytes: memory for the compositors of all scenes together.
 

@@ -28,7 +28,7 @@ from gear.verbs.train.optimise import RunningMean
 FILE = "checkpoint.safetensors"
 
 BROKEN = (SafetensorError, OSError, KeyError, ValueError, RecursionError)
-"""What reading a file ends in that is no checkpoint."""
+"""Exceptions that occur when a file that is not a checkpoint is read."""
 
 
 @dataclass(slots=True)
@@ -41,10 +41,10 @@ class TrainingState:
         elapsed_s: time that steps and validations have taken, in seconds.
         best_step: step whose weights were the best in validation; -1 before the first validation.
         best_sha256: hash of the file of those weights; "" in checkpoints of older versions.
-        worse: number of validations since then.
+        worse: number of validations since the best one.
         broken: number of consecutive skipped steps, up to the last step.
         steps: `step`, `loss` and `rate` of every stretch of the training.
-        open_losses: losses of steps that belong to no stretch yet.
+        open_losses: losses of the steps after the last complete stretch.
         validations: `step`, `elapsed_s`, `took_s`, `loss` and metrics of every validation.
     """
 
@@ -110,7 +110,7 @@ def save(
 def load(
     root: Path, plan: Json, module: nn.Module, mean: RunningMean, optimiser: torch.optim.Optimizer
 ) -> tuple[TrainingState, dict[str, Tensor]] | None:
-    """Loads a checkpoint into the parts of a training; does nothing where there is none.
+    """Loads a checkpoint into the parts of a training; does nothing if there is none.
 
     Returns:
         The progress and the extra tensors.
@@ -140,7 +140,9 @@ def load(
 
 
 def begun_config(root: Path) -> Json:
-    """The config of the training in a folder; None where there is none or it cannot be read, which `load` reports."""
+    """The config of the training in a folder; None if there is no checkpoint, or if it cannot be read, which `load`
+    reports.
+    """
     path = root / FILE
     if not path.exists():
         return None
@@ -183,7 +185,7 @@ def check_plan(root: Path, there: Json, wanted: Json) -> None:
     """Checks that the training in a folder is the one that was requested.
 
     Raises:
-        DatasetError: it is another one; the text names what differs.
+        DatasetError: the training in the folder is another one; the message names the difference.
     """
     if there == wanted:
         return

@@ -16,10 +16,12 @@ from gear.contracts.models import Recipe
 from gear.values.errors import FieldError
 
 SCALES, CROPS_PX = (0.1, 100.0), (16, 8192)
-"""Beyond these, windows and pictures need more memory than there is."""
+"""Largest sides of crops and pictures; larger ones need more memory than machines have."""
 
 MOST_RATE = 1e6
-"""No network learns at it; optimisers fail at rates that single precision has not."""
+"""Largest learning rate. No network learns at this rate, and optimisers fail at rates that single precision cannot
+represent.
+"""
 
 SHARES = ("warm_up", "final_rate", "validation_share")
 
@@ -59,7 +61,7 @@ class Adversarial:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainConfig(Recipe):
-    """A recipe and the circumstances of one training.
+    """The configuration of one training: the network's recipe and further settings.
 
     Attributes:
         seed: seed of initial weights, order, augmentation and the network's own random draws.
@@ -133,7 +135,7 @@ class TrainConfig(Recipe):
 
 
 FLAGS = {"learning_rate": "lr", "time_budget_s": "time-budget"}
-"""Of the command, where they are not called like the key."""
+"""Flags of the command whose name differs from the key."""
 
 
 def read_config(recipe: Recipe, flags: Mapping[str, Any], settings: Iterable[str] = ()) -> TrainConfig:

@@ -17,7 +17,7 @@ from gear.values.rng import derive_rng
 from gear.verbs.train.config import TrainConfig
 
 BATCHES_AHEAD = 3
-"""Made while the network is busy with an earlier one."""
+"""Number of batches that are prepared in advance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class Position:
 
 
 class Feed:
-    """Batches from a position on. A batch depends only on the seed, the position and the samples."""
+    """Supplies batches from any position on. A batch depends only on the seed, the position and the samples."""
 
     def __init__(
         self,
@@ -50,14 +50,14 @@ class Feed:
         device: torch.device | str = "cpu",
     ) -> None:
         """Args:
-        samples: to train on.
-        config: batch size, seed, framing, augmentation, threads.
-        views: cameras that the network looks at.
-        change: applied before augmentation.
-        device: where pictures are to be: they go there as bytes and become numbers there.
+            samples: training samples.
+            config: batch size, seed, framing, augmentation and number of threads.
+            views: names of the cameras that the network uses.
+            change: function that is applied to each sample before augmentation.
+            device: device of the batches. Pictures are copied there as bytes and converted there.
 
         Raises:
-            GearError: there is not even one sample.
+            GearError: there are no samples.
         """
         if not len(samples):
             raise GearError("there is no sample to train on")

@@ -33,19 +33,19 @@ from gear.verbs.train.results import check_kept, is_kept, write_weights
 from gear.verbs.train.validate import rank, total, validate
 
 NOTE_EVERY = 10
-"""Steps whose mean loss becomes one point of the history."""
+"""Number of steps whose mean loss is one point of the history."""
 
 CHECKPOINT_EVERY_S = 120.0
 VALIDATION_SHARE = 0.1
-"""Of the time, where time is the budget."""
+"""Largest share of a time budget that validations take."""
 
 MOST_VALIDATIONS = 8
-"""In that time."""
+"""Largest number of validations in a time budget."""
 
 MOST_BROKEN_STEPS = 20
 
 ONE_VALUE = "more than 1 value per channel"
-"""What torch says where a batch has nothing to normalise over."""
+"""Beginning of torch's message for a batch that has only one value per channel to normalise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -79,10 +79,10 @@ class Parts:
 
 
 OnStep = Callable[[TrainingState, float, dict[str, float] | None], None]
-"""Called with the state, the share of the training that is over (0..1), and, after a validation, its metrics."""
+"""Called with the state, the finished share of the training (0..1), and, after a validation, its metrics."""
 
 Pack = Callable[[dict[str, torch.Tensor], TrainingState], bytes]
-"""The file of the mean weights, which are the best so far."""
+"""A function that returns the bytes of the file with the averaged weights."""
 
 
 class Training:
@@ -220,7 +220,7 @@ class Training:
             return loss
 
     def _count_broken(self, is_finite: bool, loss: torch.Tensor) -> None:
-        """Counts steps that are skipped because the loss overflows; raises when nothing else happens."""
+        """Counts steps that are skipped because the loss overflows; raises if all recent steps are skipped."""
         progress = self.progress
         progress.broken = 0 if is_finite else progress.broken + 1
         if progress.broken > MOST_BROKEN_STEPS:

@@ -92,5 +92,5 @@ class Buffers:
 
 
 def clip_gradients(module: nn.Module, most: float) -> Tensor:
-    """Scales gradients to a norm of at most `most` (0 leaves them); returns the norm before."""
+    """Scales gradients to a norm of at most `most`, or not at all if that is 0; returns the original norm."""
     return nn.utils.clip_grad_norm_(module.parameters(), most if most > 0 else math.inf)

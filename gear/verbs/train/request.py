@@ -1,4 +1,4 @@
-"""What a training is asked to do."""
+"""The request of a training."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gear.values.errors import GearError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainRequest:
-    """As the keywords of `gear.train`, where they are explained; None leaves a value to the network's recipe.
+    """The arguments of `gear.train`, which documents them; None leaves a value to the network's recipe.
 
     Raises:
         GearError: there are no data.
@@ -63,7 +63,7 @@ class TrainRequest:
 
     @property
     def command_flags(self) -> dict[str, Any]:
-        """What the command that repeats the training says beside data and settings, by flag."""
+        """Further flags, besides data and settings, of the command that repeats the training, by flag."""
         return {
             "epochs": self.epochs,
             "time_budget": _budget(self.time_budget_s),
@@ -77,5 +77,5 @@ class TrainRequest:
 
 
 def _budget(seconds: float | None) -> str | None:
-    """As the command takes it: every digit, no exponent, and nothing where epochs are counted."""
+    """The time budget as text for the command: all digits, no exponent, empty if epochs are counted."""
     return None if not seconds else f"{np.format_float_positional(seconds, trim='-')}s"

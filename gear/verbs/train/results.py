@@ -125,16 +125,18 @@ def write_weights(root: Path, weights: bytes) -> None:
 
 
 def is_kept(root: Path, progress: TrainingState) -> bool:
-    """Whether the file of the best weights is there; any file, where an old checkpoint does not record its hash."""
+    """Whether the file of the best weights exists with the recorded hash; any file counts if an old checkpoint records
+    no hash.
+    """
     path = root / WEIGHTS
     return path.is_file() and progress.best_sha256 in ("", sha256(read_bytes(path)))
 
 
 def check_kept(root: Path, progress: TrainingState) -> None:
-    """Checks that the file of the best weights is there.
+    """Checks that the file of the best weights exists.
 
     Raises:
-        DatasetError: it is missing, or is another file.
+        DatasetError: the file is missing, or is another one.
     """
     if not (root / WEIGHTS).is_file():
         raise DatasetError(root / WEIGHTS, f"is gone; put it back, or delete {CHECKPOINT} beside it to train again")
@@ -210,7 +212,9 @@ def card(root: Path, origin: Origin, progress: TrainingState) -> str:
 
 
 def _size_lines(origin: Origin) -> list[str]:
-    """Lines on how to use the weights on pictures of the training's size, where that is not the task's default."""
+    """Lines of the card on how to use the weights for pictures of the training's size, if that is not the task's
+    default.
+    """
     given = origin.config.options
     scale = read_node(origin.model.spec.config, given, "options") if isinstance(given, Mapping) else None
     seen = getattr(scale, SCALE, None)

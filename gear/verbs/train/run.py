@@ -1,4 +1,4 @@
-"""`gear.train`: the whole verb as one call."""
+"""`gear.train`: trains a network on datasets of its task."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ from gear.verbs.train.starting import (
 
 GIGABYTE = 1e9
 CHANGE_NOTHING = ("workers", "cache_gb", "device")
-"""Settings with which a training may be taken up again that was begun with others."""
+"""Settings that may change when an interrupted training is resumed, because weights do not depend on them."""
 
 Paths = str | Path | Sequence[str | Path]
 
@@ -59,12 +59,12 @@ class TrainReport:
 
     Attributes:
         root: folder of the results.
-        weights: the file, for `weights=FILE` of the network.
-        steps: how many were made in all.
-        elapsed_s: time that they took, with validations.
-        best_step: after which the weights stood.
-        metrics: of the validation of those weights.
-        metric: name of the one that chose them; "" is the loss.
+        weights: path of the weights file, for the option `weights=FILE` of the network.
+        steps: number of steps over all runs.
+        elapsed_s: time of steps and validations in seconds.
+        best_step: step after which the weights were saved.
+        metrics: metrics of these weights in validation.
+        metric: name of the metric by which they were chosen; "" for the loss.
     """
 
     root: Path
@@ -109,30 +109,30 @@ def train(
     on_progress: Progress | None = None,
     on_warning: Warn | None = None,
 ) -> TrainReport:
-    """Trains a network; resumes an interrupted training in `out`, and does nothing where it is finished.
+    """Trains a network; resumes an interrupted training in `out`, and does nothing if it is finished.
 
-    The same seed, data and settings give the same weights on the CPU of one machine, stopped and taken up again or not,
-    unless time is the budget.
+    The same seed, data and settings give the same weights on the CPU of one machine, with or without interruptions,
+    unless the training has a time budget.
 
     Args:
         task: name of a task plugin.
         model: name of a model plugin that can do the task and be trained.
         data: roots of datasets, folders of roots, or `DIR:SPLIT`.
         out: folder of the results: `model.safetensors`, `train.json`, `card.md`, `curves.png`.
-        val: data to validate on; by default some sequences of `data` are kept for it.
-        epochs, time_budget_s, batch, lr, seed, init, precision, device, workers: as in `TrainConfig`, where `lr` is
-            `learning_rate`; what is not given is as the network's recipe says.
+        val: validation data; by default some sequences of `data` are held out.
+        epochs, time_budget_s, batch, lr, seed, init, precision, device, workers: fields of `TrainConfig`, where `lr` is
+            `learning_rate`; by default those of the network's recipe.
         adversarial: name of an attack; see `Adversarial`.
-        settings: further `KEY=VALUE` texts for any key of `TrainConfig`, such as `augmentation.flip=0`; the network's
-            own options are `options.KEY`.
-        allow_test_data: whether `test` splits may be learnt from.
+        settings: `KEY=VALUE` texts for any key of `TrainConfig`, such as `augmentation.flip=0`; options of the network
+            are `options.KEY`.
+        allow_test_data: whether `test` splits are accepted as training data.
         progress: shows a progress bar.
         on_step: called after every step and every validation, with the state of the training.
         on_progress: called after every step; with a time budget the number of all steps is an estimate.
-        on_warning: called with what was chosen for the time budget, and with what the user may not have meant.
+        on_warning: called with lines on values chosen for the time budget, and on settings that may be unintended.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     request = TrainRequest(
         task=task,
@@ -159,10 +159,10 @@ def train(
 
 
 def run_train(request: TrainRequest, callbacks: Callbacks, on_step: OnStep | None = None) -> TrainReport:
-    """As `train`.
+    """Runs a request; `train` documents it.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     prepare()
     origin = _origin(request, callbacks)
@@ -201,7 +201,7 @@ def with_progress(on_step: OnStep | None, callbacks: Callbacks) -> OnStep:
 
 
 def _origin(request: TrainRequest, callbacks: Callbacks) -> Origin:
-    """Opens, finds and checks everything that a request names, and chooses what depends on the data."""
+    """Opens, finds and checks everything that a request names, and chooses the values that depend on the data."""
     found, task_found = find("model", request.model), find("task", request.task)
     config = read_config(trainable(found, request.task), request.config_values, request.config_settings)
     check_options(found, config)
@@ -247,7 +247,7 @@ def trainable(found: PluginEntry, task: str) -> Any:
     """The recipe of a network for a task.
 
     Raises:
-        GearError: it does not do the task, or cannot be trained.
+        GearError: the network is for other tasks, or cannot be trained.
     """
     spec = found.spec
     assert isinstance(spec, ModelSpec)
@@ -321,7 +321,7 @@ def _plan(origin: Origin) -> Json:
 
 
 def _samples(request: TrainRequest, config: TrainConfig) -> tuple[Samples, Samples]:
-    """What to train on, and what to validate on."""
+    """Training samples and validation samples."""
     task, allowed = request.task, request.allow_test_data
     training = all_of(open_all(request.data, task, names=TRAINING, allow_test_data=allowed))
     if request.val:

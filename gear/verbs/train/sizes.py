@@ -27,8 +27,8 @@ NEARLY_WHOLE = 0.9
 def picture_scale(found: PluginEntry, config: TrainConfig, samples: Samples) -> float:
     """The factor by which pictures are scaled down for training, at most 1.
 
-    The value of the config, if it has one. Otherwise 1 without a time budget, on a GPU, with crops (which are smaller
-    than pictures), and for networks whose weights cannot record the factor for their later use.
+    It is the value in the config, if there is one. Otherwise it is 1 without a time budget, on a GPU, with crops (which
+    are smaller than pictures), and for networks whose weights cannot record the factor for later use.
 
     Raises:
         GearError: smaller pictures are requested together with adversarial patches.

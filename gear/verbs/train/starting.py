@@ -1,4 +1,4 @@
-"""Building a network for training, and what it begins with."""
+"""Builds a network for training and loads its initial weights."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from gear.values.serial import Json
 from gear.verbs.train.config import TrainConfig
 
 SCALE = "input_scale"
-"""Option of many networks: at which share of the picture's size they run; null leaves it to the weights."""
+"""Name of the networks' option for the factor by which they resize pictures; null takes it from the weights."""
 
 TRUNK = "trunk:"
-"""Before the file, or the name of a network, of which `--init` takes what fits."""
+"""Prefix of a file, or of a network's name, from which `--init` loads the weights with matching keys and shapes."""
 
 FLAGS = {"weights": "--init", "seed": "--seed", "device": "--device", "precision": "--precision"}
-"""Options of a network that the training gives it, and what says them."""
+"""Options of a network that the training sets, and the flags for them."""
 
 
 def check_options(found: PluginEntry, config: TrainConfig) -> None:
@@ -47,7 +47,7 @@ def check_options(found: PluginEntry, config: TrainConfig) -> None:
 
 
 def sizes_note(found: PluginEntry, config: TrainConfig, samples: Samples) -> str:
-    """A note for pictures of several sizes, where the weights would record the scale of one size; empty otherwise."""
+    """A note for pictures of several sizes, if the weights would record the scale of one size; otherwise empty."""
     widths_px = _widths_px(samples)
     if len(widths_px) == 1 or not _notes_share(found, config):
         return ""
@@ -84,7 +84,7 @@ def with_scale(found: PluginEntry, config: TrainConfig, share: float, begun: Jso
         found: the network's plugin.
         config: of the training.
         share: result of `picture_share`.
-        begun: config of the training that is resumed; it has the scale of first weights that were deleted since.
+        begun: config of the resumed training; it records the scale of initial weights that were deleted since.
     """
     if not _notes_share(found, config):
         return config
@@ -154,7 +154,7 @@ def build_network(found: PluginEntry, config: TrainConfig, *, precision: str) ->
 
     Raises:
         ConfigError: an option does not fit.
-        PluginError: a third party's `build` failed.
+        PluginError: the `build` function of another package failed.
     """
     wanted = {"weights": NONE, "seed": str(config.seed), "device": config.device, "precision": precision}
     fields = {field.name for field in dataclasses.fields(found.spec.config)}
@@ -176,7 +176,7 @@ def go_on_from(model: Any, init: str) -> None:
 
 
 def begin_with(found: PluginEntry, model: Any, init: str) -> str:
-    """Loads first weights into a network.
+    """Loads initial weights into a network.
 
     Args:
         found: the network's plugin.
@@ -188,7 +188,7 @@ def begin_with(found: PluginEntry, model: Any, init: str) -> str:
         A note for the user; empty where there is none.
 
     Raises:
-        GearError: there are no such weights, or they do not fit.
+        GearError: these weights do not exist, or do not fit the network.
         UnknownNameError: `init` is neither a file nor a name that the network declares.
     """
     spec = found.spec

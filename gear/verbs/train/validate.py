@@ -23,13 +23,14 @@ LOSS = "loss"
 def validate(
     model: Any, found: PluginEntry, task: Task[Any, Any], samples: Sequence[Any], views: Sequence[str]
 ) -> dict[str, float]:
-    """Metrics over the samples, with the model in eval mode.
+    """Computes the metrics over samples, with the model in eval mode.
 
-    Those of the task's evaluator, those of its reports as `<report>.<metric>`, and `loss`, the mean of summed losses.
+    They are those of the task's evaluator, those of its reports as `<report>.<metric>`, and `loss`, the mean of summed
+    losses.
 
     Raises:
-        GearError: a prediction cannot be measured, or the task's metrics are no numbers.
-        PluginError: a third party's network failed, or gives something else than losses and the task's predictions.
+        GearError: a prediction cannot be measured, or a metric of the task is not a number.
+        PluginError: a network of another package failed, or returned neither losses nor predictions of the task.
     """
     evaluators = {"": task.evaluator()}
     if isinstance(task, Reports):
@@ -69,10 +70,10 @@ def _said(given: Any) -> dict[str, float]:
 
 
 def total(losses: Mapping[str, torch.Tensor]) -> torch.Tensor:
-    """The sum of named losses, which is what is minimised.
+    """The sum of named losses, which the training minimises.
 
     Raises:
-        TypeError: they are no names with tensors.
+        TypeError: the losses are not tensors by name.
     """
     if not isinstance(losses, Mapping) or not losses:
         given = "none" if isinstance(losses, Mapping) else type(losses).__name__
@@ -81,7 +82,7 @@ def total(losses: Mapping[str, torch.Tensor]) -> torch.Tensor:
 
 
 def rank(metrics: Mapping[str, float], spec: TaskSpec[Any]) -> tuple[float, float]:
-    """How good a validation is; larger is better. The task's metric decides, between equals the loss."""
+    """A sort key of validations, where larger is better: the task's metric first, then the loss."""
     loss = -metrics[LOSS] if metrics[LOSS] == metrics[LOSS] else -math.inf
     value = metrics.get(spec.metric, math.nan)
     if value != value:

@@ -1,1 +1,1 @@
-"""The verb `verify`: every file of a dataset checked, and damaged ones made again."""
+"""The verb `verify`: checks every file of a dataset, and can make damaged files again."""

@@ -1,4 +1,4 @@
-"""The collection that a split came from, resolved again from what its files say."""
+"""Finds the collection job that made a split, from the split's plan or manifest."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ HASH = 1 + 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sources:
-    """Files that a dataset does not name, because they lie on one machine.
+    """Files that a dataset does not name, because their paths depend on the machine.
 
     Attributes:
-        patch: the patch, where the dataset's own copy is damaged; else None.
-        town: MJCF file of a town that is none of gear's own.
+        patch: the patch, if the dataset's copy is damaged; otherwise None.
+        town: MJCF file of a town that is not part of gear; otherwise None.
         scenes: its scene library.
         simulation: simulation config, where it is none of gear's own.
     """
@@ -49,15 +49,15 @@ class Sources:
 
 
 def job_of(root: Path, check: SplitCheck, sources: Sources) -> Job:
-    """The collection that made a split.
+    """The collection job that made a split.
 
     Args:
         root: of the dataset.
-        check: what is known of the split.
+        check: result of the check of the split.
         sources: files that the dataset does not name.
 
     Raises:
-        DatasetError: plan and manifest do not say how the split was made, or the same cannot be made here.
+        DatasetError: neither plan nor manifest records how the split was made, or the same files cannot be made here.
     """
     known = _known(root, check)
     with _patch_folder(root, check, known, sources) as patch:
@@ -88,10 +88,10 @@ def job_of(root: Path, check: SplitCheck, sources: Sources) -> Job:
 
 
 def _known(root: Path, check: SplitCheck) -> dict[str, Json]:
-    """How a split was made: by its plan, or by its manifest where the plan is damaged.
+    """The recipe of a split from its plan, or from its manifest if the plan is damaged.
 
     Raises:
-        DatasetError: neither says.
+        DatasetError: neither records a recipe.
     """
     plan, manifest = check.plan, check.manifest if isinstance(check.manifest, dict) else {}
     recipe = (plan.recipe if plan is not None else None) or manifest.get("config")
@@ -115,10 +115,10 @@ def _known(root: Path, check: SplitCheck) -> dict[str, Json]:
 
 @contextmanager
 def _patch_folder(root: Path, check: SplitCheck, known: dict[str, Json], sources: Sources) -> Iterator[str]:
-    """What `--patch` is to be for a split: a word, or a temporary folder with the patch under its own name.
+    """The value of `--patch` for a split: a word, or a temporary folder with the patch under its own name.
 
     Raises:
-        DatasetError: the patch is damaged and was not given, or another one was.
+        DatasetError: the patch is damaged and was not given, or another patch was given.
     """
     label, digest = known["patch"]["label"], known["patch"]["sha256"]
     if label in (NO_PATCH, RANDOM_PATCH):

@@ -1,4 +1,4 @@
-"""What `gear verify` reports."""
+"""The report of `gear verify`."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ class VerifyReport:
 
     Attributes:
         root: its folder.
-        files: how many files were checked.
-        findings: files that are not as they should be; after a repair, those that still are not.
+        files: number of checked files.
+        findings: files that are damaged, missing or unexpected; after a repair, those that remain so.
         repaired: files that a repair has made again, or deleted as leftovers.
-        unrepaired: why a split could not be repaired, one line each.
+        unrepaired: for each split that could not be repaired, one line with the reason.
     """
 
     root: Path
@@ -29,7 +29,7 @@ class VerifyReport:
 
     @property
     def is_whole(self) -> bool:
-        """Whether every file is as gear wrote it, and no other one lies among them."""
+        """Whether every file is as gear wrote it, and there are no unexpected files."""
         return not self.findings
 
     def lines(self) -> list[str]:
@@ -47,7 +47,7 @@ class VerifyReport:
         return [*lines, f"{self.root}: {', '.join(counts)} of {self.files} files"]
 
     def as_json(self) -> Json:
-        """For programs."""
+        """The report as JSON, for programs."""
         return {
             "root": str(self.root),
             "files": self.files,

@@ -1,8 +1,8 @@
 """`gear.average_weights`: the mean of two states of one network.
 
-A fine-tuned network and the one that it began with often lie in one valley of the loss, and on scenes that neither has
-seen a network between them does better than both (Wortsman et al., "Robust fine-tuning of zero-shot models", CVPR 2022,
-section 3).
+A fine-tuned network and the network from which it was trained often lie in one valley of the loss. On scenes that
+neither was trained on, an average of both can be better than either (Wortsman et al., "Robust fine-tuning of zero-shot
+models", CVPR 2022, section 3).
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ from gear.verbs.weights.convert import ConvertReport, check_target
 from gear.verbs.weights.show import file_of
 
 NETWORK = ("model", "task", "options")
-"""What both files must say alike, or one of them not at all."""
+"""Metadata keys that must have equal values in both files, or be missing in one of them."""
 
 MEASURED = ("metrics", "intervals", "source", "source_sha256")
-"""What is no longer true of the mean."""
+"""Metadata keys that do not apply to the average."""
 
 
 def average_weights(
     first: str | Path, second: str | Path, out: str | Path, *, share: float = 0.5, halves: bool = False
 ) -> ConvertReport:
-    """Writes `(1 - share) * first + share * second`; counters are those of `second`.
+    """Writes the weights `(1 - share) * first + share * second`; integer tensors are those of `second`.
 
-    The metadata are those of `second` without metrics; the training data are those of both files, and `averaged` holds
-    both hashes.
+    The metadata are those of `second` without metrics, with the training data of both files and their hashes under
+    `averaged`.
 
     Args:
         first: a safetensors file, or the name of a model with shipped weights.
-        second: likewise.
+        second: another such file or name.
         out: file to write.
         share: weight of the second file, between 0 and 1.
         halves: whether tensors of two and more dimensions are stored in float16.
 
     Raises:
-        GearError: the files belong to different networks, or the user can mend something else.
+        GearError: the files belong to different networks, cannot be read, or cannot be written.
     """
     if not 0 < share < 1:
         raise GearError(f"--share {share:g}: must be between 0 and 1, and neither")
@@ -88,7 +88,7 @@ def _between(one: Tensor, two: Tensor, share: float) -> Tensor:
 
 
 def _both(one: Json, two: Json) -> Json:
-    """The training data of both files, by part; those of the second where the first records none."""
+    """The training data of both files, by part; only those of the second if the first records none."""
     if not (isinstance(one, Mapping) and isinstance(two, Mapping)):
         return two if two is not None else one
     merged: dict[str, Any] = dict(two)

@@ -1,4 +1,4 @@
-"""Which state of a checkpoint fits a network, and what to say where none does."""
+"""Chooses the state of a checkpoint that fits a network, or explains why none does."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from gear.plugins.text import printable
 from gear.values.errors import GearError
 
 LONGEST = 2000
-"""Characters of a message, whose keys and names are a stranger's."""
+"""Largest length of a message in characters, since keys and names in a checkpoint may be long."""
 
 SHOWN = 6
-"""Entries of a checkpoint that a message names."""
+"""Largest number of a checkpoint's entries that a message names."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Chosen:
-    """A state that fits.
+    """A state dict that fits the network.
 
     Attributes:
-        name: what was taken of the checkpoint; "" for all of it.
+        name: path of the entry in the checkpoint; "" for the whole checkpoint.
         state: tensors by the network's keys.
         others: names of further states that fit.
     """
@@ -43,18 +43,18 @@ class Chosen:
 def choose_state(
     found: PluginEntry, wanted: Mapping[str, Tensor], entries: list[Candidate], path: Path, entry: str = ""
 ) -> Chosen:
-    """The first candidate that is exactly the network's state.
+    """The first candidate with exactly the keys and shapes of the network.
 
     Args:
         found: the model; its spec may translate keys of published files.
-        wanted: the network's own state.
-        entries: of the checkpoint, the likeliest first.
-        path: of the checkpoint, for messages.
-        entry: path of the one to take; "" tries all.
+        wanted: state dict of the network.
+        entries: entries of the checkpoint, the most probable first.
+        path: path of the checkpoint, for messages.
+        entry: path of the entry to take; "" tries all.
 
     Raises:
-        GearError: none fits, or there is no such entry.
-        PluginError: a third party's translation of keys failed.
+        GearError: no entry fits, or the named entry does not exist.
+        PluginError: the function `convert` of another package's spec failed.
     """
     candidates = list(candidates_of(entries))
     if entry:
@@ -81,7 +81,7 @@ def _same(one: Mapping[str, Tensor], other: Mapping[str, Tensor]) -> bool:
 
 
 def _translated(found: PluginEntry, candidate: Candidate) -> Mapping[str, Tensor] | None:
-    """The state under the network's keys; None where the model's translation cannot make anything of it."""
+    """The state with the network's keys; None if the model's `convert` does not apply to it."""
     convert = _convert_of(found)
     if convert is None:
         return candidate.state
@@ -99,7 +99,7 @@ def _refusal(
     entries: list[Candidate],
     path: Path,
 ) -> GearError:
-    """What keeps the candidate that has most of the network's keys from being its state."""
+    """The error message for the candidate that shares most keys with the network."""
 
     def shared(one: Candidate) -> int:
         state = _translated(found, one)

@@ -1,4 +1,4 @@
-"""`gear.convert_weights`: a published file as safetensors, checked against the network that is to use it."""
+"""`gear.convert_weights`: converts a published file to safetensors, checked against the network."""
 
 from __future__ import annotations
 
@@ -30,21 +30,22 @@ from gear.verbs.weights.choose import choose_state
 SUFFIX = ".safetensors"
 
 PLAIN_BUILD = {"weights": NONE, "device": "cpu"}
-"""How a network is built to compare keys with; options that a config does not have are left out."""
+"""Options with which a network is built to compare keys; options that a config does not have are left out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConvertReport:
-    """What was written.
+    """The result of a conversion.
 
     Attributes:
-        model: whose weights they are.
-        path: of the new file.
-        sha256: of it.
-        size_mb: of it, in 10^6 bytes.
-        tensors: how many it holds.
-        entry: what was taken of the published file, as a path of names: `model`, `checkpoint.net.module`; "" for all.
-        others: paths of what fits the network, too, and was not taken.
+        model: name of the model.
+        path: path of the new file.
+        sha256: hash of the new file.
+        size_mb: size of the new file in 10^6 bytes.
+        tensors: number of tensors in the file.
+        entry: path of the converted entry of the published file, such as `model` or `checkpoint.net.module`; "" for
+            all.
+        others: paths of further entries that fit the network.
     """
 
     model: str
@@ -57,12 +58,12 @@ class ConvertReport:
 
     @classmethod
     def of(cls, model: str, path: Path, tensors: int) -> ConvertReport:
-        """Of a file that has just been written."""
+        """The report on a file that was just written."""
         data = read_bytes(path)
         return cls(model=model, path=path, sha256=sha256(data), size_mb=len(data) / 1e6, tensors=tensors)
 
     def summary(self) -> str:
-        """For a person."""
+        """The result as lines of text."""
         taken = f"taken from: {self.entry}\n" if self.entry else ""
         others = f"fits, too, and was not taken (--entry NAME): {', '.join(self.others)}\n" if self.others else ""
         return (
@@ -80,23 +81,23 @@ def convert_weights(
     entry: str = "",
     halves: bool = False,
 ) -> ConvertReport:
-    """Makes a safetensors file of a published one, strictly checked against the network.
+    """Converts a published weights file to safetensors, strictly checked against the network.
 
-    Nothing in the published file is run; what of it is not the network (an optimiser's state, criteria) is left out.
-    Prefixes of wrappers (`module.`, `_orig_mod.`, `net.module.`) are taken off the keys. Where several entries of a
-    checkpoint fit, such as `model` and `ema`, the report says which one was taken. The metadata of a safetensors file
-    are kept, and given options are added to them.
+    No code in the published file is run. Parts that do not belong to the network, such as the state of an optimiser,
+    are left out. Prefixes of wrappers (`module.`, `_orig_mod.`, `net.module.`) are removed from the keys. If several
+    entries of a checkpoint fit, such as `model` and `ema`, the report names the converted one. The metadata of a
+    safetensors file are kept, and given options are added to them.
 
     Args:
         model: name of a model plugin.
-        source: a checkpoint of PyTorch's (zip or older), or a safetensors file.
+        source: a PyTorch checkpoint (zip or older format), or a safetensors file.
         out: file to write.
         settings: `KEY=VALUE` texts for the model's options that change its graph.
         entry: path of the checkpoint's entry to take, such as `ema` or `checkpoint.model`; "" chooses one that fits.
         halves: whether weights of two dimensions and more are stored in float16.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     target, origin = Path(out), Path(source)
     check_target(target, origin)
@@ -122,10 +123,10 @@ def convert_weights(
 
 
 def check_target(target: Path, *origins: Path) -> None:
-    """Where a weights file is to be written.
+    """Checks the path of the new weights file and returns it.
 
     Raises:
-        GearError: its name does not end as it should, or it is one of the files to read.
+        GearError: the suffix of the path is wrong, or it is one of the files to read.
     """
     if target.suffix != SUFFIX:
         raise GearError(f"{target}: the file to write is to end in {SUFFIX}")
@@ -137,7 +138,7 @@ def _graph(found: PluginEntry, settings: Iterable[str]) -> Any:
     """The network's module, with random weights.
 
     Raises:
-        GearError: the options do not fit, something is not installed, or the model has no module.
+        GearError: the options do not fit, a required module is not installed, or the model has no torch module.
     """
     names = {field.name for field in dataclasses.fields(found.spec.config)}
     plain = [f"{name}={value}" for name, value in PLAIN_BUILD.items() if name in names]
@@ -148,12 +149,12 @@ def _graph(found: PluginEntry, settings: Iterable[str]) -> Any:
 
 
 def _said(origin: Path) -> dict[str, str]:
-    """What the file says of itself."""
+    """The metadata of the published file."""
     return dict(inspect(origin).metadata) if origin.suffix == SUFFIX else {}
 
 
 def _options(spec: ModelSpec[Any], settings: Iterable[str], said: str) -> dict[str, Json]:
-    """Of the model: those that the file named, and those that are given, which go before."""
+    """Options of the model: those in the file's metadata, overridden by the given ones."""
     try:
         options = json.loads(said)
     except ValueError:
