@@ -1,9 +1,10 @@
-"""Which tensors of a checkpoint are a network's: entries under customary names, keys behind wrappers' prefixes.
+"""Finds the tensors of a checkpoint that are a network's state: entries with customary names, and keys with prefixes of
+wrappers.
 
 Training code wraps networks (`DataParallel` puts `module.` before every key, `torch.compile` puts `_orig_mod.`, a
 LightningModule the name of its attribute) and saves several states in one file (`model` and `ema`, `state_dict` in
-`checkpoint`). Nothing here knows all of their names: every entry and every prefix that many keys share is a candidate,
-and the network's own keys decide.
+`checkpoint`). These names are not known in advance: every entry, and every prefix that many keys share, is a candidate,
+and the keys of the network decide.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ def entries_of(content: Any, path: Path) -> list[Candidate]:
     """The mappings of a checkpoint that hold tensors, the likeliest network first, with keys as they are in the file.
 
     Raises:
-        GearError: there are none.
+        GearError: the checkpoint has no tensors.
     """
     if not isinstance(content, Mapping):
         raise GearError(f"{path}: holds no network, but a {type(content).__name__}; a state dict is wanted")
@@ -99,7 +100,7 @@ def _prefix_order(prefix: str) -> tuple[bool, int]:
 
 
 def _unlikeliness(entry: str) -> tuple[int, int, int]:
-    """Sort key of entries: customary names, then others, then averaged weights, then what an optimiser holds."""
+    """Sort key of entries: customary names, then others, then averaged weights, then states of optimisers."""
     names = entry.split(".") if entry else []
     if any(name.lower().startswith("optim") for name in names):
         rank = 3

@@ -46,7 +46,7 @@ PLAIN_GLOBALS: list[Any] = [
     types.SimpleNamespace,
     *((pure, f"{module}.{name}") for module in ("pathlib", "pathlib._local") for pure, name in PATHS),
 ]
-"""What training code saves with weights and what runs nothing when it is read.
+"""Names of classes and functions in pickles that are safe to read.
 
 Numbers and arrays of NumPy, such as the best metric so far; the parsed command line; paths, which are read as pure ones
 that touch no disk.
@@ -64,7 +64,8 @@ HARMLESS = ("torch", "collections", "numpy", "argparse")
 def read_published(path: str | Path) -> dict[str, Tensor]:
     """A network's tensors by key, from a checkpoint of PyTorch (zip or older format) or a safetensors file.
 
-    Of several entries the likeliest is read. The prefix `module.`, which `DataParallel` adds to every key, is removed.
+    If there are several entries, the most probable one is read. The prefix `module.`, which `DataParallel` adds to
+    every key, is removed.
 
     Raises:
         GearError: the file does not exist, cannot be read, asks for code to be run, or holds no network.

@@ -1,4 +1,4 @@
-"""Copies of networks for predictions alone: equal to rounding, and a tenth to a quarter faster on a CPU.
+"""Copies of networks for predictions: equal up to rounding, and a tenth to a quarter faster on a CPU.
 
 Batch normalisations in eval mode are folded into the convolutions before them, and the memory format is channels last,
 which oneDNN's convolutions prefer. Neither serves gradients: training needs the normalisations, and torch's CPU
@@ -23,7 +23,7 @@ _CONVOLVES, _NORMALISES = "Conv2dSame", "BatchNormAct2d"
 """Layers of timm's EfficientNets that are not torch's own."""
 
 _MAKING = threading.Lock()
-"""Of several threads that predict, one makes the copy that all of them use."""
+"""Lock with which one of several predicting threads makes the copy that all of them use."""
 
 
 class KeptCopy(Generic[Made]):

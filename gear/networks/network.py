@@ -115,11 +115,11 @@ class Network(nn.Module, ABC):
         """Outputs by name for pictures in 0..1 on the network's device."""
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """What `losses` takes: the outputs, or more for networks with heads that are used in training alone."""
+        """The input of `losses`: the outputs, and more for networks with heads that are used only in training."""
         return self.run(pictures)
 
     def run_for_predictions(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """What `predictions` takes: the outputs, or less for networks that predict faster from something else."""
+        """The input of `predictions`: the outputs, or other tensors from which a network predicts faster."""
         return self.run(pictures)
 
     @abstractmethod

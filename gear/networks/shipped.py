@@ -1,4 +1,4 @@
-"""Where weights files are, and what their metadata state. torch is not imported, so that listing them is quick."""
+"""Finds weights files and reads their metadata, without importing torch."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class WeightsFile:
 
     @property
     def numbers(self) -> int:
-        """How many numbers the file holds, statistics included."""
+        """Number of values in the file, including statistics."""
         return sum(math.prod(shape) for shape in self.shapes.values())
 
     def facts(self) -> dict[str, Json]:
@@ -82,7 +82,7 @@ def check_file(path: Path) -> None:
     """Checks that a weights file exists.
 
     Raises:
-        GearError: it does not.
+        GearError: the file does not exist.
     """
     if path.is_dir():
         raise GearError(f"{path}: is a folder; name the file in it")
@@ -100,7 +100,7 @@ def resolve(weights: str, name: str) -> Path | None:
     """The file that the option `weights` of network `name` refers to; None for random weights.
 
     Raises:
-        GearError: `shipped` was asked for and no installed package has weights of this network.
+        GearError: `shipped` was requested and no installed package has weights of this network.
     """
     if weights == NONE:
         return None
@@ -126,7 +126,7 @@ def trained_option(weights: str, name: str, option: str) -> Json:
         option: name of the option.
 
     Raises:
-        GearError: there are no such weights.
+        GearError: these weights do not exist.
     """
     path = resolve(weights, name)
     return None if path is None else inspect(path).option(option)

@@ -57,10 +57,10 @@ def prepare() -> bool:
 
 
 def need() -> None:
-    """As `prepare`, for code that cannot run without torchvision.
+    """Calls `prepare`, for code that cannot run without torchvision.
 
     Raises:
-        GearError: it is not installed.
+        GearError: torchvision is not installed.
     """
     if not prepare():
         raise GearError(

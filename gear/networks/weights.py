@@ -96,8 +96,8 @@ def load_trunk(network: nn.Module, path: str | Path) -> tuple[int, int]:
 
 
 def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> list[str]:
-    """What keeps a state from being loaded: missing and unknown keys, other shapes or kinds of numbers, and numbers
-    that are not finite. Empty where it fits.
+    """The reasons why a state cannot be loaded: missing and unknown keys, other shapes or dtypes, and numbers that are
+    not finite. Empty if it fits.
     """
     missing = [key for key in wanted if key not in given and not key.endswith(OPTIONAL)]
     surplus = [key for key in given if key not in wanted]
@@ -140,7 +140,7 @@ def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
 
 
 def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> None:
-    """Writes a weights file whole or not at all; see `serialised`."""
+    """Writes a weights file atomically; see `serialised`."""
     write_alone(Path(path), serialised(state, metadata, halves=halves))
 
 

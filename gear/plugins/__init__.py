@@ -1,1 +1,1 @@
-"""Plugins: how they are found, and the ones that gear brings. One file each in tasks, models, attacks, defenses."""
+"""Plugins: their discovery, and the built-in tasks, models, attacks and defenses, one file each."""

@@ -1,4 +1,4 @@
-"""From a plugin's name and options to its product, and whom to blame when a plugin's code fails."""
+"""Builds plugins from their names and options, and makes errors of a plugin's code name the plugin."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ NO_OPTIONS = Mapping({}, Place("defaults"))
 
 
 def find(kind: Kind, name: str) -> PluginEntry:
-    """The plugin of a kind with a name.
+    """Finds a plugin by kind and name.
 
     Raises:
-        UnknownNameError: there is none.
-        DuplicateNameError: several packages have one.
+        UnknownNameError: there is no such plugin.
+        DuplicateNameError: several packages have a plugin of this name.
     """
     return catalogue().get(kind, name)
 
@@ -45,7 +45,7 @@ def name_of_task(written: JsonMapping[str, Any]) -> str:
     """The name by which the task that wrote a dataset is found.
 
     Args:
-        written: what the dataset's plan says of its task.
+        written: the entry on the task in the dataset's plan.
 
     Returns:
         `package/name` where that package is installed, since another package may have a task of the same name; else
@@ -60,7 +60,7 @@ def build(found: PluginEntry, options: Node = NO_OPTIONS) -> Any:
 
     Raises:
         ConfigError: the options do not fit.
-        PluginError: a third party's `build` failed.
+        PluginError: the `build` function of another package failed.
     """
     config = read_node(found.spec.config, options, "options")
     with blamed(found, "build"):
@@ -69,11 +69,12 @@ def build(found: PluginEntry, options: Node = NO_OPTIONS) -> Any:
 
 @contextlib.contextmanager
 def blamed(found: PluginEntry, stage: str) -> Iterator[None]:
-    """Around a plugin's code: output to stdout goes to stderr, and an exception of a third party names its plugin.
+    """A context for a plugin's code: output to stdout goes to stderr, and exceptions of another package's plugin name
+    it.
 
     Raises:
-        PluginError: a third party's code raised something other than a `GearError`. Exceptions of built-in plugins are
-            faults of gear and keep their traceback.
+        PluginError: code of another package raised something other than a `GearError`. Exceptions of built-in plugins
+            are bugs of gear and keep their traceback.
     """
     try:
         with contextlib.redirect_stdout(sys.stderr):
@@ -90,8 +91,8 @@ def blamed(found: PluginEntry, stage: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def traced(founds: Iterable[PluginEntry], stage: str) -> Iterator[None]:
-    """Around code that calls plugins, such as an attack that calls a network: exceptions that passed a third party's
-    package name it.
+    """A context for code that calls plugins, such as an attack that calls a network: exceptions that pass through
+    another package name it.
 
     Raises:
         PluginError: code of one of the packages, or code that it called, raised something other than a `GearError`.

@@ -1,4 +1,4 @@
-"""Module names of the built-in plugins. They are registered through the same hooks as those of third parties."""
+"""Module names of the built-in plugins, which are registered through the same hooks as other packages' plugins."""
 
 from __future__ import annotations
 

@@ -12,12 +12,12 @@ from gear.values.errors import DuplicateNameError, PluginError, UnknownNameError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Owner:
-    """The distribution that a plugin comes from.
+    """The distribution that contains a plugin.
 
     Attributes:
-        plugin: name of its entry point; of built-ins, name of the module.
+        plugin: name of its entry point; for built-ins the name of the module.
         package: name of the distribution; `mujoco-gear` for built-ins.
-        version: of the distribution.
+        version: version of the distribution.
     """
 
     plugin: str
@@ -27,7 +27,7 @@ class Owner:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PluginEntry:
-    """A plugin in the catalogue: one spec and the distribution that brings it."""
+    """A plugin in the catalogue: one spec and its distribution."""
 
     kind: Kind
     spec: AnySpec
@@ -41,10 +41,10 @@ class PluginEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Broken:
-    """A plugin that failed to load; all others work.
+    """A plugin that failed to load.
 
     Attributes:
-        owner: where it comes from.
+        owner: the distribution that contains it.
         stage: `entry_points.txt`, `import`, `register`, `hook <name>` or `spec`.
         problem: one line.
     """
@@ -75,7 +75,9 @@ class Catalogue:
         return tuple(sorted((f for f in self.found if f.kind == kind), key=lambda f: (f.spec.name, f.owner.package)))
 
     def names(self, kind: Kind) -> tuple[str, ...]:
-        """The names by which the plugins of a kind are found: short where that is unique, else `package/name`."""
+        """The names by which the plugins of a kind are found: the short name if it is unique, otherwise
+        `package/name`.
+        """
         found = self.of_kind(kind)
         short = [f.spec.name for f in found]
         return tuple(f.spec.name if short.count(f.spec.name) == 1 else f.full_name for f in found)
@@ -103,7 +105,7 @@ class Catalogue:
         return f"({len(names)} plugin(s) failed to load: {', '.join(names)}; see `gear plugins`)"
 
     def clashes(self) -> tuple[tuple[Kind, str, tuple[str, ...]], ...]:
-        """Short names that more than one package claims, with their full names."""
+        """Short names that several packages use, with the full names."""
         result: list[tuple[Kind, str, tuple[str, ...]]] = []
         for kind in KINDS:
             by_name: dict[str, list[str]] = {}
@@ -117,7 +119,7 @@ def as_iterable(value: Any) -> Iterable[Any]:
     """The return value of a hook, if it is a collection.
 
     Raises:
-        TypeError: it is not.
+        TypeError: the value is not a collection.
     """
     if isinstance(value, (str, bytes, dict)) or not isinstance(value, Iterable):
         raise TypeError(f"a hook returns a list of specs, got {type(value).__name__}")

@@ -1,4 +1,4 @@
-"""Opening datasets: the task that wrote one is found among the plugins, and reads it."""
+"""Opens datasets with the plugin of the task that wrote them."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from gear.values.errors import DatasetError
 __all__ = ["Dataset", "Twins", "open_dataset", "open_twins", "root_and_split", "roots_of", "task_of"]
 
 DEEPEST = 3
-"""Folders between one that is given and the roots in it."""
+"""Largest number of folder levels between a given folder and the roots in it."""
 
 LISTED = 5
-"""Datasets that an error names."""
+"""Largest number of datasets that an error names."""
 
 
 def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
@@ -36,7 +36,7 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
 
     Raises:
         DatasetError: there is no dataset, no such split, or it is not finished.
-        UnknownNameError: its task's plugin is not installed.
+        UnknownNameError: the plugin of the dataset's task is not installed.
     """
     root = Path(path)
     if split is None:
@@ -74,7 +74,9 @@ def root_and_split(path: str | Path) -> tuple[Path, str | None]:
 
 
 def roots_of(folder: Path) -> list[Path]:
-    """The folder itself if it is the root of a dataset, else the roots inside it, by name; empty if there are none."""
+    """The folder itself if it is the root of a dataset, otherwise the roots inside it, by name; empty if there are
+    none.
+    """
     if next(folder.glob("gear/*/plan.json"), None) is not None:
         return [folder]
     plans = (plan for depth in range(DEEPEST + 1) for plan in folder.glob("*/" * depth + "gear/*/plan.json"))
@@ -82,16 +84,16 @@ def roots_of(folder: Path) -> list[Path]:
 
 
 def open_twins(first: str | Path, second: str | Path, split: str | None = None) -> Twins[Sample]:
-    """Opens two datasets that differ in nothing but their patch, and pairs their samples by index.
+    """Opens two datasets that differ only in their patch, and pairs their samples by index.
 
     Raises:
-        DatasetError: they differ in more than the patch, or one of them cannot be opened.
+        DatasetError: the datasets differ in more than the patch, or one of them cannot be opened.
     """
     return pair_twins(open_dataset(first, split), open_dataset(second, split))
 
 
 def _refuse_folder_of_datasets(folder: Path) -> None:
-    """Names the datasets in a folder that is no dataset itself."""
+    """Raises an error that names the datasets in a folder that is not a dataset itself."""
     roots = roots_of(folder) if folder.is_dir() else []
     if roots and folder not in roots:
         listed = ", ".join(str(root) for root in roots[:LISTED]) + ", …" * (len(roots) > LISTED)

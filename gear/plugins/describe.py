@@ -15,16 +15,16 @@ from gear.plugins.text import printable
 
 COMMON = {field.name for field in dataclasses.fields(Spec)}
 ELSEWHERE = {"recipe", "published", "convert", "parameters", "starts", "notes"}
-"""Fields that `training`, `gear models` and `gear collect` show."""
+"""Fields that are left out here because `training`, `gear models` and `gear collect` show them."""
 
 LONGEST_MEANING = 2000
-"""Characters of an option's description."""
+"""Largest length of an option's description in characters."""
 
 UNITS = {
     "px": "pixels", "m": "metres", "mm": "millimetres", "deg": "degrees", "rad": "radians", "s": "seconds",
     "levels": "levels of 0..255", "unit": "of 0..1", "hz": "hertz", "kmh": "km/h", "mps": "m/s", "mb": "megabytes",
 }  # fmt: skip
-"""By the last word of an option's name."""
+"""Units by the last word of an option's name."""
 
 
 def summary(found: PluginEntry) -> dict[str, Any]:
@@ -45,8 +45,8 @@ def summary(found: PluginEntry) -> dict[str, Any]:
 
 
 def training(spec: AnySpec) -> dict[str, Any]:
-    """JSON of a network's training recipe (None where gear cannot train it) and the names that `gear train --init`
-    accepts in addition to `shipped` and files; empty for other plugins.
+    """JSON of a network's training recipe (None if gear cannot train it) and the names that `gear train --init` accepts
+    in addition to `shipped` and files; empty for plugins that are not models.
     """
     if not isinstance(spec, ModelSpec):
         return {}
@@ -104,7 +104,7 @@ def meanings_of(config: type[Any]) -> dict[str, str]:
 
 
 def source_of(spec: AnySpec) -> str:
-    """The file in which the plugin's `build` is written; "" where Python does not know it."""
+    """The source file of the plugin's `build`; "" if Python does not know it."""
     try:
         return inspect.getsourcefile(spec.build) or ""
     except TypeError:

@@ -1,4 +1,4 @@
-"""Discovery of plugins: each is loaded under guard; a broken one is reported with its name and stops nothing else."""
+"""Discovery of plugins. Errors of a plugin are caught and reported with its name; the other plugins are loaded."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ from gear.values.entry_points import identity, installed_entry_points
 
 DISTRIBUTION = "mujoco-gear"
 GROUP = "gear"
-"""Of entry points."""
+"""Group of the entry points of plugins."""
 
 MOST_SPECS = 1000
-"""A hook that returns more specs than this is taken for an endless generator."""
+"""Largest number of specs per hook; a hook that returns more is considered an endless generator."""
 
 
 @cache
 def catalogue() -> Catalogue:
-    """All plugins of this environment, found once a process.
+    """All plugins of this environment, discovered once per process.
 
-    `GEAR_DISABLE_PLUGINS` (names joined by commas, or `*` for all) keeps third-party plugins out. A plugin that is new
-    here is first loaded in a process of its own (`gear.plugins.probe`); one that ends or hangs that process, or that
-    raises KeyboardInterrupt there, is never loaded into this one.
+    `GEAR_DISABLE_PLUGINS` (names joined by commas, or `*` for all) disables plugins of other packages. A plugin that is
+    new on this machine is first loaded in a separate process (`gear.plugins.probe`). If it ends or hangs that process,
+    or raises KeyboardInterrupt there, it is not loaded into this process.
     """
     entry_points, damaged = installed_entry_points(GROUP)
     allowed = _allowed(entry_points, os.environ.get("GEAR_DISABLE_PLUGINS", ""))
@@ -58,11 +58,11 @@ def discover(entry_points: Iterable[importlib.metadata.EntryPoint], disabled: st
     """Loads built-ins and the given entry points into this process.
 
     Args:
-        entry_points: of third parties.
-        disabled: names of entry points that are left out, joined by commas; `*` for all.
+        entry_points: entry points of other packages.
+        disabled: names of entry points to leave out, joined by commas; `*` for all.
 
     Raises:
-        Exception: a built-in is broken, which is a fault of gear and keeps its traceback.
+        Exception: a built-in plugin is broken, which is a bug of gear and keeps its traceback.
         KeyboardInterrupt: the user pressed Ctrl-C. One that a plugin raises is reported like any other exception.
     """
     manager = pluggy.PluginManager(hookspecs.PROJECT)
@@ -86,7 +86,7 @@ def discover(entry_points: Iterable[importlib.metadata.EntryPoint], disabled: st
 
 
 def owner_of(entry_point: importlib.metadata.EntryPoint) -> Owner:
-    """The distribution that brings an entry point; its module's name where the distribution is not known."""
+    """The distribution of an entry point; the name of its module if the distribution is unknown."""
     package, version = entry_point.value.split(":")[0], "?"
     if entry_point.dist is not None:
         package, version = identity(entry_point.dist)
@@ -110,7 +110,7 @@ def _register(
     """Imports a plugin and registers its hooks.
 
     Returns:
-        None where that works; else stage and problem, and no hook of the plugin stays registered.
+        None on success; otherwise stage and problem, and no hook of the plugin stays registered.
     """
     stage = "import"
     try:
@@ -130,7 +130,9 @@ def _register(
 
 
 def _call_hooks(manager: pluggy.PluginManager, owners: dict[str, Owner]) -> tuple[list[PluginEntry], list[Broken]]:
-    """Calls each implementation on its own, so that one that raises stops no other, and its owner is known."""
+    """Calls each implementation of a hook separately, so that an exception does not affect the others and its owner is
+    known.
+    """
     found: list[PluginEntry] = []
     broken: list[Broken] = []
     for kind, hook in HOOK_OF.items():
@@ -156,8 +158,8 @@ def _specs_of(hook: Callable[[], Any]) -> list[Any]:
     """The specs that a hook returns.
 
     Raises:
-        TypeError: it returned something else than a collection of specs.
-        ValueError: it returned too many.
+        TypeError: the hook returned something else than a collection of specs.
+        ValueError: the hook returned too many specs.
     """
     specs = list(islice(as_iterable(hook()), MOST_SPECS + 1))
     if len(specs) > MOST_SPECS:
@@ -166,11 +168,11 @@ def _specs_of(hook: Callable[[], Any]) -> list[Any]:
 
 
 class PluginRaisedError(Exception):
-    """A plugin's code raised something.
+    """A plugin's code raised an exception.
 
     Attributes:
-        error: what it raised, which need not be an `Exception`.
-        problem: the same as one printable line.
+        error: the raised exception, which need not be an `Exception`.
+        problem: the exception as one printable line.
     """
 
     def __init__(self, error: BaseException) -> None:
@@ -180,10 +182,10 @@ class PluginRaisedError(Exception):
 
 
 def guarded(call: Callable[[], Any]) -> Any:
-    """Runs a plugin's code; what it prints to stdout must not get into gear's output.
+    """Runs a plugin's code, with its output to stdout redirected to stderr.
 
     Raises:
-        PluginRaisedError: it raised anything, SystemExit, GeneratorExit and KeyboardInterrupt included.
+        PluginRaisedError: the code raised any exception, including SystemExit, GeneratorExit and KeyboardInterrupt.
         KeyboardInterrupt: the user pressed Ctrl-C meanwhile.
     """
     with _noticing_interrupts() as interrupts:
@@ -198,10 +200,11 @@ def guarded(call: Callable[[], Any]) -> Any:
 
 @contextlib.contextmanager
 def _noticing_interrupts() -> Iterator[list[int]]:
-    """A list that gets an entry when the user presses Ctrl-C, so that a plugin's own KeyboardInterrupt is told apart.
+    """A list that gets an entry when the user presses Ctrl-C, to distinguish it from a KeyboardInterrupt that the
+    plugin raises.
 
-    Signals can be handled in the main thread alone, and only Python's usual handler is replaced; elsewhere a
-    KeyboardInterrupt counts as the plugin's.
+    Signals can be handled only in the main thread, and only Python's default handler is replaced. Otherwise every
+    KeyboardInterrupt is attributed to the plugin.
     """
     seen: list[int] = []
 

@@ -1,12 +1,12 @@
-"""Plugins that are new here are loaded in a process of their own first, and what that process came to is remembered.
+"""Loads plugins that are new on this machine in a separate process first, and caches the result.
 
-An exception can be caught in the process that raises it, so it makes no plugin unsafe. What cannot be caught there are
-an end of the process (`os._exit`, a crash in C code), a hang, and a KeyboardInterrupt, which looks as if the user had
-pressed Ctrl-C. A plugin that does any of these while its module is imported, in a hook or as its specs are checked is
-reported and never loaded into gear's own process.
+Most exceptions can be caught in the process that raises them. Three failures cannot be handled there: the end of the
+process (`os._exit`, a crash in C code), a hang, and a KeyboardInterrupt, which looks like the user's Ctrl-C. A plugin
+that causes one of these during import, in a hook or in the checks of its specs is reported and not loaded into gear's
+process.
 
-The verdicts lie in `~/.cache/gear/plugins.json` (`$XDG_CACHE_HOME`), by distribution, version, and time and size of the
-package's files. A plugin that behaves otherwise later (by chance, by the clock, in `build`) is beyond this.
+Results are stored in `~/.cache/gear/plugins.json` (`$XDG_CACHE_HOME`), by distribution, version, and time and size of
+the package's files. Failures that occur only later, for example by chance or in `build`, are not found.
 """
 
 from __future__ import annotations
@@ -31,26 +31,26 @@ from gear.plugins.text import printable
 from gear.values.machine import cores
 
 LIMIT_S = 30.0
-"""Seconds that a plugin may take to be imported and to say what it has; far more than importing torch takes."""
+"""Time limit in seconds for the import and the hooks of a plugin; importing torch takes far less."""
 
 MOST_FILES = 2000
-"""Of a package, whose times and sizes are looked at."""
+"""Largest number of a package's files whose times and sizes are compared."""
 
 MOST_KEPT = 1000
 """Verdicts in the cache; the newest stay."""
 
 Verdict = tuple[str, str]
-"""Stage and problem of a plugin that must not be loaded."""
+"""Stage and problem of a plugin that must not be loaded; None for a safe plugin."""
 
 UNKNOWN: Verdict = ("", "")
-"""In place of a verdict where there is none."""
+"""Marks a plugin without a cached result."""
 
 
 def unsafe_plugins(entry_points: Iterable[EntryPoint]) -> dict[EntryPoint, Verdict]:
-    """The plugins that must not be loaded into this process, with what they did in a process of their own.
+    """The plugins that must not be loaded into this process, with their failures in the separate process.
 
     Args:
-        entry_points: of third parties; those that were probed before are not probed again while their files stay.
+        entry_points: entry points of other packages; a plugin is probed again only if its files changed.
     """
     importlib.invalidate_caches()  # a package may have been installed since this process began
     stamped = {one: stamp(one) for one in entry_points}
@@ -68,7 +68,9 @@ def unsafe_plugins(entry_points: Iterable[EntryPoint]) -> dict[EntryPoint, Verdi
 
 
 def _probe_if_possible(entry_point: EntryPoint) -> Verdict | None:
-    """`UNKNOWN` where no process can be started; the plugin is then loaded as if it were safe, and probed next time."""
+    """Probes a plugin; returns `UNKNOWN` if no process can be started. The plugin is then loaded, and
+    probed next time.
+    """
     try:
         return probe(entry_point)
     except OSError:
@@ -76,17 +78,17 @@ def _probe_if_possible(entry_point: EntryPoint) -> Verdict | None:
 
 
 def probe(entry_point: EntryPoint, limit_s: float = LIMIT_S) -> Verdict | None:
-    """Loads one plugin in a process of its own.
+    """Loads one plugin in a separate process.
 
     Args:
-        entry_point: of the plugin.
-        limit_s: seconds after which the process, with all that it started, is ended.
+        entry_point: entry point of the plugin.
+        limit_s: seconds after which the process and its children are ended.
 
     Returns:
-        None where the process came to its end, whatever exceptions the plugin raised; else stage and problem.
+        None if the process ended normally, even if the plugin raised exceptions; otherwise stage and problem.
 
     Raises:
-        OSError: the process did not come so far as to load the plugin.
+        OSError: the process failed before it loaded the plugin.
     """
     with tempfile.TemporaryDirectory(prefix="gear-probe-") as folder:
         notes = Path(folder) / "notes"
@@ -124,11 +126,11 @@ sys.path[:] = json.loads(sys.argv[1])
 from gear.plugins.probe_process import main
 main(*sys.argv[2:])
 """
-"""What the probing process runs; the path is given, so that it finds what this process finds."""
+"""Code of the separate process; it gets this process's import path."""
 
 
 def stamp(entry_point: EntryPoint) -> str:
-    """A hash that changes with whatever may change how a plugin loads: its files, its environment, gear."""
+    """A hash of everything that may change how a plugin loads: its files, its environment and gear."""
     facts: list[Any] = [sys.executable, sys.version, entry_point.name, entry_point.value, __file__]
     with contextlib.suppress(Exception):  # damaged metadata, or a finder that raises: then there is less to look at
         if entry_point.dist is not None:
@@ -157,7 +159,7 @@ def _signal_name(number: int) -> str:
 
 
 def _cache_file() -> Path | None:
-    """None where the user has no home."""
+    """Path of the cache file; None if the user has no home folder."""
     try:
         return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gear" / "plugins.json"
     except RuntimeError:
@@ -165,7 +167,7 @@ def _cache_file() -> Path | None:
 
 
 def _read(path: Path | None) -> dict[str, Verdict | None]:
-    """Verdicts by stamp; none where there is no file, or one that is not gear's."""
+    """Cached results by hash; empty if there is no valid cache file."""
     if path is None:
         return {}
     try:
@@ -182,7 +184,7 @@ def _read(path: Path | None) -> dict[str, Verdict | None]:
 
 
 def _write(path: Path | None, known: dict[str, Verdict | None]) -> None:
-    """Whole or not at all; where the cache cannot be written, plugins are probed again next time."""
+    """Writes the cache atomically. If it cannot be written, plugins are probed again next time."""
     if path is None:
         return
     with contextlib.suppress(OSError):

@@ -1,7 +1,7 @@
-"""The process that loads one plugin to see whether it survives: run by `gear.plugins.probe` alone.
+"""The separate process that loads one plugin as a test; started by `gear.plugins.probe`.
 
-It notes in a file what it is about to do, and at its end that it came so far. The file is the only thing that the other
-process believes: the plugin may print, leave threads behind or register functions that run at exit.
+It writes its current stage to a file, and a final entry at its end. The parent process relies only on this file,
+because the plugin may print, leave threads running or register functions that run at exit.
 """
 
 from __future__ import annotations

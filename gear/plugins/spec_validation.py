@@ -1,4 +1,4 @@
-"""Checks of a plugin's spec: every field is held to the type hints of its spec class before anything reads it."""
+"""Checks every field of a plugin's spec against the type hints of its spec class."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ HOOK_OF: dict[Kind, str] = {
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 COMMON_FIELDS = frozenset(field.name for field in dataclasses.fields(Spec))
-"""Fields that every spec has; they have rules of their own."""
+"""Fields that every spec has; they are checked separately."""
 
 
 def spec_problem(kind: Kind, spec: Any) -> str | None:
@@ -51,7 +51,7 @@ def _spec_problem(kind: Kind, spec: Any) -> str | None:
 
 
 def _common_problem(spec: Spec[Any, Any]) -> str | None:
-    """Summary, config class and build, of which the type hints say too little."""
+    """The problem with summary, config class or build, for which type hints are not enough."""
     summary, config, build = (getattr(spec, name) for name in ("summary", "config", "build"))
     if not isinstance(summary, str) or not summary.strip() or not summary.isprintable():
         return "its summary is not one line"
@@ -64,7 +64,7 @@ def _common_problem(spec: Spec[Any, Any]) -> str | None:
 
 
 def _field_problem(kind: Kind, spec: Any) -> str | None:
-    """The fields that the kind declares, each against its type hint."""
+    """The problem with a field that the kind declares, by its type hint."""
     for name, hint in _hints(kind).items():
         problem = mismatch(getattr(spec, name), hint, name)
         if problem is not None:
@@ -82,22 +82,22 @@ def _default_problem(spec: Spec[Any, Any]) -> str | None:
 
 @cache
 def _hints(kind: Kind) -> dict[str, Any]:
-    """The type hints of the fields that a kind's spec class has beside the common ones, by name."""
+    """The type hints of a spec class's fields, except the common ones, by name."""
     hints = typing.get_type_hints(SPEC_TYPES[kind])
     return {name: hint for name, hint in hints.items() if name not in COMMON_FIELDS}
 
 
 def mismatch(value: Any, hint: Any, name: str) -> str | None:
-    """Where a value differs from a type hint, as `<name> must be <what>, got <type>`; None where it fits.
+    """The difference of a value from a type hint, as `<name> must be <what>, got <type>`; None if it fits.
 
-    Knows what specs are made of: classes, `Literal`, unions, callables, mappings, `tuple`, `frozenset` and nested
-    dataclasses, whose fields are checked too. A float may be a whole number; a number may not be a bool; a text must be
-    printable, since it is shown in terminals.
+    Supports classes, `Literal`, unions, callables, mappings, `tuple`, `frozenset` and nested dataclasses, whose fields
+    are checked too. A float may be an integer; a number must not be a bool; a text must be printable, because it is
+    shown in terminals.
 
     Args:
-        value: of the field.
-        hint: as `typing.get_type_hints` gives it.
-        name: of the field, with its place in a container, such as `taps[0]`.
+        value: value of the field.
+        hint: type hint from `typing.get_type_hints`.
+        name: name of the field, with the position in a container, such as `taps[0]`.
     """
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if hint is Any or isinstance(hint, TypeVar):
@@ -118,7 +118,7 @@ def mismatch(value: Any, hint: Any, name: str) -> str | None:
 
 
 def _item_problem(value: Any, kind: type[Any], arguments: tuple[Any, ...], name: str) -> str | None:
-    """The items of a container, or the fields of a dataclass."""
+    """The problem with an item of a container, or with a field of a dataclass."""
     items: list[tuple[str, Any, Any]] = []
     if kind is tuple and arguments[1:] == (...,):
         items = [(f"{name}[{number}]", one, arguments[0]) for number, one in enumerate(value)]
@@ -141,7 +141,7 @@ def _item_problem(value: Any, kind: type[Any], arguments: tuple[Any, ...], name:
 
 
 def _nested(problems: list[str | None], name: str) -> str | None:
-    """Of the problems with the members of a union, one that lies within a member that fits as a whole."""
+    """The problem with a union's member whose type fits but one of whose parts does not."""
     return next((one for one in problems if one is not None and not one.startswith(f"{name} must be ")), None)
 
 

@@ -1,15 +1,15 @@
-"""A plugin's words made safe to print: one line, no control characters, of bounded length."""
+"""Makes texts of plugins safe to print: one line, no control characters, limited length."""
 
 from __future__ import annotations
 
 LONGEST = 200
-"""Characters of a plugin's text that a message quotes."""
+"""Largest number of characters of a plugin's text in a message."""
 
 
 def printable(text: str, longest: int = LONGEST) -> str:
-    """The text in one line with control characters, such as terminal escapes, spelt out; cut at `longest` characters.
+    """The text as one line with control characters, such as terminal escapes, escaped; cut at `longest` characters.
 
-    What a terminal's encoding lacks is not looked at here: that depends on where the text is printed.
+    Characters that the terminal's encoding lacks are not replaced here, since they depend on where the text is printed.
     """
     safe = "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in text[:longest])
     return safe if len(text) <= longest else f"{safe[:longest]}…"
@@ -18,7 +18,7 @@ def printable(text: str, longest: int = LONGEST) -> str:
 def one_line(error: BaseException) -> str:
     """An exception as one printable line: the name of its type and the first line of its text.
 
-    An exception whose own text cannot be had is named by its type alone.
+    If the text of the exception cannot be computed, only its type is named.
     """
     name = printable(type(error).__name__)
     try:

@@ -1,4 +1,4 @@
-"""What gear's depth networks have in common: input size, ground truth, predictions."""
+"""Base of gear's depth networks: input size, ground truth, predictions."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class DepthNetwork(Network):
 
     @abstractmethod
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """`depth_m` (B, h, w) of any size for (B, 3, H, W) pictures in 0..1, and what the losses need in addition."""
+        """`depth_m` (B, h, w) of any size for (B, 3, H, W) pictures in 0..1, and further outputs for the losses."""
 
     @abstractmethod
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:

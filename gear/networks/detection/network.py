@@ -1,8 +1,8 @@
-"""What gear's 2D detectors have in common: input size, ground truth, predictions.
+"""Base of gear's 2D detectors: input size, ground truth, predictions.
 
-Outputs are in pixels of the picture, whatever size the network runs at. Losses are in pixels of the graph's input, as
-those of torchvision: all anchors that contain an object completely tie there and learn it; in other units rounding
-would break the ties.
+Outputs are in pixels of the picture, for any size of the network's input. Losses are in pixels of the graph's input, as
+in torchvision: there, all anchors that contain an object completely have exactly the same overlap and are trained on
+it; in other units rounding would break these ties.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Size = tuple[int, int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sizing:
-    """How the graph's input is made of a picture.
+    """The preprocessing of pictures to the graph's input.
 
     Attributes:
         inner_px: function from height and width of the picture to those of the graph's input.

@@ -16,16 +16,16 @@ SYNONYMS = {
 
 
 def match(names: Mapping[int, str], known: Mapping[str, int]) -> tuple[dict[int, int], tuple[str, ...]]:
-    """Which classes of a network are which of ours.
+    """Matches the classes of a network to known classes by name.
 
     A name may list several, separated by commas or semicolons, as in ADE20K; the first known one counts.
 
     Args:
-        names: of the network's classes, by number.
-        known: our numbers by name, in lower case.
+        names: names of the network's classes, by number.
+        known: numbers of the known classes by name, in lower case.
 
     Returns:
-        Our numbers by the network's, and the names without a match, in the network's order.
+        Numbers of the known classes by the network's numbers, and the names without a match, in the network's order.
     """
     found = {}
     for index, name in names.items():

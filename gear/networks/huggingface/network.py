@@ -63,7 +63,7 @@ class FolderNetwork(Network):
         return self.processor.apply(pictures[VIEW])
 
     def said(self, seen: Tensor, **labels: Any) -> Any:
-        """The graph's output for its inputs.
+        """Runs the graph and returns its output.
 
         Raises:
             GearError: the graph fails on them, as with a config.json whose sizes can be built but do not fit.

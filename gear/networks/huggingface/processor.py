@@ -1,4 +1,4 @@
-"""What an image processor of Hugging Face does to a picture, in torch, so that gradients pass it."""
+"""The operations of Hugging Face's image processors in torch, so that gradients pass them."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
 FAR = 3.0
-"""Deviations from which a neuron counts for `share`."""
+"""Magnitude of a z-score above which a neuron counts for the aggregate `share`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -91,7 +91,7 @@ class Lgs(PerPicture):
         return np.arange(count) * self._stride_px
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The same in torch; the choice of windows has no gradient."""
+        """The same operation in torch; the choice of windows has no gradient."""
         import torch
 
         grey = (pictures * pictures.new_tensor(GREY).view(1, 3, 1, 1)).sum(1, keepdim=True)

@@ -1,4 +1,4 @@
-"""Z-Mask (Rossolini et al., AAAI 2023): covers what over-activates a network's layers, and scores it."""
+"""Z-Mask (Rossolini et al., AAAI 2023): covers regions that over-activate a network's layers, and gives a score."""
 
 from __future__ import annotations
 

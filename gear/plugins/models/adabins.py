@@ -1,4 +1,4 @@
-"""AdaBins (Bhat et al., CVPR 2021): depth as a choice between bins that the picture itself decides on."""
+"""AdaBins (Bhat et al., CVPR 2021): depth as a weighted mean of bins that are adapted to each picture."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ def build(options: DepthOptions) -> Model:
     """The network with its weights.
 
     Raises:
-        GearError: the weights are not there.
+        GearError: the weights are missing.
     """
     from gear.networks.depth.ddrnet_depth import DdrnetDepth, ddrnet_depth_graph
     from gear.networks.input_scale import input_scale_of

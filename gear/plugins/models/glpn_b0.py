@@ -15,7 +15,7 @@ def build(options: GlpnB0Options) -> Model:
     """The network with its weights.
 
     Raises:
-        GearError: transformers or the weights are not there.
+        GearError: transformers or the weights are missing.
     """
     from gear.networks.depth.glpn import Glpn, glpn_graph
     from gear.networks.input_scale import input_scale_of

@@ -47,7 +47,7 @@ def build_detect2d(options: DetectorFolderOptions) -> FolderDetector:
 
 
 def _start(auto: str) -> Mapping[str, Callable[[Any], None]]:
-    """`gear train --init folder`: go on from the folder's own weights."""
+    """Loads the folder's own weights, for `gear train --init folder`."""
 
     def begin(model: Any) -> None:
         from gear.networks.huggingface.folder import start_from

@@ -1,1 +1,1 @@
-"""What defenses that read a network's activations are made of: feature maps, z-scores, over-activation."""
+"""Building blocks of defenses that read a network's activations: feature maps, z-scores, over-activation."""

@@ -1,4 +1,4 @@
-"""A network's feature maps while it looks at one sample."""
+"""Reads a network's feature maps during the forward pass of a sample or a batch."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
 PAPERS_DEEPEST = "ct1"
-"""BiSeNet's layer for detection in Z-Mask's supplement, although `ct0` is deeper."""
+"""Layer of BiSeNet that Z-Mask's supplement uses for detection, although `ct0` is deeper."""
 
 
 def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[str]) -> dict[str, Tensor]:
-    """What the named taps give for one sample: (C, h, w) float32 on the CPU by name, without gradients.
+    """Feature maps of one sample: (C, h, w) float32 on the CPU by name of the tap, without gradients.
 
     Args:
-        model: with such taps.
+        model: model with these taps.
         views: (H, W, 3) uint8 pictures by camera name.
-        names: of taps.
+        names: names of the taps.
 
     Raises:
-        GearError: the model has no such tap, or its output is no map.
+        GearError: the model has no such tap, or the tap's output is not a feature map.
     """
     with torch.no_grad():
         return {name: maps[0] for name, maps in tapped(model, as_batch([views], tuple(views)), names).items()}
 
 
 def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> dict[str, Tensor]:
-    """What the named taps give for a batch, with gradients where torch is keeping track.
+    """Feature maps of a batch, with gradients if torch records them.
 
     Args:
         model: with such taps.
@@ -41,8 +41,8 @@ def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> d
         names: of taps.
 
     Returns:
-        (B, C, h, w) float32 on the CPU by name. Of a tap that sees both pictures of pairs at once, which have the left
-        ones first, it is the left ones'.
+        (B, C, h, w) float32 on the CPU by name of the tap. If a tap processes both pictures of stereo pairs in one
+        batch, left pictures first, only the maps of the left pictures are returned.
 
     Raises:
         GearError: the model has no such tap, or its output is no map.
@@ -76,7 +76,7 @@ def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> d
 
 
 def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:
-    """The tap whose map has the fewest cells, the later one of equals; BiSeNet's `ct1`.
+    """Name of the tap whose map has the fewest cells, and the last of these; `ct1` for BiSeNet.
 
     Raises:
         GearError: the model has no taps.
@@ -91,6 +91,6 @@ def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:
 
 
 def spread(items: Sequence[Any], most: int) -> Iterator[Any]:
-    """At most so many of them, evenly spaced from the first on; read one at a time."""
+    """Yields at most a given number of items, evenly spaced from the first on."""
     count = min(most, len(items))
     return (items[index * len(items) // count] for index in range(count))

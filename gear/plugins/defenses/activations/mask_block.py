@@ -1,4 +1,4 @@
-"""From two heat maps to a mask and a score: Z-Mask's fusion block, eight numbers that are learnt."""
+"""Z-Mask's fusion block: a mask and a score from two heat maps, with eight learnt parameters."""
 
 from __future__ import annotations
 
@@ -15,18 +15,20 @@ LEARNING_RATE, BATCH, CELLS = 0.01, 15, 4096
 NUMBERS = 8
 
 COVERED_FROM = 0.5
-"""Mask from which a cell is covered."""
+"""Value of the mask from which on a cell is covered."""
 
 LEAST_GAIN, LEAST_IOU = 0.95, 0.05
-"""A block that ends above this share of the constant answer's loss, or below this IoU, has learnt nothing."""
+"""Limits for a fit: a block whose loss exceeds this share of the best constant's loss, or whose IoU is lower than this,
+has learnt nothing.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Example:
-    """What the block learns from; all (rows, columns).
+    """A training example of the block; all arrays are (rows, columns).
 
     Attributes:
-        shallow, deep: heat maps.
+        shallow, deep: heat maps of shallow and of deep layers.
         truth: 1 where the patch is, 0 elsewhere.
     """
 
@@ -37,14 +39,16 @@ class Example:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaskBlock:
-    """Attributes:
-    numbers: (8,): weights and offsets of the gate, of the mask, and of the mask's own gate.
+    """Z-Mask's fusion block with its parameters.
+
+    Attributes:
+        numbers: (8,) weights and offsets of the gate, of the mask, and of the mask's own gate.
     """
 
     numbers: Tensor
 
     def mask(self, shallow: Tensor, deep: Tensor) -> Tensor:
-        """Where the patch is believed to be, in 0..1; any shape.
+        """Probability in 0..1 that a cell shows a patch; for maps of any shape.
 
         The deep map opens a gate for the shallow one: M = sigmoid(w tanh(w' (H_S G) + b') + b) with
         G = sigmoid(v tanh(v' H_D + c') + c).
@@ -57,24 +61,24 @@ class MaskBlock:
         return torch.sigmoid(mask_out * inner + mask_out_offset)
 
     def score(self, shallow: Tensor, deep: Tensor) -> float:
-        """How much both maps agree on under the mask: sum(H_D H_S M) / (1 + sum M), 0 or more."""
+        """The agreement of both maps under the mask: sum(H_D H_S M) / (1 + sum M), 0 or more."""
         return float(self.score_tensor(shallow, deep))
 
     def score_tensor(self, shallow: Tensor, deep: Tensor) -> Tensor:
-        """As `score`, with the gradient to both maps."""
+        """The same as `score`, with gradients with respect to both maps."""
         mask = self.mask(shallow, deep)
         return (deep * shallow * mask).sum() / (1 + mask.sum())
 
 
 def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> MaskBlock:
-    """Cross-entropy with the true masks, Adam, numbers drawn from U(0, 1) at first, as published.
+    """Fits a block by Adam on the cross-entropy with the true masks, from parameters drawn from U(0, 1), as published.
 
-    Steps see some of a picture's cells, drawn anew each time: eight numbers need no more, and it is ten times as fast.
+    Each step uses a random subset of each picture's cells, which is enough for eight parameters and ten times as fast.
 
     Args:
         examples: at least one, on one grid.
-        steps: of 15 pictures each, or of all where there are fewer.
-        rng: of the first numbers, and of what each step sees.
+        steps: number of steps, each over 15 pictures, or over all if there are fewer.
+        rng: generator of the initial parameters and of the subsets.
     """
     numbers = torch.tensor(rng.uniform(0, 1, NUMBERS), dtype=torch.float32, requires_grad=True)
     optimiser = torch.optim.Adam([numbers], lr=LEARNING_RATE)
@@ -94,13 +98,13 @@ def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """How well a block knows its own examples.
+    """The quality of a block on its own training examples.
 
     Attributes:
         loss: mean cross-entropy with the true masks.
-        constant_loss: that of the best constant answer, which knows nothing of the maps.
-        iou: of the mask from 0.5 on with the true one, over all examples together.
-        share: of the cells that show a patch.
+        constant_loss: loss of the best constant prediction, which does not use the maps.
+        iou: IoU of the mask, thresholded at 0.5, with the true one, over all examples together.
+        share: share of the cells that show a patch.
     """
 
     loss: float
@@ -110,7 +114,7 @@ class Fit:
 
     @property
     def has_learnt(self) -> bool:
-        """Whether the maps tell the block more than a constant, and it finds some of the patches."""
+        """Whether the block is better than a constant and finds some of the patches."""
         return self.loss < LEAST_GAIN * self.constant_loss and self.iou >= LEAST_IOU
 
 

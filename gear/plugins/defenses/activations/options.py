@@ -1,4 +1,4 @@
-"""What the options of detectors have in common."""
+"""Common options of detectors."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlarmConfig:
-    """When a score is an alarm.
+    """Option for the threshold of the alarm.
 
     Attributes:
-        false_alarms: share of clean calibration pictures that shall score above 0.5.
+        false_alarms: share of clean calibration pictures whose score may exceed 0.5.
     """
 
     false_alarms: float = 0.05
@@ -24,10 +24,10 @@ class AlarmConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectorConfig(AlarmConfig):
-    """Where a detector looks.
+    """Options of a detector that reads one feature map.
 
     Attributes:
-        layer: feature map of the model to look at; empty takes the deepest.
+        layer: name of the model's feature map that is read; empty for the deepest one.
     """
 
     layer: str = ""

@@ -1,4 +1,4 @@
-"""Where a feature map is active beyond measure: Z-Mask's spatial pooling refinement (Rossolini et al., AAAI 2023)."""
+"""Heat maps of over-activated regions: Z-Mask's spatial pooling refinement (Rossolini et al., AAAI 2023)."""
 
 from __future__ import annotations
 
@@ -12,30 +12,32 @@ from torch.nn import functional
 
 LEAST_DEVIATION = 1e-5
 CHANNELS_AT_ONCE = 64
-"""As many are pooled together: deep maps of many channels would take gigabytes."""
+"""Number of channels that are pooled at a time, because maps with many channels would need gigabytes."""
 
 Cells = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ChannelStatistics:
-    """What is usual in the channels of a feature map.
+    """Mean and standard deviation of the channels of a feature map on clean pictures.
 
     Attributes:
-        mean, deviation: (C,) over the cells of a picture.
+        mean, deviation: (C,) mean and standard deviation over the cells of a picture.
     """
 
     mean: Tensor
     deviation: Tensor
 
     def z_scores(self, features: Tensor) -> Tensor:
-        """(C, rows, columns) features, by channel."""
+        """Z-scores of (C, rows, columns) features, with the statistics of each channel."""
         mean, deviation = self.mean[:, None, None], self.deviation[:, None, None]
         return (features - mean) / (deviation + LEAST_DEVIATION)
 
 
 def channel_statistics(features: Tensor, grid: Cells) -> ChannelStatistics:
-    """Of one (C, h, w) map, as it is on the grid: every cell counts as often as it is the nearest one there."""
+    """Statistics of one (C, h, w) map on the grid: each cell is weighted by the number of grid places whose nearest
+    cell it is.
+    """
     down, across = (_nearest(*sizes).sum(dim=0) for sizes in zip(features.shape[1:], grid, strict=True))
     times, count = down[:, None] * across, grid[0] * grid[1]
     mean = (features * times).sum(dim=(1, 2)) / count
@@ -44,7 +46,7 @@ def channel_statistics(features: Tensor, grid: Cells) -> ChannelStatistics:
 
 
 def mean_of(many: Sequence[ChannelStatistics]) -> ChannelStatistics:
-    """The means of several pictures' means and deviations, as published; at least one picture."""
+    """Averages the means and deviations of at least one picture, as published."""
     return ChannelStatistics(
         mean=torch.stack([one.mean for one in many]).mean(dim=0),
         deviation=torch.stack([one.deviation for one in many]).mean(dim=0),
@@ -52,23 +54,23 @@ def mean_of(many: Sequence[ChannelStatistics]) -> ChannelStatistics:
 
 
 def on_grid(features: Tensor, grid: Cells) -> Tensor:
-    """(C, h, w) to (C, rows, columns), each cell as the nearest one."""
+    """Resizes (C, h, w) to (C, rows, columns) by nearest neighbour."""
     return functional.interpolate(features[None], size=grid, mode="nearest")[0]
 
 
 def pooled_sizes(z: Tensor, grid: Cells, kernel: Cells) -> Tensor:
-    """Mean over channels of the size of the Z-scores' mean in windows of the grid, stretched to the grid.
+    """Magnitudes of the mean z-scores in windows of the grid, averaged over channels and resized to the grid.
 
-    Windows lie inside the grid, as published. Taking the nearest cell and the mean of a window are both linear, and the
-    same for rows as for columns: two products of matrices, whose cost does not grow with the window.
+    Windows lie inside the grid, as published. Nearest-neighbour resizing and averaging over windows are both linear and
+    separable, so they are two matrix products, whose time does not depend on the size of the windows.
 
     Args:
-        z: (C, h, w), of any size.
-        grid: rows and columns.
-        kernel: rows and columns of the windows; larger ones than the grid are as large as the grid.
+        z: (C, h, w) z-scores of any size.
+        grid: rows and columns of the grid.
+        kernel: rows and columns of the windows, limited to those of the grid.
 
     Returns:
-        (rows, columns), 0 or more.
+        (rows, columns) values of at least 0.
     """
     down, across = (_window_means(*sizes) for sizes in zip(z.shape[1:], grid, kernel, strict=True))
     sizes = torch.zeros(len(down), len(across))
@@ -78,10 +80,10 @@ def pooled_sizes(z: Tensor, grid: Cells, kernel: Cells) -> Tensor:
 
 
 def refined(pooled: Sequence[Tensor]) -> Tensor:
-    """One layer's heat map from its pooled sizes, those of the largest windows first.
+    """The heat map of one layer from its pooled magnitudes, those of the largest windows first.
 
-    H is the first, and then H / (1 + max H) times one after the other: where large windows see nothing, small ones find
-    nothing.
+    H starts as the first map. It is then normalised to H / (1 + max H) and multiplied by each next map, so that small
+    windows count only where large windows are active.
     """
     result = pooled[0]
     for one in pooled[1:]:
@@ -90,10 +92,11 @@ def refined(pooled: Sequence[Tensor]) -> Tensor:
 
 
 def cell_auroc(heat: Tensor, truth: Tensor) -> float:
-    """How often a cell of the patch is hotter than another cell: area under the ROC curve; NaN without both kinds.
+    """Area under the ROC curve of a heat map as a detector of the patch's cells; NaN if all cells or no cells show the
+    patch.
 
     Args:
-        heat: (rows, columns).
+        heat: (rows, columns) heat map.
         truth: (rows, columns), 1 where the patch is, 0 elsewhere.
     """
     is_patch = truth.flatten() > 0
@@ -105,13 +108,15 @@ def cell_auroc(heat: Tensor, truth: Tensor) -> float:
 
 
 def _nearest(cells: int, grid: int) -> Tensor:
-    """(grid, cells): 1 where a place of the grid takes its value from a cell."""
+    """(grid, cells) matrix of nearest-neighbour resizing along one axis: 1 where a grid place takes its value from a
+    cell.
+    """
     return functional.interpolate(torch.eye(cells)[None], size=grid, mode="nearest")[0].T
 
 
 @functools.lru_cache(maxsize=64)
 def _window_means(cells: int, grid: int, kernel: int) -> Tensor:
-    """(windows, cells): from a line of cells to the means of windows of a grid on which each has the nearest one."""
+    """(windows, cells) matrix along one axis from cells to means of windows of the resized grid."""
     sums = functional.pad(_nearest(cells, grid).double().cumsum(dim=0), (0, 0, 1, 0))
     kernel = min(kernel, grid)
     return ((sums[kernel:] - sums[:-kernel]) / kernel).float()

@@ -1,4 +1,4 @@
-"""Detectors that score how unusual one feature map is: HyperNeuron and FPDA are two of them."""
+"""Detectors that score the deviation of one feature map from clean pictures, such as HyperNeuron and FPDA."""
 
 from __future__ import annotations
 
@@ -28,19 +28,20 @@ from gear.values.frames import UInt8Image
 Views = Mapping[str, UInt8Image]
 
 FOLDS = 4
-"""Each quarter of the clean pictures is scored by what is usual in the others: pictures that have taught what is usual
-look more usual than new ones."""
+"""Number of folds for the scores of clean pictures. Each quarter is scored with the statistics of the others, because
+pictures deviate less from their own statistics than new pictures do.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Learnt:
-    """What a detector knows after calibration.
+    """The state of a detector after calibration.
 
     Attributes:
-        layer: the tap that it looks at.
-        usual: its numbers in clean pictures.
-        level: raw score at which it raises the alarm.
-        report: what it learnt.
+        layer: name of the tap that is read.
+        usual: statistics of the features of clean pictures.
+        level: raw score above which the alarm is raised.
+        report: the fit report.
     """
 
     layer: str
@@ -49,18 +50,18 @@ class Learnt:
     report: FitReport
 
     def fit_report(self) -> FitReport:
-        """The alarm level, and how often clean pictures of the same kind exceed it."""
+        """The alarm level, and the rate at which clean pictures of the same kind exceed it."""
         return self.report
 
 
 class Detector:
-    """A `Defense` that leaves pictures as they are and says how sure it is of an attack.
+    """A `Defense` that does not change pictures and returns a score that the sample is attacked.
 
     Args:
-        layer: the tap to look at; "" takes the deepest.
-        compress: from a (C, h, w) feature map to the numbers that are compared.
-        aggregate: from their Z-scores to one number, 0 or more.
-        false_alarms: share of clean pictures that score above 0.5.
+        layer: name of the tap to read; "" for the deepest.
+        compress: function from a (C, h, w) feature map to the features that are compared.
+        aggregate: function from the z-scores of these features to one number, 0 or more.
+        false_alarms: share of clean pictures whose score may exceed 0.5.
     """
 
     def __init__(
@@ -76,10 +77,10 @@ class Detector:
     def fit(
         self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
     ) -> Learnt:
-        """Learns from clean pictures alone.
+        """Calibrates the detector with clean pictures only.
 
         Raises:
-            GearError: there are too few, they differ in size, or the model has no such feature map.
+            GearError: there are too few pictures, they differ in size, or the model has no such feature map.
         """
         assert model is not None
         if len(clean) < FOLDS:
@@ -98,23 +99,23 @@ class Detector:
         return Learnt(layer=layer, usual=learnt, level=level, report=FitReport(values=values))
 
     def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
-        """The pictures as they came, and the score."""
+        """Returns the unchanged pictures and the score."""
         assert model is not None
         raw = self._raw(state.usual, self._numbers(model, views, state.layer))
         return DefenseResult(views=dict(views), score=sureness(raw, state.level))
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The pictures as they came."""
+        """Returns the unchanged pictures."""
         return dict(views)
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> DefendedBatch:
-        """The pictures unchanged, and their scores with the gradient to the pictures."""
+        """The unchanged pictures, and their scores with gradients with respect to the pictures."""
         features = tapped(model, views, [state.layer])[state.layer]
         raw = torch.stack([self._aggregate(state.usual.z_scores(self._compress(one))) for one in features])
         return DefendedBatch(views=dict(views), scores=sureness_tensor(raw, state.level))
 
     def wrap(self, model: Model) -> Model:
-        """The model as it is."""
+        """Returns the model unchanged."""
         return model
 
     def _numbers(self, model: Model, views: Views, layer: str) -> Tensor:

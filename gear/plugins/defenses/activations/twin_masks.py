@@ -1,4 +1,4 @@
-"""Where the patch is, from two pictures that differ in nothing but the patch."""
+"""Finds the patch's pixels from two pictures that differ only in the patch."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
 LEAST_CHANGE = 12
-"""Levels of a channel. What a patch does to the light on things near it is less."""
+"""Smallest change of a channel in levels that counts; light from a patch changes its surroundings by less."""
 
 CLOSING_PX = 5
-"""Holes where the patch happens to have the colour of what it covers are filled up to this size."""
+"""Largest holes in pixels that are filled, where the patch has the colour of the covered pixels."""
 
 MOST_CHANGED = 0.5
-"""Share of a picture beyond which it is taken for another scene."""
+"""Share of changed pixels above which the pictures are considered different scenes."""
 
 
 def patch_area(clean: UInt8Image, patched: UInt8Image, number: int) -> npt.NDArray[np.bool_]:
-    """(H, W): where the second picture shows the patch.
+    """(H, W) bool: pixels of the second picture that show the patch.
 
     Args:
-        clean, patched: (H, W, 3) of one scene.
-        number: of the sample, for the error.
+        clean, patched: (H, W, 3) uint8 pictures of one scene.
+        number: number of the sample, for the error message.
 
     Raises:
-        GearError: they are no twins.
+        GearError: the pictures are not twins.
     """
     if clean.shape == patched.shape:
         changed = (cv2.absdiff(clean, patched).max(axis=2) >= LEAST_CHANGE).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""How far numbers lie from what they usually are."""
+"""Z-scores of features with respect to clean pictures, and alarm levels for scores."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ from torch import Tensor
 from gear.values.errors import GearError
 
 LEAST_LEVEL = 1e-9
-"""An alarm level of 0 would make every score 1."""
+"""Smallest alarm level, because a level of 0 would make every score 1."""
 
 FLOOR = 0.01
-"""Of the mean deviation, added to each. A number that never changed in calibration has none: the least change of it
-would outweigh all others."""
+"""Share of the mean deviation that is added to each deviation. Otherwise a feature that was constant in the calibration
+has deviation 0, and its smallest change would outweigh all other features.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Usual:
-    """What is usual.
+    """Means and standard deviations of features on clean pictures.
 
     Attributes:
-        mean, deviation: of each number, float64.
+        mean, deviation: mean and standard deviation of each feature, float64.
     """
 
     mean: Tensor
@@ -35,7 +36,7 @@ class Usual:
         """(values - mean) / deviation.
 
         Raises:
-            GearError: their shape is not that of the calibration, so pictures have another size.
+            GearError: the shape of the features differs from the calibration's, because the pictures have another size.
         """
         if values.shape != self.mean.shape:
             here, there = (" x ".join(map(str, one.shape)) for one in (values, self.mean))
@@ -47,12 +48,12 @@ class Usual:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Moments:
-    """Sums over samples from which means and deviations follow.
+    """Sums over samples from which means and deviations are computed.
 
     Attributes:
-        count: samples.
-        mean: of each number, float64.
-        squares: sum of squared deviations from the mean, of each number.
+        count: number of samples.
+        mean: mean of each feature, float64.
+        squares: sum of squared deviations from the mean, of each feature.
     """
 
     count: int
@@ -60,7 +61,7 @@ class Moments:
     squares: Tensor
 
     def merged(self, other: Moments) -> Moments:
-        """Of the samples of both (Chan, Golub and LeVeque, 1979).
+        """The moments of both sets of samples together (Chan, Golub and LeVeque, 1979).
 
         Raises:
             GearError: their shapes differ.
@@ -75,7 +76,7 @@ class Moments:
         return Moments(count=count, mean=mean, squares=squares)
 
     def usual(self) -> Usual:
-        """Mean and deviation.
+        """Means and standard deviations of the samples.
 
         Raises:
             GearError: there are fewer than two samples.
@@ -89,7 +90,7 @@ NO_MOMENTS = Moments(count=0, mean=torch.zeros(()), squares=torch.zeros(()))
 
 
 def moments(samples: Iterable[Tensor]) -> Moments:
-    """Over samples of one shape, in one pass.
+    """Computes the moments of samples of equal shape in one pass.
 
     Raises:
         GearError: shapes differ.
@@ -102,10 +103,10 @@ def moments(samples: Iterable[Tensor]) -> Moments:
 
 
 def usual(samples: Iterable[Tensor]) -> Usual:
-    """Means and deviations over samples of one shape, in one pass.
+    """Computes means and standard deviations of samples of equal shape in one pass.
 
     Raises:
-        GearError: there are fewer than two, or shapes differ.
+        GearError: there are fewer than two samples, or their shapes differ.
     """
     return moments(samples).usual()
 
@@ -132,10 +133,10 @@ def alarm_level(clean: Sequence[float], false_alarms: float) -> float:
 
 
 def false_alarm_interval(count: int, false_alarms: float) -> tuple[float, float]:
-    """In which share of new clean pictures of the same kind the level raises the alarm, with 95 %.
+    """The 95 % interval of the share of new clean pictures of the same kind that exceed the alarm level.
 
     The share that exceeds the k-th of n scores has the distribution Beta(n + 1 - k, k) over draws of the n calibration
-    pictures. Pictures of other scenes may exceed it more often still.
+    pictures. Pictures of other scenes may exceed the level more often.
     """
     from scipy import stats
 
@@ -156,5 +157,5 @@ def sureness(raw: float, level: float) -> float:
 
 
 def sureness_tensor(raw: Tensor, level: float) -> Tensor:
-    """As `sureness`, of (B,) scores with their gradient."""
+    """The same as `sureness` for (B,) raw scores, with gradients."""
     return raw / (raw + max(level, LEAST_LEVEL))

@@ -1,6 +1,6 @@
-"""Z-Mask (Rossolini et al., AAAI 2023): what over-activates shallow and deep layers alike is a patch, and is covered.
+"""Z-Mask (Rossolini et al., AAAI 2023): regions that over-activate both shallow and deep layers are covered as patches.
 
-After the authors' code and supplement; what they leave open is an option of the plugin.
+It follows the authors' code and supplement. Choices that these leave open are options of the plugin.
 """
 
 from __future__ import annotations
@@ -36,29 +36,30 @@ from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
 LEAST_AUROC = 0.75
-"""Of the cells of a layer's heat map, for the layer to be looked at."""
+"""Smallest AUROC over the cells of a layer's heat map with which the layer is used."""
 
 LAYER_PICTURES = 12
-"""Patched pictures by which layers are chosen, at most."""
+"""Largest number of patched pictures by which layers are chosen."""
 
 MOSTLY = 0.5
-"""Share of a cell that the patch must take to be there."""
+"""Share of a cell that the patch must cover for the cell to count as patch."""
 
 FILL = np.array([124, 116, 104], np.uint8)
-"""ImageNet's mean in bytes: what is covered is 0, as published, to a network that normalises by it. To a network with
-another normalisation it is a grey near the middle, which is gear's choice."""
+"""Fill colour of covered regions: ImageNet's mean in bytes. A network that normalises by this mean receives 0, as
+published. For networks with another normalisation it is a grey near the middle, which is gear's choice.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Learnt:
-    """What calibration gives.
+    """The state of the defense after calibration.
 
     Attributes:
-        layers: that are looked at.
-        statistics: of their channels.
-        block: makes masks of heat maps.
+        layers: names of the layers that are read.
+        statistics: statistics of the channels of these layers.
+        block: computes masks from heat maps.
         level: raw score that the share `false_alarms` of clean pictures exceeds.
-        report: how well all that knows the calibration pictures.
+        report: quality of the fit on the calibration pictures.
     """
 
     layers: Layers
@@ -68,12 +69,12 @@ class Learnt:
     report: FitReport
 
     def fit_report(self) -> FitReport:
-        """The mask block's loss and mask IoU on the calibration's own patches, and the alarm level."""
+        """The loss and the mask IoU of the fusion block on the calibration data, and the alarm level."""
         return self.report
 
 
 class ZMask:
-    """The defense. Its statistics, and the mask that is learnt from them, are of the reference camera."""
+    """The defense. Its statistics and its fusion block are fitted to pictures of the reference camera."""
 
     def __init__(self, settings: ZMaskConfig) -> None:
         self._settings = settings
@@ -82,10 +83,10 @@ class ZMask:
     def fit(
         self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
     ) -> Learnt:
-        """Statistics from clean pictures, the fusion block from their twins with patches.
+        """Computes statistics from clean pictures, and fits the fusion block to their twins with patches.
 
         Raises:
-            GearError: there are no pictures, they are no twins, or no patch is seen in them.
+            GearError: there are no pictures, they are not twins, or no patch is visible in them.
         """
         assert model is not None
         if not len(clean) or not len(patched):
@@ -113,7 +114,7 @@ class ZMask:
         return Learnt(layers=layers, statistics=statistics, block=block, level=level, report=report)
 
     def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
-        """Covers what over-activates the network; the score is that of the camera that shows most of it."""
+        """Covers regions that over-activate the network; the score is the highest one over the cameras."""
         assert model is not None
         masks = {name: np.zeros(picture.shape[:2], np.float32) for name, picture in views.items()}
         score = 0.0
@@ -129,7 +130,7 @@ class ZMask:
         return DefenseResult(views=cleaned, mask=masks, score=score)
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Needs the model and what was learnt of it, which it is not given here.
+        """Not available, because Z-Mask needs the model and its state; `forward_fitted` takes them.
 
         Raises:
             ValueError: always.
@@ -141,7 +142,7 @@ class ZMask:
         return self.defend_batch(views, model, state).views
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> DefendedBatch:
-        """Covers as `apply` does; how far a patch is covered has the gradient of the mask before it is rounded."""
+        """Covers regions as `apply` does. The gradient of the covering is that of the mask before rounding."""
         covers = {name: torch.zeros_like(pictures[:, :1]) for name, pictures in views.items()}
         masks = {name: pictures.new_zeros(pictures[:, 0].shape) for name, pictures in views.items()}
         scores: list[Tensor] = []
@@ -169,7 +170,7 @@ class ZMask:
         return DefendedBatch(views=cleaned, masks=masks, scores=score)
 
     def wrap(self, model: Model) -> Model:
-        """The model as it is."""
+        """Returns the model unchanged."""
         return model
 
     def _statistics(self, clean: Sequence[Views], model: Model, layers: Layers) -> dict[str, ChannelStatistics]:
@@ -189,7 +190,7 @@ class ZMask:
         layers: Layers,
         statistics: Mapping[str, ChannelStatistics],
     ) -> Iterator[Example]:
-        """Heat maps of pictures in which a patch is seen, with where."""
+        """Training examples: heat maps of the pictures in which a patch is visible, with the true mask."""
         for number in spread(range(len(patched)), self._settings.learning_pictures):
             without, look = looks(clean[number])[0], looks(patched[number])[0]
             area = patch_area(without.views[look.camera], look.views[look.camera], number)
@@ -199,13 +200,15 @@ class ZMask:
                 yield Example(shallow=shallow, deep=deep, truth=truth)
 
     def _grid(self, height: int, width: int) -> Cells:
-        """Of a picture of that size: its cells are as square as those of 150 x 300 are in one of 2048 x 1024."""
+        """Rows and columns of the grid for a picture of a size. Cells have the aspect ratio of those of a 150 x 300
+        grid on a picture of 2048 x 1024.
+        """
         return self._settings.rows, max(1, round(self._settings.rows * width / height))
 
     def _seen(
         self, model: Model, look: Look[UInt8Image], layers: Layers, statistics: Mapping[str, ChannelStatistics]
     ) -> tuple[Tensor, Tensor]:
-        """The heat maps of what a model sees, the right way round."""
+        """The heat maps of one input of the model, mirrored back if the input is mirrored."""
         grid = self._grid(*look.views[look.camera].shape[:2])
         heats = self._heats(feature_maps(model, look.views, layers.all()), grid, layers, statistics)
         return _flipped(heats) if look.is_mirrored else heats
@@ -217,7 +220,9 @@ class ZMask:
         layers: Layers,
         statistics: Mapping[str, ChannelStatistics],
     ) -> tuple[Tensor, Tensor]:
-        """The shallow and the deep heat map of one camera's features: cell by cell the largest of the layers'."""
+        """The shallow and the deep heat map of one camera's features: for each cell the largest value over
+        the layers.
+        """
         heats = self._layer_heats(maps, grid, layers, statistics)
         first, second = (torch.stack(list(heats[kind].values())).amax(dim=0) for kind in ("shallow", "deep"))
         return first, second
@@ -249,15 +254,16 @@ class ZMask:
         layers: Layers,
         statistics: Mapping[str, ChannelStatistics],
     ) -> Layers:
-        """Those of the layers whose heat maps tell where the calibration's patches are.
+        """Selects the layers whose heat maps separate patches from other cells in the calibration pictures.
 
-        Published layers were chosen by hand for one network's weights. A layer that tells nothing drowns the others,
-        since the largest heat counts in each cell. In `ddrnet23_slim_depth` cells on its patches are hotter than others
-        in `rb1` and `rb2` (0.94 and 0.93), not in `rbb1` and `rbb2` (0.58 and 0.53). With all four the block learnt
-        nothing (loss 0.205, the constant answer's; mask IoU 0), with the first two it does (0.125 and 0.36).
+        The published layers were chosen by hand for one network's weights. Since each cell takes the largest value over
+        the layers, a layer without information hides the others. In `ddrnet23_slim_depth` the cells on patches have
+        AUROC 0.94 and 0.93 in `rb1` and `rb2`, but 0.58 and 0.53 in `rbb1` and `rbb2`. With all four layers the block
+        learns nothing (loss 0.205, equal to the best constant's; mask IoU 0); with the first two it does (loss 0.125,
+        IoU 0.36).
 
-        Layers are kept whose cells on the patch are hotter than others with a probability of `LEAST_AUROC`, or else the
-        best one. Each of them may be shallow and deep, as in the supplement. What the options name is kept as it is.
+        Layers with an AUROC of at least `LEAST_AUROC` are kept, or the best one if there are none. A layer may be both
+        shallow and deep, as in the supplement. Layers that the options name are always kept.
         """
         every = Layers(shallow=layers.all(), deep=layers.all())
         areas: dict[str, dict[str, list[float]]] = {"shallow": {}, "deep": {}}
@@ -282,7 +288,7 @@ class ZMask:
 
 
 def _truth(area: npt.NDArray[np.bool_], grid: Cells) -> Tensor:
-    """(rows, columns) of 0 and 1: cells that the patch takes most of."""
+    """(rows, columns) of 0 and 1: cells of which the patch covers more than `MOSTLY`."""
     share = cv2.resize(area.astype(np.float32), grid[::-1], interpolation=cv2.INTER_AREA)
     return torch.from_numpy((share >= MOSTLY).astype(np.float32))
 

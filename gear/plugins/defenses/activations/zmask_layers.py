@@ -1,4 +1,4 @@
-"""What Z-Mask looks at: which layers, and which pictures of a rig."""
+"""The inputs of Z-Mask: the layers that it reads, and the pictures of a rig."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ LEFT, RIGHT = "left", "right"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layers:
-    """Which feature maps are looked at.
+    """The feature maps that are read.
 
     Attributes:
-        shallow, deep: names of taps.
+        shallow, deep: names of the taps.
     """
 
     shallow: tuple[str, ...]
     deep: tuple[str, ...]
 
     def all(self) -> tuple[str, ...]:
-        """Each once."""
+        """All names without repetitions."""
         return tuple(dict.fromkeys((*self.shallow, *self.deep)))
 
 
@@ -41,11 +41,11 @@ KNOWN = (
     Layers(shallow=("spatial_1x1", "spatial_7x7", "ct2"), deep=("ct1", "ct2", "spatial_1x1")),
     Layers(shallow=("layer1",), deep=("layer1", "layer4")),
 )
-"""Of DDRNet and BiSeNet as the supplement has them; of ResNets as far as their taps go."""
+"""Layers of known networks: for DDRNet and BiSeNet those of the supplement, for ResNets those among gear's taps."""
 
 
 def layers_of(model: Model, shallow: Sequence[str], deep: Sequence[str]) -> Layers:
-    """The paper's layers of a network that has them, else the first and the last tap; what is given wins.
+    """The layers of a network: the given ones, otherwise those of the paper, otherwise the first and the last tap.
 
     Raises:
         GearError: the model has no taps.
@@ -60,12 +60,12 @@ def layers_of(model: Model, shallow: Sequence[str], deep: Sequence[str]) -> Laye
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look(Generic[Shown]):
-    """One way to show a sample, or a batch of them, to the network.
+    """One input for the network, made from a sample or a batch.
 
     Attributes:
-        camera: whose picture its feature maps tell of.
-        views: what the network is shown, by camera name.
-        is_mirrored: whether that is left and right the wrong way round.
+        camera: name of the camera whose picture the feature maps describe.
+        views: pictures for the network, by camera name.
+        is_mirrored: whether the pictures are mirrored, left to right.
     """
 
     camera: str
@@ -74,10 +74,11 @@ class Look(Generic[Shown]):
 
 
 def looks(views: Mapping[str, Shown]) -> tuple[Look[Shown], ...]:
-    """A look for each camera whose picture the network can be made to tell of, that of the reference camera first.
+    """One input for each camera whose picture the network's feature maps can describe, with the reference camera first.
 
-    A stereo network tells of the left picture. In a mirror the right picture is the left one of another pair, so that
-    the same network with the same statistics tells of it, too. Of other rigs the first camera alone is looked at.
+    The feature maps of a stereo network describe the left picture. Mirrored, the right picture becomes the left one of
+    another pair, so that the same network and statistics also describe it. For other rigs only the first camera is
+    used.
     """
     first = LEFT if LEFT in views else next(iter(views))
     plain = Look(camera=first, views=views, is_mirrored=False)

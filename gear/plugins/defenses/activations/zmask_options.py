@@ -10,17 +10,17 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZMaskConfig(AlarmConfig):
-    """Options, with the values of the authors' demonstration (BiSeNet, pictures of 2048 x 1024).
+    """Options; the defaults are those of the authors' demonstration (BiSeNet, pictures of 2048 x 1024).
 
     Attributes:
-        shallow, deep: feature maps of the model to look at; empty takes the paper's of networks that it names, of
-            others the first (shallow) and the first and the last (deep).
-        rows: of the grid on which activations are compared.
+        shallow, deep: names of the model's feature maps; empty for those of the paper, or, for networks that the paper
+            does not name, for the first one (shallow) and the first and the last one (deep).
+        rows: number of rows of the grid on which activations are compared.
         shallow_kernels, deep_kernels: rows of the pooling windows, large ones first; they are twice as wide.
-        statistics_pictures: clean pictures of which what is usual is learnt, at most.
-        learning_pictures: pictures with patches from which the mask is learnt, at most.
-        steps: of the training on these; 250 passes over 100 pictures, 15 a step, were published.
-        only_if_sure: whether to leave alone what scores less than 0.5.
+        statistics_pictures: largest number of clean pictures from which statistics are computed.
+        learning_pictures: largest number of pictures with patches to which the fusion block is fitted.
+        steps: number of training steps; the authors train for 250 passes over 100 pictures, 15 per step.
+        only_if_sure: whether pictures with a score below 0.5 are left unchanged.
     """
 
     shallow: tuple[str, ...] = ()
