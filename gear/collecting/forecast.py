@@ -28,17 +28,15 @@ class Forecast:
         self, store: Store, missing: int, on_warning: Warn, clock_s: Callable[[], float] = time.monotonic
     ) -> None:
         """Args:
-        store: of the split.
-        missing: number of samples to be made.
-        on_warning: called once with what a large collection needs.
-        clock_s: seconds from any start.
+        store: of the split. missing: number of samples to be made. on_warning: called once with what a large collection
+        needs. clock_s: clock in seconds, with any zero point.
         """
         self._store, self._missing, self._on_warning, self._clock_s = store, missing, on_warning, clock_s
         self._sizes: list[int] = []
         self._first_s = 0.0
 
     def sample_done(self, index: int) -> None:
-        """Takes in a finished sample; the first `FIRST` ones count.
+        """Records a finished sample; only the first `FIRST` samples are measured.
 
         Raises:
             GearError: the disk has less room than all samples need.

@@ -102,7 +102,7 @@ def prepare_merge(root: Path, plans: Sequence[Plan]) -> None:
         plans: of the splits that are merged.
 
     Raises:
-        DatasetError: the disk refuses.
+        DatasetError: a file cannot be written.
     """
     wanted = {plan.info.split: plan.as_json() for plan in plans}
     there: dict[str, Json] = {}

@@ -23,13 +23,13 @@ class Plan:
 
     Attributes:
         task: name and package of the task plugin, its version and options.
-        content: town, scene, weather, renderer and the rest that decides what is seen; no paths, no patch.
+        content: town, scene, weather, renderer and everything else that decides the pictures, without paths and patch.
         patch: label and sha256 of the patch's pictures.
-        info: names for the format's index files.
-        samples: how many frames the split has.
-        auxiliary: kinds of further files that each sample owns: `probes`. Pictures and labels do not depend on them.
-        recipe: the collection's config without paths, from which a damaged file can be made again; None in datasets of
-            earlier versions. It decides no bytes beyond those that `content` decides.
+        info: names and seed for the format's index files.
+        samples: number of frames of the split.
+        auxiliary: kinds of auxiliary files of each sample, such as `probes`. Pictures and labels do not depend on them.
+        recipe: the collection's config without paths, from which damaged files can be made again; None in datasets of
+            earlier versions. `content` already decides all bytes.
     """
 
     task: dict[str, str]
@@ -43,12 +43,12 @@ class Plan:
 
     @property
     def twin_key(self) -> str:
-        """Equal for two splits that differ in nothing but the patch (and in how many samples they have)."""
+        """Hash that is equal for two splits that differ only in the patch and in the number of samples."""
         return _digest({"task": self.task, "options": self.options, "content": self.content})
 
     @property
     def content_key(self) -> str:
-        """Equal for two splits whose common samples are equal byte for byte."""
+        """Hash that is equal for two splits whose common samples have equal bytes."""
         content = {"twin": self.twin_key, "patch": self.patch}
         return _digest(content | ({"auxiliary": list(self.auxiliary)} if self.auxiliary else {}))
 
@@ -59,7 +59,7 @@ class Plan:
         return frames if isinstance(frames, int) and frames > 0 else 1
 
     def as_json(self) -> Json:
-        """The content of its file. Entries of auxiliary files and of a recipe are only there where the plan has any."""
+        """The content of the plan's file. Auxiliary files and the recipe have entries only if the plan has them."""
         content = to_json(self)
         for name in ("auxiliary", "recipe"):
             if not getattr(self, name):
@@ -97,10 +97,10 @@ def _digest(value: Json) -> str:
 
 
 def refuse_copy(root: Path, split: str) -> None:
-    """Refuses a split whose folder was copied or renamed: it names the files of the split that it was copied from.
+    """Refuses a split whose folder was copied or renamed, since it names the files of the original split.
 
     Raises:
-        DatasetError: the plan, of whatever version, is that of another split.
+        DatasetError: the plan is that of another split.
     """
     try:
         there = load_sealed(inside(root, plan_path(split)))
@@ -118,12 +118,12 @@ def _refuse_copy(root: Path, split: str, there: Json) -> None:
 
 
 def read_plan(root: Path, split: str) -> Plan | None:
-    """The plan of a split, or None where there is no such split.
+    """Reads the plan of a split; None if there is no such split.
 
     Raises:
         ReplaceableError: the plan is of another version of gear.
-        DamagedError: its bytes are not those that gear wrote.
-        DatasetError: it cannot be read, or is the plan of another split.
+        DamagedError: the bytes of the plan are not those that gear wrote.
+        DatasetError: the plan cannot be read, or is that of another split.
     """
     path = inside(root, plan_path(split))
     if not path.exists():
@@ -147,7 +147,7 @@ def read_plan(root: Path, split: str) -> Plan | None:
 
 
 def _manifest(root: Path, split: str) -> dict[str, Json]:
-    """The manifest of a split; empty where it is missing or damaged."""
+    """The manifest of a split; empty if it is missing or damaged."""
     try:
         there = load_sealed(inside(root, manifest_path(split)))
     except DatasetError:
@@ -156,7 +156,9 @@ def _manifest(root: Path, split: str) -> dict[str, Json]:
 
 
 def _damaged(root: Path, split: str, problem: str) -> DamagedError:
-    """The error of a damaged plan: a finished split has a manifest, from which the plan can be made again."""
+    """The error for a damaged plan. It advises a repair if the split has a manifest, from which the plan can be made
+    again.
+    """
     remedy = REPAIR if _manifest(root, split) else "delete it and run the same collection again; samples are kept"
     return DamagedError(root / plan_path(split), f"{problem}; {remedy}")
 
@@ -165,9 +167,9 @@ def refuse_other_tasks(root: Path, plan: Plan, *, besides: str = "") -> None:
     """Refuses to mix tasks: all splits of a root are of one task.
 
     Args:
-        root: of the dataset.
-        plan: what is to be collected into it.
-        besides: a split that is not checked.
+        root: root of the dataset.
+        plan: plan of the split to be collected.
+        besides: name of a split that is not checked.
 
     Raises:
         DatasetError: the root holds another task's dataset, or a plan there cannot be read.
@@ -181,10 +183,10 @@ def refuse_other_tasks(root: Path, plan: Plan, *, besides: str = "") -> None:
 
 
 def begin(root: Path, plan: Plan) -> None:
-    """Writes the plan of a new split, or checks that an existing split has the same one, with at most as many samples.
+    """Writes the plan of a new split, or checks that an existing split has the same plan with at most as many samples.
 
     Raises:
-        OutdatedError: the existing split shows another patch, and does not differ otherwise.
+        OutdatedError: the existing split differs only in its patch.
         ReplaceableError: the existing split has another configuration, or more samples.
         DatasetError: the root holds another task's dataset, or a plan there cannot be read.
     """
@@ -211,13 +213,13 @@ def write_plan(root: Path, plan: Plan) -> None:
     """Writes the plan of a split.
 
     Raises:
-        DatasetError: the disk refuses.
+        DatasetError: a file cannot be written.
     """
     write_whole(root, plan_path(plan.info.split), sealed_json(plan.as_json()))
 
 
 def differences(old: Json, new: Json, key: str = "", *, places: tuple[str, str] = ("there", "now")) -> list[str]:
-    """One text for each key in which two JSON values differ, with both values.
+    """The differences of two JSON values: one text per key, with both values.
 
     Args:
         old, new: the values; `samples`, `info` and `recipe` of two plans are left out.

@@ -53,7 +53,7 @@ def whole_tree(target: Path, command: str, *, is_kept: bool = False) -> Iterator
         is_kept: whether the hidden folder also stays after Ctrl-C.
 
     Raises:
-        DatasetError: as `check_target` and `unfinished_place`, another run is filling it, or the disk refuses.
+        DatasetError: as `check_target` and `unfinished_place`, another run is filling it, or a file cannot be written.
     """
     check_target(target, command)
     unfinished = unfinished_place(target, command)

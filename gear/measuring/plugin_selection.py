@@ -109,7 +109,7 @@ def check_camera(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> 
 
 
 def check_optics(model: Chosen, options: Json, collected: str, flag: str) -> None:
-    """As `check_camera`, for the options of a task.
+    """Checks a model against the camera of a task; see `check_camera`.
 
     Raises:
         GearError: the model assumes another camera.

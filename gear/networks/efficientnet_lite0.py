@@ -78,7 +78,9 @@ class OnLite0(nn.Module, ABC):
         self.train(self.training)
 
     def train(self, mode: bool = True) -> OnLite0:
-        """As `nn.Module.train`, except that normalisation layers of a frozen trunk stay in eval mode."""
+        """Sets the mode like `nn.Module.train`, except that normalisation layers of a frozen trunk stay in
+        eval mode.
+        """
         super().train(mode)
         if self.is_frozen:
             for layer in self.lite0().modules():

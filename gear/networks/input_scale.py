@@ -26,7 +26,7 @@ class Scaled(Protocol):
 
     @property
     def weights(self) -> str:
-        """As `gear.networks.options.NetworkOptions.weights`."""
+        """The option `gear.networks.options.NetworkOptions.weights`."""
         ...
 
     @property

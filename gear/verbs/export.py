@@ -1,4 +1,4 @@
-"""A finished dataset in another layout."""
+"""Exports a finished dataset to another layout."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def export(
     progress: bool = False,
     on_progress: Progress | None = None,
 ) -> int:
-    """Writes all splits of a dataset as another layout's tree.
+    """Writes all splits of a dataset in another layout.
 
-    The tree is written into a hidden folder beside its place and renamed when it is whole. An export that fails deletes
-    that folder; after one that was killed, the same command takes up what is there.
+    The tree is written into a hidden folder next to `out`, which is renamed when it is complete. An export that fails
+    deletes that folder. After an export that was killed, the same command continues with the files that exist.
 
     Args:
         dataset: root of a dataset whose splits are finished.
@@ -47,16 +47,17 @@ def export(
         out: folder of the new tree; must be empty or new.
         settings: options of the layout as `KEY=VALUE`, each of them.
         progress: shows a progress bar.
-        on_progress: called after every file with (files so far, 0): their number is not known before.
+        on_progress: called after every file with (number of written files, 0), because the number of all files is
+            unknown.
 
     Returns:
-        How many samples the tree holds.
+        Number of samples in the tree.
 
     Raises:
         UnknownNameError: there is no such layout.
         ConfigError: the layout has no such option, or the option has no such value.
         GearError: the layout needs a package that is not installed.
-        DatasetError: the layout is another task's, a split is not finished, `out` holds something, or the disk refuses.
+        DatasetError: the layout is another task's, a split is not finished, `out` holds something, or a file cannot be written.
     """
     chosen = find_layout(layout)
     options = read_node(chosen.options, with_overrides(NO_OPTIONS, settings, flag="--set"), "options")
@@ -129,10 +130,10 @@ def _size_of(root: Path, files: Iterable[str]) -> int:
 
 
 def _write_tree(root: Path, tree: Iterable[tuple[str, bytes]], on_progress: Progress) -> None:
-    """Writes what is missing of a tree, and deletes what an earlier export, that was killed, left of another one.
+    """Writes the missing files of a tree, and deletes other files that an earlier, killed export left.
 
     Raises:
-        DatasetError: two samples are to be in one file, or the disk refuses.
+        DatasetError: two samples are to be in one file, or a file cannot be written.
     """
     written: set[str] = set()
     for relative, data in tree:

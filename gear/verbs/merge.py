@@ -64,7 +64,7 @@ def merge(
 
     Raises:
         DatasetError: the folders were made with different configurations, a sample is in none of them, a file is
-            damaged or leads outside its folder, `out` holds something, or the disk refuses.
+            damaged or leads outside its folder, `out` holds something, or a file cannot be written.
         UnknownNameError: the plugin of the task is not installed.
     """
     roots, target = [Path(root) for root in datasets], Path(out).resolve()

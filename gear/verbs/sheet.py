@@ -1,4 +1,4 @@
-"""A contact sheet: what a person looks at first."""
+"""Contact sheets: pictures of a dataset's first samples at a glance."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CAPTION_PX = 22
 def contact_sheet(
     path: str | Path, *, split: str | None = None, samples: int = 12, on_progress: Progress | None = None
 ) -> UInt8Image:
-    """Pictures of the first samples, one row each: every preview that the task offers, with its name.
+    """Pictures of the first samples, one row per sample with all previews of the task and their names.
 
     Below them stand the legends of the previews, where the task has them.
 
@@ -35,7 +35,7 @@ def contact_sheet(
 
     Raises:
         DatasetError: there is no finished split to show.
-        PluginError: a third party's task failed, or gave no pictures to look at.
+        PluginError: the task of another package failed, or gave no pictures.
     """
     dataset = open_dataset(path, split)
     found = find("task", name_of_task(dataset.plan.task))
@@ -58,9 +58,9 @@ def contact_sheet(
 
 
 def caption(sample: Sample, name: str) -> str:
-    """The line over a preview: sample, name, scene, and how the first two surfaces are seen.
+    """The text over a preview: sample, name, scene, and the visibility of the first two surfaces.
 
-    A preview that is called as a camera says what that camera sees, any other one what the first camera does.
+    Visibility is that in the camera with the preview's name, or in the first camera if there is none.
     """
     record = sample.record
     camera = name if name in sample.images else record.cameras[0].name
@@ -83,13 +83,13 @@ def sheet(
     Args:
         path: root of a dataset.
         out: the PNG.
-        split: of the dataset; may be left out where there is only one.
+        split: of the dataset; optional if there is only one.
         samples: number of rows.
         progress: shows a progress bar.
         on_progress: called after every sample.
 
     Raises:
-        DatasetError: there is nothing to show, or `out` cannot be written.
+        DatasetError: there is no finished split, or `out` cannot be written.
     """
     target = Path(out)
     refuse_folder(target)

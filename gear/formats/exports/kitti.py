@@ -1,4 +1,4 @@
-"""KITTI object detection as the benchmark itself is laid out: one `training` pool with lists of ids."""
+"""Export to the layout of KITTI's object detection benchmark: one pool `training` with lists of ids."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ FOLDERS = (("image_2", "png"), ("image_3", "png"), ("calib", "txt"), ("label_2",
 
 
 def kitti_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
-    """The files of the new tree, from a stereo3d dataset.
+    """The files of the exported tree, from a stereo3d dataset.
 
-    Ids run from 0 through all splits in the order given, so that `ImageSets/<split>.txt` tells them apart in one pool.
-    `ImageSets/trainval.txt` joins `train` and `val` where both are there.
+    Ids count from 0 over all splits in the given order, and `ImageSets/<split>.txt` lists those of each split.
+    `ImageSets/trainval.txt` lists those of `train` and `val`, if both exist.
 
     Args:
-        splits: what to put into the pool.
-        read: the bytes of a file of the dataset, by relative path.
+        splits: the splits of the pool.
+        read: returns the bytes of a file of the dataset, by relative path.
     """
     lists: dict[str, list[str]] = {}
     number = 0

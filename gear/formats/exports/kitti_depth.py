@@ -1,5 +1,4 @@
-"""KITTI depth as the benchmark itself is laid out: drives, annotated depth, and the cropped selection that its devkit
-reads."""
+"""Export to the layout of KITTI's depth benchmark: drives, annotated depth, and the cropped selection of its devkit."""
 
 from __future__ import annotations
 
@@ -16,16 +15,16 @@ CROP_WIDTH_PX, CROP_HEIGHT_PX = 1216, 352
 
 
 def kitti_depth_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
-    """The files of the new tree, from a depth dataset.
+    """The files of the exported tree, from a depth dataset.
 
-    `<date>/<drive>/image_02/data/` holds pictures, `train|val/<drive>/proj_depth/groundtruth/image_02/` depth in
-    1/256 m; the split `train` goes to `train`, every other one to `val`. A split of single pictures is one drive, a
-    driving one a drive a sequence. Splits other than `train` are also in `val_selection_cropped`, cut to 1216 x 352
-    with their intrinsics, if their pictures are large enough. There are no laser scans.
+    `<date>/<drive>/image_02/data/` holds pictures, `train|val/<drive>/proj_depth/groundtruth/image_02/` depth in 1/256
+    m. The split `train` is written to `train`, all others to `val`. A split of single pictures is one drive; a split of
+    sequences has one drive per sequence. Splits other than `train` are also written to `val_selection_cropped`, cropped
+    to 1216 x 352 with adapted intrinsics, if their pictures are large enough. There are no laser scans.
 
     Args:
-        splits: what to put into the tree.
-        read: the bytes of a file of the dataset, by relative path.
+        splits: the splits of the tree.
+        read: returns the bytes of a file of the dataset, by relative path.
     """
     drives: dict[tuple[str, int], int] = {}
     for split in splits:
@@ -52,7 +51,9 @@ def kitti_depth_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOpti
 
 
 def _selection(record: SceneRecord, drive: str, frame: int, image: bytes, depth: bytes) -> Tree:
-    """The benchmark's own crop: at the bottom, in the middle."""
+    """Yields the cropped picture, depth and intrinsics of a sample: the benchmark's crop is at the bottom in the
+    middle.
+    """
     camera = record.cameras[0]
     top, left = camera.height_px - CROP_HEIGHT_PX, (camera.width_px - CROP_WIDTH_PX) // 2
     if top < 0 or left < 0:

@@ -14,7 +14,7 @@ from gear.values.errors import GearError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CollectRequest:
-    """As the keywords of `gear.collect`, where they are explained.
+    """The arguments of `gear.collect`, which documents them.
 
     Raises:
         GearError: the number of workers is not at least 1, or the shard is not `I/N`.

@@ -1,4 +1,4 @@
-"""`gear.collect`: the whole verb as one call."""
+"""`gear.collect`: renders a dataset split with its ground truth."""
 
 from __future__ import annotations
 
@@ -41,26 +41,26 @@ def collect(
     """Collects one dataset split; resumes an interrupted collection and never makes a finished sample twice.
 
     Args:
-        task: name of a task plugin; needed unless `config` names one.
-        config: name or path of a collection config; the other arguments go before what it says.
+        task: name of a task plugin; required unless `config` names one.
+        config: name or path of a collection config; the other arguments override its values.
         town, scene, split, samples, seed, weather, patch, renderer, quality: as in the config.
         out: root of the dataset.
-        probes: also keep what compositors need; see `gear.dataset.probe_files`.
+        probes: whether probes for compositors are stored as well; see `gear.dataset.probe_files`.
         settings: further `KEY=VALUE` texts for any key of the config.
-        engine: name of the engine that makes the samples; `processes` are those of this machine.
-        workers: number of workers of the engine; they change nothing but time.
+        engine: name of the engine that makes the samples; `processes` uses processes on this machine.
+        workers: number of workers of the engine; the result does not depend on it.
         shard: `I/N`, to collect the I-th of N parts of the split. Sequences stay whole. Shards may be collected in any
             order, at any time and on any machine. A run without a shard makes what is missing and closes the split;
             `gear.merge` joins shards of separate folders.
         in_subprocess: whether a single worker is a process of its own, too, which gives all its memory back.
-        force: replaces a split that was made with another configuration.
+        force: whether an existing split with another configuration is replaced.
         progress: shows a progress bar.
         on_progress: called after every sample.
         on_warning: called, before anything is rendered, with what the user may not have meant: patches
             of another scene, options of the task.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     request = CollectRequest(
         task=task,
@@ -89,10 +89,10 @@ def collect(
 
 
 def run_collect(request: CollectRequest, callbacks: Callbacks) -> CollectReport:
-    """As `collect`.
+    """Runs a request; `collect` documents it.
 
     Raises:
-        GearError: anything that the user can put right; its text is one line.
+        GearError: an error that the user can correct; the message is one line.
     """
     job = resolve(request.loaded())
     for note in job.notes:

@@ -34,23 +34,23 @@ def verify(
     """Checks that every file of a dataset has the bytes that gear wrote, and that none is missing.
 
     A repair makes again what is damaged or missing: whole samples, indexes, manifest, plan and copies of patches. The
-    dataset is then byte for byte what it was, as long as the same versions, renderer and device are used; where they
-    would make other bytes, nothing is changed. Files that do not belong to the dataset are reported and stay.
+    dataset then has its original bytes, if the same versions, renderer and device are used; if these would make other
+    bytes, nothing is changed. Files that do not belong to the dataset are reported and kept.
 
     Args:
         dataset: root of a dataset.
-        split: the split to check; all of them unless given.
+        split: the split to check; all by default.
         repair: whether to make again what is damaged or missing.
-        patch: for a repair, the patch that the dataset shows, where its own copy is damaged.
-        town: for a repair, the MJCF file of a town that is none of gear's own.
+        patch: for a repair, the patch that the dataset shows, if the dataset's copy is damaged.
+        town: for a repair, the MJCF file of a town that is not part of gear.
         scenes: for a repair, that town's scene library.
         simulation: for a repair, the simulation config, where it is none of gear's own.
-        workers: processes that make samples again.
+        workers: number of processes that make samples again.
         progress: whether to show the progress on stderr.
         on_progress: called with (samples, samples of the split), while a split is checked and while it is repaired.
 
     Raises:
-        DatasetError: it is no dataset, a file cannot be read, or one leads outside of the dataset.
+        DatasetError: the folder is not a dataset, a file cannot be read, or a path leads outside of the dataset.
     """
     sources = Sources(patch=patch, town=town, scenes=scenes, simulation=simulation)
     with displayed(Callbacks.of(on_progress=on_progress), "verify", progress=progress) as callbacks:
@@ -91,7 +91,7 @@ def _verified(
 
 
 def _findings(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) -> list[Finding]:
-    """Those of the chosen splits; what belongs to no split is known only when all are."""
+    """The findings of the chosen splits. Files that belong to no split are found only if all splits are checked."""
     found = [finding for name in chosen for finding in checks[name].findings]
     unexpected = unexpected_files(root, checks.values())
     if len(chosen) < len(checks):
@@ -105,10 +105,11 @@ def _count(checks: dict[str, SplitCheck], chosen: Sequence[str]) -> int:
 
 
 def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callbacks: Callbacks) -> None:
-    """Makes a split whole again.
+    """Repairs a split.
 
     Raises:
-        DatasetError: it is not known how it was made, it would be made otherwise here, or a run is at work on it.
+        DatasetError: it is not recorded how the split was made, other bytes would be made here, or another run is
+            writing it.
     """
     job = job_of(root, check, sources)
     with turn(root):
