@@ -57,7 +57,8 @@ def export(
         UnknownNameError: there is no such layout.
         ConfigError: the layout has no such option, or the option has no such value.
         GearError: the layout needs a package that is not installed.
-        DatasetError: the layout is another task's, a split is not finished, `out` holds something, or a file cannot be written.
+        DatasetError: the layout is for another task, a split is not finished, `out` is not empty, or a file cannot be
+            written.
     """
     chosen = find_layout(layout)
     options = read_node(chosen.options, with_overrides(NO_OPTIONS, settings, flag="--set"), "options")
