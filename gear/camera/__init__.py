@@ -1,4 +1,8 @@
-"""The camera: turns linear frames into pictures, by weather, effects and a response that no picture influences."""
+"""The camera: turns a renderer's linear frames into 8-bit pictures.
+
+The steps are weather, lamps, optional effects of lens and sensor, and the tone curve. None of them depends on the
+content of the picture, so a patch changes only the pixels that show it.
+"""
 
 from gear.camera.response import IDENTITY, Response, face_light, response_for
 

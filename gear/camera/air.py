@@ -1,12 +1,13 @@
-"""Fog, haze and the veil of rain between the camera and the scene, applied to linear frames by depth.
+"""Fog, haze and the veil of distant rain between the camera and the scene, applied to linear frames by depth.
 
     L' = L T + A (1 - T)
 
-The transmittance T depends on depth, and the light of the air A on direction: frames stay linear in every albedo, and
-a patch changes only pixels that show it.
+The transmittance T depends on depth; the light A that the air scatters towards the camera depends on direction. Both
+are independent of the colours of surfaces, so frames stay linear in every albedo and a patch changes only pixels that
+show it.
 
-Depth is sampled at pixel centres. In `film` quality a pixel on a silhouette mixes colours of both sides, but has the
-air of its centre: against thick fog, silhouettes of near objects are as hard as in `fast`.
+Depth is sampled at pixel centres. In `film` quality, a pixel on a silhouette mixes the colours of two objects but gets
+the fog of the object at its centre. In thick fog, silhouettes of near objects are therefore as hard as in `fast`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from gear.values.geometry import Array
 from gear.values.scene import CameraRecord
 
 SKY_DISTANCE_M = 2e4
-"""Length of rays to the sky in metres, for fog that does not thin with height."""
+"""Length in metres that is assumed for rays that hit nothing (sky), where the fog does not thin with height."""
 
 _COARSE_PX = 16
 _STRIP_ROWS = 32
@@ -33,12 +34,13 @@ _STEEP = 80.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fog:
-    """A fog, or the veil of rain: extinction that begins at a distance and decays exponentially with height.
+    """A fog, or the veil of rain: extinction that starts at a distance from the camera and decreases exponentially with
+    height.
 
     Attributes:
-        per_m: extinction at height 0, 1/m.
-        from_m: distance along a ray at which it begins, metres.
-        thinning_per_m: rate of decay with height, 1/m; 0 for none.
+        per_m: extinction coefficient at height 0, 1/m.
+        from_m: distance from the camera along a ray at which the fog starts, metres.
+        thinning_per_m: rate of the exponential decrease with height, 1/m; 0 for the same fog at all heights.
     """
 
     per_m: float
@@ -46,17 +48,18 @@ class Fog:
     thinning_per_m: float
 
     def thickness(self, length_m: FloatImage, rise: FloatImage, height_m: float) -> FloatImage:
-        """Optical thickness along rays: the closed integral of an exponentially decaying density.
+        """Optical thickness of the fog along rays: the integral of the extinction, in closed form.
 
-        Over a height difference with decay x, the mean density is (1 - exp(-x)) / x times that at the lower end.
+        If the density decreases by the factor exp(-x) between the two ends of a ray, its mean is (1 - exp(-x)) / x
+        times the density at the lower end.
 
         Args:
-            length_m: (h, w) lengths of the rays.
+            length_m: (h, w) lengths of the rays in metres.
             rise: (h, w) height gained per metre of ray.
-            height_m: height at which they begin.
+            height_m: height at which the rays start (the camera's), metres.
 
         Returns:
-            (h, w) float32.
+            (h, w) float32, without unit.
         """
         inside_m = np.maximum(length_m - np.float32(self.from_m), 0)
         if self.thinning_per_m <= 0:
@@ -91,11 +94,11 @@ class Air:
     ring: Array
 
     def apply(self, linear_rgb: UInt16Image, depth_m: FloatImage, camera: CameraRecord) -> UInt16Image:
-        """The frame seen through the air.
+        """Adds fog and haze to a frame.
 
         Args:
             linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`.
-            depth_m: (H, W) float32 planar z, NaN where nothing is.
+            depth_m: (H, W) float32 planar z, NaN where nothing was hit.
             camera: the camera that takes the picture.
 
         Returns:
@@ -121,7 +124,9 @@ class Air:
         return np.asarray(cv2.merge(planes), dtype=np.uint16)
 
     def transmittance(self, depth_m: FloatImage, camera: CameraRecord) -> FloatImage:
-        """The transmittance T of each pixel and channel, (H, W, 3) float32 in 0..1."""
+        """(H, W, 3) float32 in 0..1: the share of a surface's light that reaches the camera, for each pixel and
+        channel.
+        """
         rays, _ = self._directions(camera)
         return np.stack(self._through(depth_m, rays, float(camera.world_from_camera.position_m[2])), axis=-1)
 
@@ -143,7 +148,8 @@ class Air:
         return [np.exp(length_m * np.float32(-per_m) - tau) for per_m in self.clear_per_m]
 
     def _directions(self, camera: CameraRecord) -> tuple[FloatImage, list[FloatImage]]:
-        """Rays as `_through` takes them, and the light of the air, (H, W) per channel.
+        """Two values for each pixel: the rays as `_through` takes them, and the light of the air as three (H, W)
+        channels.
 
         The light varies slowly, so it is computed on a coarse grid and interpolated.
         """

@@ -1,14 +1,15 @@
-"""Contact shadows: the sky's light that road users block on the ground under and beside them.
+"""Contact shadows: a car or person hides part of the sky from the ground under and beside it.
 
     L' = L (1 - s o)
 
-o is the share of the sky that an actor hides from a point of level ground, weighted by the cosine: the mean of the
-shadows of the actor's triangles from directions all over the sky. s is the share of the sky in the ground's light: all
-of it under a vehicle, where no sun comes; beside it, the mean of shade and sun, since the frame does not tell them
-apart. Neither depends on any albedo, so frames stay linear.
+o is the share of the sky that the actor hides from a point on level ground, weighted by the cosine of the angle to the
+vertical. It is computed once per asset: the mean of the shadows of its triangles over directions from the whole sky.
+s is the sky's share in the light of the ground. Under a vehicle s is 1, because the sun does not reach that ground.
+Beside a vehicle the frame does not tell whether the sun shines there, so s is the mean of both cases. Neither o nor s
+depends on any albedo, so frames stay linear.
 
-Renderers lack these shadows: their sky casts none, and `gear.render.occlusion` reaches some decimetres only. Under an
-overcast sky and in the shade of houses, cars would seem to float.
+No renderer of gear has these shadows: their sky light casts none, and `gear.render.occlusion` reaches a few decimetres
+only. Without them, cars seem to float under an overcast sky and in the shade of houses.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.noise import smooth_step
+from gear.camera.fractal import smooth_step
 from gear.camera.response import DISPLAY_POWER
 from gear.camera.surface_points import longest_edges, points_on
 from gear.values.frames import FloatImage, Shape, UInt16Image
@@ -32,20 +33,22 @@ Mask = npt.NDArray[np.bool_]
 
 DIRECTIONS = 128
 MOST_HIDDEN = 0.94
-"""Largest share of light that is blocked; the rest is reflected by the ground around."""
+"""Largest share of the sky's light that is taken away; the ground around reflects the rest."""
 
 OUTLINE = np.float32(0.5)
-"""Share of a pixel on a silhouette that shows the background."""
+"""Share of a pixel on an actor's silhouette that shows the background."""
 
 _FULL_FROM, _BESIDE_TO = 0.75, 0.4
-"""Hidden shares of the sky above which there is no sun, and below which there may be."""
+"""Hidden shares of the sky: above the first no sunlight is assumed; below the second there may be sunlight."""
 
 _CELLS_PER_M = {"large": 12.5, "small": 16.0}
 _LARGE_M = 2.5
 _REACH_HEIGHTS, _LEAST_REACH_M, _MOST_REACH_M = 1.6, 0.6, 3.0
 _RIM = 0.4
 _STEP_M, _FADE_M = 0.2, 0.15
-"""Height difference between ground and wheels up to which shadows are full, as at kerbs, and the fade above it."""
+"""Height difference between ground and wheels up to which shadows are full (a kerb), and the further difference
+over which they fade to nothing; metres.
+"""
 
 _NEAREST_M, _FARTHEST_M = 0.3, 200.0
 _MOST_POINTS = 400_000
@@ -56,11 +59,11 @@ _EDGES = np.array([(i, i | bit) for bit in (1, 2, 4) for i in range(8) if not i 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkyOcclusion:
-    """Share of the sky that one asset hides from the level ground around it.
+    """Share of the sky that one asset hides from the level ground under and around it.
 
     Attributes:
-        share: (rows, columns) float32 in 0..1; rows go to the actor's left, columns ahead; 0 at the border.
-        cells_per_m: resolution of both axes.
+        share: (rows, columns) float32 in 0..1, 0 at the border. Rows go to the actor's left, columns to its front.
+        cells_per_m: cells per metre along both axes.
     """
 
     share: FloatImage
@@ -68,10 +71,12 @@ class SkyOcclusion:
 
     @staticmethod
     def of(shape: Shape) -> SkyOcclusion:
-        """Averages shadows from directions with a cosine distribution. The asset is solid from its underside up.
+        """Computes the shares as the mean of shadows from directions with a cosine distribution.
+
+        The asset is treated as solid from its underside up.
 
         Args:
-            shape: its triangles in the actor frame, standing on z = 0.
+            shape: triangles of the asset in the actor frame; it stands on z = 0.
         """
         rows, columns, cells_per_m = _grid(shape)
         layers = _layers(_points(shape, 1.5 * cells_per_m) * cells_per_m, rows, columns)
@@ -85,7 +90,7 @@ class SkyOcclusion:
 
 
 def _reach_m(shape: Shape) -> float:
-    """Distance beside an asset up to which ground is shaded, metres."""
+    """Distance from an asset's outline up to which the ground is darkened, metres."""
     top_m = float(shape.box_centre_m[2] + shape.box_size_m[2] / 2)
     return min(max(_REACH_HEIGHTS * top_m, _LEAST_REACH_M), _MOST_REACH_M)
 
@@ -173,17 +178,17 @@ class ContactShadows:
     def apply(
         self, linear_rgb: UInt16Image, depth_m: FloatImage, is_ground: Mask, camera: CameraRecord, record: SceneRecord
     ) -> UInt16Image:
-        """The frame with contact shadows.
+        """Darkens the ground under and beside the actors.
 
         Args:
             linear_rgb: (H, W, 3) uint16, gear's linear frame.
-            depth_m: (H, W) float32 planar z, NaN where nothing is.
-            is_ground: (H, W) bool, pixels of ground.
+            depth_m: (H, W) float32 planar z, NaN where nothing was hit.
+            is_ground: (H, W) bool, True where a pixel shows ground.
             camera: the camera that takes the picture.
-            record: the scene.
+            record: the scene, for its actors.
 
         Returns:
-            (H, W, 3) uint16; the frame itself where nothing is shaded.
+            (H, W, 3) uint16; `linear_rgb` itself where nothing is darkened.
         """
         left = self.factors(depth_m, is_ground, camera, record)
         if left is None:
@@ -198,7 +203,10 @@ class ContactShadows:
     def factors(
         self, depth_m: FloatImage, is_ground: Mask, camera: CameraRecord, record: SceneRecord
     ) -> FloatImage | None:
-        """(H, W) float32 factors for the frame's values; None where nothing is shaded. Arguments as for `apply`."""
+        """(H, W) float32 factors by which the frame's values are multiplied; None if no pixel is darkened.
+
+        The arguments are those of `apply`.
+        """
         left: FloatImage | None = None
         for actor in record.actors:
             shape = self.shapes.get(actor.asset)

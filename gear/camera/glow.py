@@ -1,4 +1,4 @@
-"""Lit windows, and the glare of lamps that shine towards the camera."""
+"""Lit windows, and the glare around lamps that shine towards the camera."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ _MOST = 4.0
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LitWindows:
-    """N lit windows.
+    """The N lit windows of a town.
 
     Attributes:
-        corners_m: (N, 4, 3) in the world, in order around each window.
-        normal: (N, 3) unit vectors out of the house.
-        geom_id: (N,) id of the geom that each is part of.
-        gain: (N, 3) factors on the frame's light, for curtains and goods in lamplight.
-        light: (N, 3) light that is added, in shares of full scale.
-        reach_m: distance beyond which windows are dark.
+        corners_m: (N, 4, 3) corners in world coordinates, in order around each window.
+        normal: (N, 3) unit vectors that point out of the house.
+        geom_id: (N,) id of the geom to which each window belongs.
+        gain: (N, 3) factors on the frame's light, for what lamps inside make visible (curtains, goods).
+        light: (N, 3) light that is added, as a share of full scale.
+        reach_m: windows farther from the camera than this are dark.
     """
 
     corners_m: Array
@@ -53,10 +53,10 @@ class LitWindows:
     reach_m: float = 1200.0
 
     def seen(self, geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord) -> npt.NDArray[np.int32]:
-        """(H, W) index of the window that each pixel shows, -1 for none.
+        """(H, W) int32: index of the lit window that each pixel shows, -1 for none.
 
-        A pixel shows a window where it has the window's geom and lies in its plane: one geom may be many houses, of
-        which one hides another.
+        A pixel shows a window if it has the window's geom id and its position lies in the window's plane. The id alone
+        is not enough: one geom may contain many houses, of which one hides another.
         """
         pose = camera.world_from_camera_transform
         found = np.full(geom_id.shape, -1, np.int32)
@@ -86,13 +86,13 @@ class LitWindows:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LampGlare:
-    """The visible lamps of one kind, as spots in the picture.
+    """The visible lamps of one kind, each as a spot of light in the picture.
 
     Attributes:
-        position_m: (N, 3) in the world.
-        places_px: (N, 2) column and row, index pixels.
-        size_px: (N,) radius of the lamp's glass, pixels.
-        strength: (N,) light at the middle of a spot.
+        position_m: (N, 3) world positions.
+        places_px: (N, 2) column and row in the picture, index pixels.
+        size_px: (N,) radius of the lamp's glass in the picture, pixels.
+        strength: (N,) light at the middle of the spot; 1.0 is the frame's full scale.
     """
 
     position_m: Array
@@ -102,12 +102,12 @@ class LampGlare:
 
     @staticmethod
     def of(lamps: Lamps, camera: CameraRecord, glare: float, depth_m: FloatImage) -> LampGlare:
-        """The lamps in front of the camera that no surface hides.
+        """Finds the lamps that are in front of the camera and that no surface hides.
 
         Args:
             lamps: lamps of one kind.
             camera: the camera that takes the picture.
-            glare: light of a spot per intensity towards the camera.
+            glare: light at the middle of a spot per unit of intensity towards the camera.
             depth_m: (H, W) float32 planar z, NaN where nothing was hit.
         """
         pose = camera.world_from_camera_transform
@@ -130,7 +130,7 @@ class LampGlare:
         )
 
     def spots(self, size_px: tuple[int, ...]) -> FloatImage:
-        """(height, width) float32 light without colour: a Gaussian spot per lamp, and a wide faint one around it."""
+        """(height, width) float32 light without colour: for each lamp a narrow Gaussian spot and a wide, faint one."""
         result = np.zeros(size_px, np.float32)
         for place, size, strength in zip(self.places_px, self.size_px, self.strength, strict=True):
             sigma = max(_LEAST_SIGMA_PX, size)
@@ -141,11 +141,12 @@ class LampGlare:
         return result
 
     def streaks(self, camera: CameraRecord, ground_m: float) -> FloatImage:
-        """(H, W) float32 light without colour: reflections of lamps on wet level ground, stretched towards the camera.
+        """(H, W) float32 light without colour: reflections of the lamps on wet ground, as streaks that point to the
+        camera.
 
         Args:
             camera: the camera that takes the picture.
-            ground_m: height of the ground in the world.
+            ground_m: height of the level ground in world coordinates.
         """
         pose = camera.world_from_camera_transform
         below_m = self.position_m * (1, 1, -1) + (0, 0, 2 * ground_m)

@@ -20,13 +20,13 @@ from gear.values.frames import FloatImage, Shape
 from gear.values.scene import ActorRecord, SceneRecord
 
 LEAST_LIGHT = 0.002
-"""Light below which shadows are not computed: a fifteenth of the night's light on the ground."""
+"""Lamps that give a surface less light than this need no shadows: a fifteenth of the night's light on the ground."""
 
 SHADOWED_WITHIN_M = 100.0
-"""Distance from the camera beyond which lamps cast no shadows."""
+"""Lamps farther from the camera than this cast no shadows, metres."""
 
 WORTH = 0.85
-"""Share of a lamp's reach in which road users cast shadows; its light is faint beyond."""
+"""Share of a lamp's reach within which road users cast shadows; farther away its light is too faint to matter."""
 
 STANDING = Layout(cells=384, zoom=1.0)
 DRIVING = Layout(cells=384, zoom=2.2)
@@ -39,12 +39,12 @@ _LARGE_M = 2.5
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Casters:
-    """Triangles of a town's static objects, without the ground, in spatial pieces.
+    """Triangles of a town's static objects without the ground, sorted into spatial pieces with bounding boxes.
 
     Attributes:
-        corners_m: (N, 3, 3) float32 triangles in the world.
-        ends: (M,) index after the last triangle of each piece.
-        low_m, high_m: (M, 3) float32 corners of the pieces' bounding boxes.
+        corners_m: (N, 3, 3) float32 corners in world coordinates.
+        ends: (M,) for each piece, the index after its last triangle.
+        low_m, high_m: (M, 3) float32 lower and upper corners of the pieces' bounding boxes.
     """
 
     corners_m: Floats
@@ -68,7 +68,7 @@ class Casters:
         return Casters(corners_m=corners_m, ends=ends, low_m=low_m, high_m=high_m)
 
     def near(self, place_m: Floats, reach_m: float) -> Floats:
-        """(K, 3, 3) triangles that may reach into a sphere around a position (3,)."""
+        """(K, 3, 3) triangles that may reach into the sphere of radius `reach_m` around the position `place_m` (3,)."""
         away = np.maximum(np.maximum(self.low_m - place_m, place_m - self.high_m), 0)
         chosen = np.flatnonzero(lengths(away.T) < reach_m).tolist()
         starts = np.append(0, self.ends)
@@ -83,9 +83,9 @@ class User:
     """A road user as a set of points that block light.
 
     Attributes:
-        points_m: (N, 3) float32 points on its surface, in the world.
+        points_m: (N, 3) float32 points on its surface, world coordinates.
         spacing_m: distance between neighbouring points.
-        middle_m, radius_m: bounding sphere.
+        middle_m, radius_m: centre (3,) and radius of its bounding sphere.
     """
 
     points_m: Floats
@@ -94,7 +94,7 @@ class User:
     radius_m: float
 
     def is_before(self, lamp_frame: LampFrame, reach_m: float) -> bool:
-        """Whether its bounding sphere is near a lamp and within the directions of the lamp's map."""
+        """Whether the bounding sphere is within a lamp's reach and in the field of view of the lamp's shadow map."""
         away = self.middle_m - lamp_frame.place_m
         away_m = float(np.linalg.norm(away))
         if away_m >= WORTH * reach_m + self.radius_m:
@@ -107,11 +107,11 @@ class User:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LampShadows:
-    """Shadow casters of a town at night.
+    """Everything in a town that casts shadows at night.
 
     Attributes:
         casters: static objects.
-        shapes: triangles of every asset that may take part, by name.
+        shapes: triangles of every asset that may take part in a scene, by name.
     """
 
     casters: Casters
@@ -121,7 +121,7 @@ class LampShadows:
     _scenes: list[SceneShadows] = field(default_factory=list, init=False, repr=False)
 
     def scene(self, record: SceneRecord) -> SceneShadows:
-        """The casters with the road users of a scene; cached for consecutive views of one scene."""
+        """The shadow casters together with the road users of one scene; cached, because a scene has several views."""
         if not self._scenes or self._scenes[0].record is not record:
             users = [
                 self._user(actor, self.shapes[actor.asset]) for actor in record.actors if actor.asset in self.shapes
@@ -141,7 +141,7 @@ class LampShadows:
         return User(points_m=points_m, spacing_m=spacing_m, middle_m=middle_m, radius_m=radius_m)
 
     def standing(self, kind: str, index: int, lamp_frame: LampFrame, reach_m: float) -> Floats:
-        """(cells, cells) distances at which static objects stop the light of a static lamp; computed once."""
+        """(cells, cells) distances at which static objects stop the light of a static lamp; computed once per lamp."""
         if (kind, index) not in self._fixed:
             self._fixed[kind, index] = first_hits(self.casters.near(lamp_frame.place_m, reach_m), lamp_frame)
         return self._fixed[kind, index]
@@ -149,10 +149,10 @@ class LampShadows:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SceneShadows:
-    """Shadow casters of one scene.
+    """Everything in one scene that casts shadows at night.
 
     Attributes:
-        town: static objects.
+        town: the static objects.
         record: the scene.
         users: its road users.
     """
@@ -163,12 +163,12 @@ class SceneShadows:
     _maps: dict[tuple[str, int], ShadowMap] = field(default_factory=dict, init=False, repr=False)
 
     def map(self, kind: str, index: int, lamps: Lamps, *, stands: bool) -> ShadowMap:
-        """The shadow map of one lamp. In the light of moving lamps only road users cast shadows.
+        """The shadow map of one lamp. In the light of a moving lamp (headlamp), only road users cast shadows.
 
         Args:
             kind: kind of the lamp.
-            index: its index within the kind.
-            lamps: all lamps of the kind.
+            index: its index among the lamps of that kind.
+            lamps: all lamps of that kind.
             stands: whether the lamp is a static one of the town.
         """
         if (kind, index) not in self._maps:
@@ -187,12 +187,12 @@ class SceneShadows:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LampShadow:
-    """The shadows of one lamp. Its map is computed when it is first needed.
+    """The shadows in the light of one lamp. The shadow map is computed at the first use.
 
     Attributes:
-        scene: shadow casters.
-        kind, index: the lamp.
-        lamps: all lamps of its kind.
+        scene: shadow casters of the scene.
+        kind, index: which lamp: its kind, and its index among the lamps of that kind.
+        lamps: all lamps of that kind.
         stands: whether the lamp is a static one of the town.
     """
 
@@ -210,14 +210,14 @@ class LampShadow:
         facing: FloatImage,
         up: FloatImage,
     ) -> None:
-        """Multiplies the lamp's light by the share that reaches each surface, in place.
+        """Multiplies a lamp's light, in place, by the share that reaches each surface.
 
         Args:
             light: (h, W) light of the lamp without shadows.
-            towards: east, north and up components, (h, W) each, of unit vectors from the lamp to the surfaces.
-            away_m: (h, W) distances from the lamp.
+            towards: unit vectors from the lamp to the surfaces, as three (h, W) arrays: east, north and up.
+            away_m: (h, W) distances of the surfaces from the lamp, metres.
             facing: (h, W) cosines between the surfaces' normals and the direction to the lamp.
-            up: (h, W) upward components of the normals.
+            up: (h, W) upward components of the surfaces' normals.
         """
         shown = light.reshape(-1)
         where = np.flatnonzero(shown > LEAST_LIGHT)
@@ -229,7 +229,7 @@ class LampShadow:
 
 
 def _thinned(shape: Shape, spacing_m: float) -> Floats:
-    """(N, 3) points on all triangles, one per cell of `spacing_m`."""
+    """(N, 3) points on all triangles, at most one in each cubic cell with sides of `spacing_m`."""
     corners = shape.vertices_m[shape.faces].astype(np.float32)
     steps = np.maximum(np.ceil(longest_edges(corners) / spacing_m), 1).astype(np.int64)
     points_m = np.concatenate(list(points_on(corners, steps)))

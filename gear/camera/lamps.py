@@ -1,4 +1,4 @@
-"""Lamps and their angular distribution of light."""
+"""Lamps: positions, intensities, and how their light is distributed over directions."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from gear.values.geometry import Array
 from gear.values.scene import ActorRecord, SceneRecord
 
 DRIVING = ("ego", "npc", "carrier")
-"""Roles of vehicles whose lamps are on."""
+"""Roles of the vehicles whose lamps are switched on."""
 
 HEAD_REACH_M = 70.0
 HEAD_HEIGHT_M = 0.65
 HEAD_DIP = 0.012
-"""Tangent of the angle by which low beams point down."""
+"""Tangent of the angle by which low beams point below the horizontal."""
 
 HEAD_COLOUR = (1.0, 0.93, 0.80)
 HEAD_INTENSITY = 130.0
@@ -30,14 +30,14 @@ class Lamps:
     """N lamps of one kind.
 
     Attributes:
-        position_m: (N, 3) in the world.
-        axis: (N, 3) unit vectors along which they shine.
+        position_m: (N, 3) world positions.
+        axis: (N, 3) unit vectors along which the lamps shine.
         intensity: (N,) light of a white surface one metre in front of the lamp; 1.0 is the frame's full scale.
-        colour: (3,) factors per channel.
-        beam: angular distribution: takes the components of unit vectors from the lamp (along the axis, horizontally
-            across it, up) to shares of the intensity.
-        reach_m: distance beyond which nothing is lit.
-        up_m, down_m: heights above and below a lamp up to which surfaces are lit.
+        colour: (3,) factors for red, green and blue.
+        beam: angular distribution, as a function. Its arguments are the components of unit vectors from the lamp: along
+            the axis, horizontally across it, and up. It returns shares of the intensity.
+        reach_m: surfaces farther away than this get no light, metres.
+        up_m, down_m: surfaces more than this above or below the lamp get no light, metres.
     """
 
     position_m: Array
@@ -50,7 +50,7 @@ class Lamps:
     down_m: float
 
     def shares_towards(self, place_m: Array) -> Array:
-        """(N,) shares of their intensity that lamps send towards a world position (3,)."""
+        """(N,) share of its intensity that each lamp sends towards the world position `place_m` (3,)."""
         away = place_m - self.position_m
         away = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
         across = np.einsum("nd,nd->n", away, sides_of(self.axis))
@@ -59,7 +59,7 @@ class Lamps:
 
 
 def sides_of(axis: Array) -> Array:
-    """(N, 3) horizontal unit vectors to the left of axes; zero for vertical axes."""
+    """(N, 3) horizontal unit vectors that point to the left of (N, 3) axes; zero for vertical axes."""
     side = np.stack([-axis[:, 1], axis[:, 0], np.zeros(len(axis))], axis=1)
     length = np.linalg.norm(side, axis=1, keepdims=True)
     return np.asarray(np.where(length > _UPRIGHT, side / np.maximum(length, _UPRIGHT), 0.0))
@@ -67,11 +67,11 @@ def sides_of(axis: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Headlamps:
-    """Positions of a vehicle's headlamps.
+    """Positions of a vehicle's headlamps in the actor frame.
 
     Attributes:
-        front_m: distance ahead of the vehicle's origin.
-        half_gauge_m: distance of each of two headlamps from the middle; 0 for a single one.
+        front_m: distance ahead of the vehicle's origin, metres.
+        half_gauge_m: distance of each of the two headlamps from the middle, metres; 0 for a single headlamp.
     """
 
     front_m: float
@@ -79,17 +79,21 @@ class Headlamps:
 
 
 def street_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImage:
-    """A street lamp: more light to the sides than straight down, none upwards. See `Lamps.beam`."""
+    """Angular distribution of a street lamp: more light to the sides than straight down, none upwards. See
+    `Lamps.beam`.
+    """
     return np.asarray(np.clip(along * 3.5, 0, 1) * (1 + 1.6 * (1 - along * along)))
 
 
 def globe_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImage:
-    """A globe lamp: light to all sides, less upwards. See `Lamps.beam`."""
+    """Angular distribution of a globe lamp: light to all sides, less upwards. See `Lamps.beam`."""
     return np.asarray(np.clip(1 - 0.9 * up, 0.1, 1), dtype=np.float32)
 
 
 def low_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImage:
-    """A low beam: wide, with a sharp cut-off just above its brightest direction. See `Lamps.beam`."""
+    """Angular distribution of a low beam: wide, with a sharp cut-off just above its brightest direction. See
+    `Lamps.beam`.
+    """
     ahead = np.maximum(along, 1e-3)
     side, rise = across / ahead, up / ahead + np.float32(HEAD_DIP)
     above = np.exp(-np.maximum(rise, 0) / np.float32(_HEAD_CUT))
@@ -99,16 +103,16 @@ def low_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImag
 
 
 def drivers(record: SceneRecord, vehicles: Mapping[str, Headlamps]) -> list[ActorRecord]:
-    """The vehicles of a scene whose lamps are on: those that drive and have headlamps."""
+    """The vehicles of a scene whose lamps are on: those that take part in traffic and have headlamps."""
     return [actor for actor in record.actors if actor.asset in vehicles and actor.role in DRIVING]
 
 
 def headlamps(record: SceneRecord, vehicles: Mapping[str, Headlamps]) -> Lamps:
-    """The headlamps of all driving vehicles of a scene.
+    """The headlamps of all vehicles of a scene whose lamps are on.
 
     Args:
         record: the scene.
-        vehicles: headlamps by asset; other assets have none.
+        vehicles: positions of headlamps by asset name; assets that are missing here have none.
     """
     positions, axes = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for actor in drivers(record, vehicles):

@@ -1,4 +1,4 @@
-"""The light of lamps on the surfaces of a view."""
+"""The light that lamps give to the surfaces of a view."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ _NEAREST_M = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LampsInView:
-    """The lamps of one kind, with the part of a picture that each may light.
+    """The lamps of one kind, each with the part of the picture that it may light.
 
     Attributes:
         lamps: all N lamps of the kind.
-        boxes: (N, 4) first and last column, first and last row that each may light; empty where it lights none.
+        boxes: (N, 4) first column, last column, first row and last row that each lamp may light; empty if it lights
+            none.
         sides: (N, 3) horizontal unit vectors to the left of the lamps' axes.
-        origin_m: (3,) position of the camera.
+        origin_m: (3,) world position of the camera.
     """
 
     lamps: Lamps
@@ -36,7 +37,7 @@ class LampsInView:
 
     @staticmethod
     def of(lamps: Lamps, camera: CameraRecord) -> LampsInView:
-        """The boxes of lamps for a camera."""
+        """Finds the part of a camera's picture that each lamp may light."""
         pose = camera.world_from_camera_transform
         sides = np.array([(x, y) for x in (-1, 1) for y in (-1, 1)]) * lamps.reach_m
         corners = np.array([(*side, z) for side in sides for z in (-lamps.down_m, lamps.up_m)])
@@ -56,17 +57,17 @@ class LampsInView:
         return LampsInView(lamps=lamps, sides=sides_of(lamps.axis), boxes=boxes, origin_m=pose.translation_m)
 
     def near(self, within_m: float) -> list[int]:
-        """Indices of lamps with a box that are within a distance of the camera."""
+        """Indices of the lamps that may light part of the picture and are within `within_m` metres of the camera."""
         away_m = np.linalg.norm(self.lamps.position_m - self.origin_m, axis=1)
         first, last, above, below = self.boxes.T
         return np.flatnonzero((first < last) & (above < below) & (away_m < within_m)).tolist()
 
     def light(self, strip: Strip, shadows: Mapping[int, LampShadow] | None = None) -> FloatImage | None:
-        """(h, W) float32 light of the lamps on white surfaces, without colour; None where no lamp lights the strip.
+        """(h, W) float32 light of the lamps on white surfaces, without colour; None if no lamp lights the strip.
 
         Args:
             strip: some rows of the view.
-            shadows: shadows of some lamps, by index.
+            shadows: shadows of some of the lamps, by index.
         """
         top, bottom = strip.rows.start, strip.rows.stop
         first, last, above, below = self.boxes.T

@@ -1,4 +1,6 @@
-"""Surfaces that emit light at night: lenses of vehicle lamps, interiors of buses, boards under their own lamps."""
+"""Surfaces that emit light at night: glasses of vehicle lamps, interiors of buses, and boards with lamps of
+their own.
+"""
 
 from __future__ import annotations
 
@@ -15,16 +17,17 @@ from gear.values.scene import CameraRecord, SceneRecord
 Where = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 BOARD_LIGHT, BOARD_FALL = 0.33, 0.3
-"""Light of a white board at its upper edge, and the share by which it is darker at the lower edge."""
+"""Light of a white board at its upper edge (1.0 is full scale), and the share by which its lower edge is darker."""
 
 INSIDE_LIGHT = (0.62, 0.60, 0.54)
-"""Light of a white surface inside a bus, per channel."""
+"""Light of a white surface inside a bus, for red, green and blue."""
 
 FRONT_LIGHT, BACK_LIGHT = (0.9, 0.85, 0.75), (0.30, 0.008, 0.004)
 BACK_GAIN = 0.35
 ENDS = 0.6
-"""Glass beyond this share of the distance to a vehicle's front or back belongs to lamps that are on; glass between them
-belongs to blue lights on the roof, which are off."""
+"""Lamps that are on lie beyond this share of the distance from a vehicle's middle to its front or back. Glass
+nearer to the middle belongs to blue lights on the roof, which are off.
+"""
 
 
 def vehicle_lamp_light(
@@ -36,14 +39,19 @@ def vehicle_lamp_light(
     geoms: GeomTable,
     vehicles: Mapping[str, Headlamps],
 ) -> Iterator[tuple[Where, float, tuple[float, float, float]]]:
-    """The lenses of the lamps of driving vehicles.
+    """Pixels that show lamps of vehicles which are switched on, with the light that they emit.
 
     Args:
-        lenses: (ngeom + 1,) bool, whether a geom is a lens; the last entry is for id -1.
-        geom_id, depth_m: (H, W) of a view.
+        lenses: (ngeom + 1,) bool: whether a geom is a glass of a lamp; the last entry is for geom id -1.
+        geom_id, depth_m: (H, W) ids and planar z of a view.
         camera: the camera that takes the picture.
-        record, geoms: the scene, and what each geom is.
-        vehicles: assets that have lamps.
+        record: the scene.
+        geoms: table that says what each geom is.
+        vehicles: positions of headlamps by asset name.
+
+    Yields:
+        For the front and for the back of each vehicle: rows and columns of the pixels, the factor on the frame's light
+            there, and the (3,) light that is added.
     """
     rows, columns = np.nonzero(lenses[geom_id])
     if not len(rows):
@@ -66,13 +74,14 @@ def bus_interior_light(
     geoms: GeomTable,
     vehicles: Mapping[str, Headlamps],
 ) -> Where:
-    """Rows and columns of the windows of driving buses, whose interior is lit.
+    """Rows and columns of the pixels that show windows of buses in traffic, whose interior is lit.
 
     Args:
-        panes: (ngeom + 1,) bool, whether a geom is a bus window; the last entry is for id -1.
-        geom_id: (H, W) of a view.
-        record, geoms: the scene, and what each geom is.
-        vehicles: assets that have lamps.
+        panes: (ngeom + 1,) bool: whether a geom is a window of a bus; the last entry is for geom id -1.
+        geom_id: (H, W) ids of a view.
+        record: the scene.
+        geoms: table that says what each geom is.
+        vehicles: positions of headlamps by asset name.
     """
     rows, columns = np.nonzero(panes[geom_id])
     driving = [actor.id for actor in drivers(record, vehicles)]
@@ -83,7 +92,17 @@ def bus_interior_light(
 def board_light(
     geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
 ) -> Iterator[tuple[Where, FloatImage]]:
-    """Faces of standing boards: rows and columns, and (N,) light of a white face there under the board's lamps."""
+    """Pixels that show the faces of boards which stand on the ground, with the light of the boards' own lamps.
+
+    Args:
+        geom_id, depth_m: (H, W) ids and planar z of a view.
+        camera: the camera that takes the picture.
+        record: the scene.
+        geoms: table that says what each geom is.
+
+    Yields:
+        For each board: rows and columns of its N pixels, and (N,) light that a white face has there.
+    """
     index = np.append(geoms.surface_index, -1)[geom_id]
     for number, surface in enumerate(record.surfaces):
         rows, columns = np.nonzero(index == number)

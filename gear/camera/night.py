@@ -1,12 +1,12 @@
-"""Lamps at night in linear frames: light on surfaces, by depth, and surfaces that emit light.
+"""Lamps at night in linear frames: light on surfaces, computed from depth, and surfaces that emit light.
 
     L' = L (k + E / A) + G
 
-L is the frame under even light, in which every surface shows its albedo times A, the irradiance by its normal; k is the
-share of that light that is left at night, E the irradiance by lamps, G emitted light. None of these depends on any
-albedo: frames stay linear, and a patch changes only pixels that show it.
+L is the frame under even light: a surface appears as its albedo times A, where A is the irradiance for its normal. k is
+the share of that even light that is left at night, E the irradiance by lamps, and G emitted light. None of these
+depends on any albedo. Frames therefore stay linear, and a patch changes only pixels that show it.
 
-Normals follow from depth. Static objects of the town and the scene's road users cast shadows.
+Normals are computed from depth. Static objects of the town and the scene's road users cast shadows.
 """
 
 from __future__ import annotations
@@ -35,23 +35,23 @@ from gear.values.scene import CameraRecord, SceneRecord
 HalfImage = npt.NDArray[np.float16]
 
 GLARE = {"street": 0.12, "globe": 0.6, "head": 0.03}
-"""Light of the spot of a visible lamp per intensity towards the camera, by kind of lamp."""
+"""Light at the middle of the spot of a visible lamp per unit of its intensity towards the camera, by kind of lamp."""
 
 SIGNAL_GAIN = 0.9
 STREAK_SHARE = 0.12
-"""Share of a lamp's spot that wet ground reflects."""
+"""Share of a lamp's spot that wet ground reflects as a streak."""
 
 _GRAIN_PX = 128
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class NightLight:
-    """The light of lamps in one view of one scene; the same for all faces of its surfaces.
+    """The light of lamps in one view of one scene. It does not depend on the patches shown.
 
     Attributes:
-        share: (H, W, 3) float16, k + E / A.
-        glow: (H, W, 3) float16, G in frame units.
-        streaks: (H, W, 3) float16, reflections of lamps on wet ground, in frame units; None for dry ground.
+        share: (H, W, 3) float16, the factor k + E / A of the module's formula.
+        glow: (H, W, 3) float16, the added light G in units of the frame.
+        streaks: (H, W, 3) float16, reflections of lamps on wet ground in units of the frame; None for dry ground.
     """
 
     share: HalfImage
@@ -59,7 +59,7 @@ class NightLight:
     streaks: HalfImage | None
 
     def apply(self, linear_rgb: UInt16Image) -> UInt16Image:
-        """The frame at night, (H, W, 3) uint16, a new array, rounded with a fixed dither pattern."""
+        """The frame at night, (H, W, 3) uint16: a new array, rounded with a fixed dither pattern."""
         result = np.empty_like(linear_rgb)
         for rows in _bands(len(linear_rgb)):
             light = self.share[rows].astype(np.float32) * linear_rgb[rows] + self.glow[rows]
@@ -67,7 +67,7 @@ class NightLight:
         return result
 
     def apply_reflections(self, linear_rgb: UInt16Image) -> UInt16Image:
-        """The frame with reflections of lamps on wet ground; the frame itself where ground is dry."""
+        """The frame with the reflections of lamps on wet ground; the frame itself if the ground is dry."""
         if self.streaks is None:
             return linear_rgb
         result = np.empty_like(linear_rgb)
@@ -78,22 +78,22 @@ class NightLight:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Night:
-    """A town's lamps in one weather.
+    """The lamps of a town in one weather.
 
     Attributes:
-        level, sky_level: share of the even light that is left on surfaces and in the sky, 0..1.
-        lit: strength of lamps, 0..1; small at dusk, when they are on but pale.
-        even: (3, 3) even light of white surfaces that face up, sideways and down, per channel; 1.0 is the frame's full
-            scale.
-        lamps: lamps of the town, by kind: `street` and `globe`.
+        level, sky_level: share of the even light that is left at night on surfaces and in the sky, 0..1.
+        lit: strength of the lamps, 0..1; small at dusk, when lamps are on but look pale.
+        even: (3, 3) even light of white surfaces: rows for surfaces that face up, sideways and down, columns for red,
+            green and blue; 1.0 is the frame's full scale.
+        lamps: lamps of the town by kind: `street` and `globe`.
         windows: lit windows.
-        vehicles: headlamps by asset.
+        vehicles: positions of headlamps by asset name.
         wetness: wetness of open ground, 0..1.
-        is_signal: (ngeom,) bool, lenses of traffic lights, which emit light in the frame.
-        is_lens: (ngeom,) bool, lenses of vehicle lamps.
-        is_pane: (ngeom,) bool, windows of buses.
-        is_display: whether frames hold display values instead of light.
-        shadows: shadows of lamps; None for none.
+        is_signal: (ngeom,) bool: whether a geom is a glass of a traffic light; these already emit light in the frame.
+        is_lens: (ngeom,) bool: whether a geom is a glass of a vehicle's lamp.
+        is_pane: (ngeom,) bool: whether a geom is a window of a bus.
+        is_display: whether frames hold display values instead of light (the classic renderer).
+        shadows: what casts shadows; None for no shadows.
     """
 
     level: float
@@ -111,13 +111,13 @@ class Night:
     shadows: LampShadows | None = None
 
     def light(self, truth: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable) -> NightLight:
-        """The light of lamps in a view.
+        """The light of lamps in one view.
 
         Args:
             truth: depth and ids of the view.
             camera: the camera that takes the picture.
-            record: the scene, for vehicles that drive.
-            geoms: what each geom is.
+            record: the scene, for its vehicles.
+            geoms: table that says what each geom is.
         """
         kinds = {**self.lamps, "head": headlamps(record, self.vehicles)}
         share, glow = self._own(truth.geom_id, truth.depth_m, camera, record, geoms)
@@ -145,7 +145,7 @@ class Night:
     def _spots(
         self, kinds: Mapping[str, Lamps], camera: CameraRecord, record: SceneRecord
     ) -> list[tuple[LampsInView, dict[int, LampShadow]]]:
-        """The lamps in a view by kind, each with the shadows of near lamps by index."""
+        """For each kind of lamp: the lamps in the view, and the shadows of the near ones by index."""
         found = []
         scene = self.shadows.scene(record) if self.shadows is not None else None
         for kind, lamps in kinds.items():
@@ -165,7 +165,7 @@ class Night:
     def _add_lamps(
         self, strip: Strip, spots: Sequence[tuple[LampsInView, dict[int, LampShadow]]], share: FloatImage
     ) -> None:
-        """Adds k + E / A to some rows of `share`."""
+        """Adds the factor k + E / A to some rows of `share`."""
         share += np.where(strip.is_seen, np.float32(self.level), np.float32(self.sky_level))[..., None]
         lit = [(spot.lamps.colour, spot.light(strip, shadows)) for spot, shadows in spots]
         above, aside, below = self.even.astype(np.float32)
@@ -179,7 +179,7 @@ class Night:
     def _own(
         self, geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
     ) -> tuple[HalfImage, HalfImage]:
-        """(H, W, 3) factors and added light of surfaces that emit light; zero elsewhere."""
+        """For surfaces that emit light: (H, W, 3) factors on the frame and (H, W, 3) added light; zero elsewhere."""
         share = np.zeros((*geom_id.shape, 3), np.float16)
         glow = np.zeros_like(share)
         panes = self.windows.seen(geom_id, depth_m, camera)
@@ -203,7 +203,7 @@ def _add_colour(total: HalfImage, light: FloatImage, colour: tuple[float, float,
 
 
 def _bands(height: int) -> Iterator[slice]:
-    """Slices of a few rows each: float arrays of whole pictures would take much memory."""
+    """Slices of a few rows each. Float arrays of whole pictures would take too much memory."""
     return (slice(top, min(top + STRIP_ROWS, height)) for top in range(0, height, STRIP_ROWS))
 
 

@@ -1,4 +1,4 @@
-"""Positions and surface normals of pixels, from depth alone."""
+"""Positions and surface normals of pixels, computed from depth alone."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from gear.values.frames import FloatImage
 from gear.values.scene import CameraRecord
 
 STRIP_ROWS = 32
-"""Rows of a strip: its arrays stay in the processor's cache."""
+"""Number of rows per strip: small enough that the arrays of a strip stay in the processor's cache."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Strip:
-    """Some rows of a view.
+    """Positions and normals of some rows of a view.
 
     Attributes:
-        rows: of the picture.
-        is_seen: (h, W) bool, whether a surface was hit.
-        position_m: (3, h, W) float32 vectors in the world from the camera to the surface; zero where nothing was hit.
-        normal: (3, h, W) float32 unit normals in the world, towards the camera; zero where nothing was hit.
+        rows: which rows of the picture.
+        is_seen: (h, W) bool, True where a surface was hit.
+        position_m: (3, h, W) float32 vectors from the camera to the surface, world axes; zero where nothing was hit.
+        normal: (3, h, W) float32 unit normals, world axes, on the camera's side; zero where nothing was hit.
     """
 
     rows: slice
@@ -35,12 +35,13 @@ class Strip:
 def strips_of(depth_m: FloatImage, camera: CameraRecord) -> Iterator[Strip]:
     """Positions and normals of a view, in strips from top to bottom.
 
-    Derivatives are one-sided. On a plane 1/z is linear over the picture, so that of the two neighbours along a row or
-    column the one is used on whose side the second difference of 1/z is smaller. Neither silhouettes nor the edges of
-    road paint, some millimetres above its road, then tilt a normal.
+    A normal is the cross product of two differences of positions, one along the row and one along the column. Each
+    difference is taken to one neighbour only, the one that more likely lies on the same surface. On a plane, 1/z is
+    linear over the picture; so the neighbour on the side with the smaller second difference of 1/z is used. In this way
+    neither silhouettes nor edges of road paint (some millimetres above the road) tilt a normal.
 
     Args:
-        depth_m: (H, W) float32 planar z, NaN where nothing is.
+        depth_m: (H, W) float32 planar z, NaN where nothing was hit.
         camera: the camera that takes the picture.
     """
     height, width = depth_m.shape
@@ -66,7 +67,9 @@ def strips_of(depth_m: FloatImage, camera: CameraRecord) -> Iterator[Strip]:
 
 
 def _along(position: FloatImage, z: FloatImage, axis: int) -> FloatImage:
-    """(3, h, W) difference of positions to a neighbour along an axis of the picture."""
+    """(3, h, W) differences between the positions of a pixel and of its better neighbour along one axis of the
+    picture.
+    """
     step = np.diff(position, axis=axis + 1)
     bend = np.abs(np.diff(1 / z, n=2, axis=axis))
     bend[np.isnan(bend)] = np.inf

@@ -25,16 +25,16 @@ from gear.values.scene import CameraRecord, SceneRecord
 class CameraPipeline:
     """Turns the linear frames of one renderer into pictures of one weather.
 
-    All steps but noise and the response curve are linear in every albedo.
+    All steps except sensor noise and the tone curve are linear in every albedo.
 
     Attributes:
         response: exposure and tone curve.
-        contact_shadows: shadows of the sky's light under and beside road users; None for none.
+        contact_shadows: darker ground under and beside road users; None to leave it out.
         night: the town's lamps; None by day.
         air: fog, haze and the veil of rain.
         water: puddles and wet ground.
         rain: streaks of falling drops.
-        effects: parameters of the camera's effects.
+        effects: parameters of the optional camera effects.
     """
 
     response: Response
@@ -46,7 +46,7 @@ class CameraPipeline:
     effects: CameraEffects
 
     def with_effects(self, record: SceneRecord) -> SceneRecord:
-        """The record with all that ground truth has to know of the camera's effects, such as the lens."""
+        """The scene's record, with what ground truth must know about the camera's effects, such as the lens."""
         cameras = record.cameras
         for effect in self.effects.active():
             cameras = tuple(effect.recorded(camera) for camera in cameras)
@@ -55,27 +55,33 @@ class CameraPipeline:
     def night_light(
         self, truth: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
     ) -> NightLight | None:
-        """The light of lamps in a view, for the argument of `view`; None by day.
+        """The light of lamps in a view, to be passed to `view` as `night_light`; None by day.
 
         Args:
             truth: depth and ids of the view.
             camera: the camera of the view.
             record: the scene.
-            geoms: what each geom is.
+            geoms: table that says what each geom is.
         """
         return self.night.light(truth, camera, record, geoms) if self.night is not None else None
 
     def mirror_camera(self, camera: CameraRecord, record: SceneRecord) -> CameraRecord | None:
-        """The camera below the ground from which reflections on wet ground are rendered; None where nothing is wet.
+        """The camera below the ground that renders the reflections on wet ground; None where nothing is wet.
 
-        At night there is none: `NightLight` has the reflections of lamps, and nothing else is bright enough.
+        At night it is None as well: `NightLight` contains the reflections of lamps, and nothing else is bright enough.
         """
         if self.night is not None or (self.water.share <= 0 and self.water.film <= 0):
             return None
         return mirror_camera(camera, record.ego.world_from_actor.position_m[2])
 
     def reflection(self, below: MirrorView | None, record: SceneRecord) -> Reflection | None:
-        """The reflections on wet ground, from a render by `mirror_camera` without ground and with neutral surfaces."""
+        """The reflections on wet ground.
+
+        Args:
+            below: a render by `mirror_camera` in which the ground is left out and surfaces are neutral; None for no
+                reflections.
+            record: the scene.
+        """
         if below is None:
             return None
         raw, camera = below
@@ -94,15 +100,16 @@ class CameraPipeline:
         night_light: NightLight | None = None,
         reflection: Reflection | None = None,
     ) -> View:
-        """One view: colour with weather and camera effects, and depth and ids aligned with it.
+        """One finished view: colour with weather and camera effects, and depth and ids aligned with it.
 
         Args:
-            raw: linear colour, depth and ids of a renderer.
+            raw: linear colour, depth and ids from a renderer.
             camera: the camera that takes the picture.
             record: the scene, for its seed and the ego car's motion.
-            geoms: what each geom is.
-            night_light: from `night_light` for the same view with any faces; computed if None.
-            reflection: reflections on wet ground; without them puddles reflect only the sky.
+            geoms: table that says what each geom is.
+            night_light: result of `night_light` for this view (it may be shared by renders with other patches);
+                computed here if None.
+            reflection: reflections on wet ground; if None, puddles reflect only the sky.
         """
         seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, night_light, reflection))
         exposure = Exposure(camera=camera, scene=record, geoms=geoms)

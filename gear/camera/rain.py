@@ -1,9 +1,10 @@
-"""Falling rain: streaks of drops, hidden by what is nearer.
+"""Falling rain: streaks of drops, hidden by objects that are nearer.
 
     L' = L (1 - a) + D a
 
-The share a that drops cover comes from the sample's random generator and from depth; D is the light in a drop, that of
-the sky. Neither depends on any albedo, so frames stay linear, and twins have the same drops.
+The share a of a pixel that drops cover follows from the sample's random generator and from depth. D is the light in a
+drop, which is that of the sky. Neither depends on any albedo, so frames stay linear, and a patched sample and its
+unpatched twin have the same drops.
 """
 
 from __future__ import annotations
@@ -21,11 +22,11 @@ from gear.values.geometry import Array
 from gear.values.scene import CameraRecord, Vec3
 
 SHUTTER_S = 1 / 120
-"""Exposure time of streaks in seconds."""
+"""Exposure time in seconds that gives the streaks their length."""
 
 FALL_MPS = 7.5
 DROPS_PER_M3 = 16.0
-"""Visible drops per cubic metre in the strongest rain."""
+"""Number of visible drops per cubic metre in the strongest rain."""
 
 DROP_M = 0.0022
 _LAYERS_M = (0.8, 2.0, 4.0, 8.0, 14.0)
@@ -36,11 +37,11 @@ _SHIFT = 4
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Rain:
-    """The rain of one weather.
+    """The falling rain of one weather.
 
     Attributes:
         intensity: strength of the rain, 0..1.
-        wind_world_mps: horizontal velocity of drops in the world.
+        wind_world_mps: horizontal velocity of the drops in world coordinates, m/s.
         light: (3,) light of a drop; 1.0 is the frame's full scale.
     """
 
@@ -50,7 +51,13 @@ class Rain:
 
     @staticmethod
     def of(precipitation: float, wind_intensity: float, light: Array) -> Rain:
-        """The rain of CARLA's parameters, percent; the wind blows from the west."""
+        """The rain for CARLA's weather parameters.
+
+        Args:
+            precipitation: strength of the rain, percent.
+            wind_intensity: strength of the wind, percent; it blows from the west.
+            light: (3,) light of a drop; 1.0 is the frame's full scale.
+        """
         wind = (_WIND_MPS * wind_intensity / 100, 0.25 * _WIND_MPS * wind_intensity / 100, 0.0)
         return Rain(intensity=precipitation / 100, wind_world_mps=wind, light=light)
 
@@ -62,14 +69,14 @@ class Rain:
         velocity_world_mps: Vec3,
         rng: np.random.Generator,
     ) -> UInt16Image:
-        """The frame with streaks of rain.
+        """Draws streaks of rain into a frame.
 
         Args:
             linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`.
-            depth_m: (H, W) float32 planar z, NaN where nothing is.
+            depth_m: (H, W) float32 planar z, NaN where nothing was hit.
             camera: the camera that takes the picture.
-            velocity_world_mps: velocity of the camera in the world.
-            rng: generator of this sample and camera.
+            velocity_world_mps: velocity of the camera in world coordinates, m/s.
+            rng: random generator of this sample and camera.
 
         Returns:
             (H, W, 3) uint16, a new array, rounded.
@@ -83,7 +90,7 @@ class Rain:
     def cover(
         self, depth_m: FloatImage, camera: CameraRecord, velocity_world_mps: Vec3, rng: np.random.Generator
     ) -> FloatImage:
-        """(H, W) float32 in 0..1, the share of each pixel that drops cover; arguments as for `apply`."""
+        """(H, W) float32 in 0..1: the share of each pixel that drops cover. The arguments are those of `apply`."""
         falling = np.array([*self.wind_world_mps[:2], -FALL_MPS]) - np.asarray(velocity_world_mps)
         motion = camera.world_from_camera_transform.rotation.T @ falling * SHUTTER_S
         clear = np.ones(depth_m.shape, np.float32)
@@ -98,7 +105,7 @@ class Rain:
     def _layer(
         self, camera: CameraRecord, near_m: float, far_m: float, motion: Array, rng: np.random.Generator
     ) -> npt.NDArray[np.uint8]:
-        """(H, W) uint8 cover of the drops between two depths, 255 for all of a pixel."""
+        """(H, W) uint8 share of each pixel that drops between two depths cover; 255 is the whole pixel."""
         pinhole = camera.intrinsics
         half_x, half_y = camera.width_px / (2 * pinhole.fx_px), camera.height_px / (2 * pinhole.fy_px)
         # Tangents of the view's middle: 0 unless the principal point lies elsewhere.

@@ -1,6 +1,6 @@
-"""Planar reflections on level wet ground, rendered from a camera below the ground.
+"""Reflections on level wet ground, rendered by a mirrored camera below the ground.
 
-A plane mirror shows the view of the camera that is mirrored at its plane.
+A plane mirror shows what a camera at the mirrored position would see.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.noise import sampled
+from gear.camera.fractal import sampled
 from gear.contracts.rendering import RawView
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage
 from gear.values.geometry import Array, RigidTransform
@@ -20,34 +20,39 @@ from gear.values.scene import CameraRecord, Pose
 _Floats = npt.NDArray[np.float32]
 
 MirrorView = tuple[RawView, CameraRecord]
-"""A render from `mirror_camera`, and that camera."""
+"""A render by the mirrored camera, and that camera (`mirror_camera`)."""
 
 SHARE_PX = 0.5
-"""Resolution relative to the picture: ripples and rough ground show less detail than a mirror."""
+"""Resolution of the reflection relative to the picture; it may be lower, because ripples and rough ground hide
+detail.
+"""
 
 _RAYS = (33, 65)
-"""Columns and rows of rays that determine which part of the street the picture can reflect."""
+"""Numbers of columns and rows of rays that are tested to find which part of the street the picture can reflect."""
 
 _STEP_PX, _MARGIN_PX = 32, 8
-"""Sizes are multiples of a step, since renderers keep buffers for each size."""
+"""Sizes of reflections are multiples of the first, since renderers keep buffers for each size; the second is a
+margin. Pixels.
+"""
 
 _STEEPEST = 0.2
-"""Least cosine between the mirror camera's axis and a ray."""
+"""Smallest cosine between the mirrored camera's axis and a ray."""
 
 _UNDER_M = 0.05
 _BLUR_RAD = (0.008, 0.04)
-"""Standard deviations of the blur across and along the view on damp ground, whose facets stretch reflections."""
+"""Standard deviations of the blur on damp ground, across and along the direction of view, in radians."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Reflection:
-    """The reflected street.
+    """The street as a mirror at the height of the ground shows it.
 
     Attributes:
-        camera: the mirror camera.
-        height_m: height of the mirror in the world.
-        sharp: (h, w, 4) float32: light times the known share, 1.0 being the frame's full scale, and the known share
-            0..1. Objects below the mirror hide the reflection, which is unknown there.
+        camera: the mirrored camera.
+        height_m: height of the mirror in world coordinates.
+        sharp: (h, w, 4) float32. The last channel is the share 0..1 of the pixel whose reflection is known; the others
+            are light times that share (1.0 is the frame's full scale). The reflection is unknown where objects below
+            the mirror hide it.
         soft: the same, blurred as on damp ground.
     """
 
@@ -58,12 +63,12 @@ class Reflection:
 
     @staticmethod
     def of(view: RawView, camera: CameraRecord, height_m: float) -> Reflection:
-        """The reflection from a render of the world without its ground.
+        """Makes the reflection from a render of the world without its ground.
 
         Args:
-            view: the render of `camera`.
-            camera: from `mirror_camera`.
-            height_m: height of the mirror in the world.
+            view: render by `camera`.
+            camera: the mirrored camera, from `mirror_camera`.
+            height_m: height of the mirror in world coordinates.
         """
         assert view.linear_rgb is not None
         at_m = np.nan_to_num(view.depth_m, nan=np.inf) * _climb(camera) + camera.world_from_camera.position_m[2]
@@ -74,7 +79,12 @@ class Reflection:
         return Reflection(camera=camera, height_m=height_m, sharp=sharp, soft=np.asarray(soft, dtype=np.float32))
 
     def at(self, picture: _Floats, east: _Floats, north: _Floats, up: _Floats) -> _Floats:
-        """(N, 4) reads of `sharp` or `soft` in directions with components (N,), of any length."""
+        """(N, 4) values of `sharp` or `soft` in given directions.
+
+        Args:
+            picture: `sharp` or `soft`.
+            east, north, up: (N,) components of the directions, which may have any length.
+        """
         x, y, z = (
             axis[0] * east + axis[1] * north + axis[2] * up
             for axis in self.camera.world_from_camera_transform.rotation.T.astype(np.float32)
@@ -87,13 +97,14 @@ class Reflection:
 
 
 def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
-    """The camera whose render a level mirror shows to a camera; None where the camera sees no ground.
+    """The camera whose render shows what a level mirror reflects to a given camera; None if the camera sees no ground.
 
-    It is symmetric, level, and as large as needed to cover all reflected rays.
+    The mirrored camera has no roll and its principal point lies in the middle of its picture, which is just large
+    enough for all reflected rays.
 
     Args:
         camera: the camera above the mirror.
-        height_m: height of the mirror in the world.
+        height_m: height of the mirror in world coordinates.
     """
     world_from_camera = camera.world_from_camera_transform
     pinhole = camera.intrinsics
@@ -130,12 +141,12 @@ def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
 
 
 def beyond_mirror(depth_m: FloatImage, camera: CameraRecord, height_m: float) -> tuple[FloatImage, CameraRecord]:
-    """The part of each ray beyond the mirror, as depth from a camera at the height of the mirror.
+    """The part of each mirrored ray that lies above the mirror, as a depth and a camera at the height of the mirror.
 
     Args:
-        depth_m: (h, w) of the mirror camera.
-        camera: the mirror camera.
-        height_m: height of the mirror in the world.
+        depth_m: (h, w) planar z of the mirrored camera.
+        camera: the mirrored camera.
+        height_m: height of the mirror in world coordinates.
     """
     x, y, z = camera.world_from_camera.position_m
     leg_m = np.float32(height_m - z) / np.maximum(_climb(camera), np.float32(1e-6))
@@ -153,7 +164,9 @@ def _climb(camera: CameraRecord) -> _Floats:
 
 
 def _facing(forward: Array, rotation: Array) -> Array:
-    """(3, 3) world-from-camera rotation that looks along `forward` without roll; like `rotation` where it looks up."""
+    """(3, 3) world-from-camera rotation that looks along `forward` without roll. Where `forward` is vertical,
+    the up direction of `rotation` is used.
+    """
     forward = forward / np.linalg.norm(forward)
     level = np.cross(forward, (0, 0, 1))
     right = level if np.linalg.norm(level) > 0.1 else rotation[:, 0] - forward * (rotation[:, 0] @ forward)

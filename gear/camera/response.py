@@ -1,4 +1,4 @@
-"""The response of the camera: exposure and tone curve, equal for all pixels of all pictures of a weather.
+"""The response of the camera: exposure and tone curve. It is the same for all pixels of all pictures of a weather.
 
 For light x in 0..1 (1 is the frame's full scale):
 
@@ -6,8 +6,8 @@ For light x in 0..1 (1 is the frame's full scale):
     z = y ^ c                       contrast: c > 1 darkens dark values
     picture = sRGB(z)               the encoding that readers of PNG files expect
 
-The curve is strictly increasing from 0 to 1, so that it clips nothing and is invertible. It does not depend on the
-picture: a patch cannot change how the rest of a scene is shown.
+The curve increases strictly from 0 to 1, so it clips nothing and can be inverted. It does not depend on the content of
+the picture: a patch cannot change how the rest of a scene is shown.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Encoding = Literal["srgb", "none"]
 Floats = npt.NDArray[np.float64]
 
 DISPLAY_POWER = 1 / 2.2
-"""Exponent from light to display values, where frames hold display values."""
+"""Exponent from light to display values, for frames that hold display values (the classic renderer)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +34,9 @@ class Response:
     """One setting of exposure and tone curve.
 
     Attributes:
-        exposure: gain of the darkest values, more than 0; below 1 it darkens.
-        contrast: exponent of the tone curve, 0.5 to 2.
-        encoding: `srgb`, or `none` for frames that hold display values.
+        exposure: gain g of the darkest values, above 0; values below 1 darken.
+        contrast: exponent c of the tone curve, 0.5 to 2.
+        encoding: `srgb`, or `none` for frames that already hold display values.
 
     Raises:
         ValueError: a parameter is out of range.
@@ -58,7 +58,7 @@ class Response:
         object.__setattr__(self, "_table", table)
 
     def apply(self, linear_rgb: UInt16Image) -> UInt8Image:
-        """The picture of a frame.
+        """Converts a linear frame to an 8-bit picture.
 
         Args:
             linear_rgb: (..., 3) uint16, 0..`LINEAR_FULL_SCALE`.
@@ -88,9 +88,10 @@ IDENTITY = Response(encoding="none")
 
 
 def response_for(renderer_name: str, weather: Weather) -> Response:
-    """The response for a renderer's frames in a weather; it depends on nothing else.
+    """The response that belongs to a renderer and a weather.
 
-    With a low sun, streets are in shadow and exposure is raised. Clouds lower contrast, and the curve adds some.
+    When the sun is low, streets lie in shadow and the exposure is raised. Clouds lower the contrast of light, so the
+    tone curve adds some.
     """
     if renderer_name == "classic":
         return IDENTITY
@@ -101,9 +102,10 @@ def response_for(renderer_name: str, weather: Weather) -> Response:
 
 
 def face_light(renderer_name: str, face: UInt8Image) -> Floats:
-    """Weights of a face's bytes in a linear frame: I = B + w (W - B), where W and B show a white and a black face.
+    """Converts the bytes of a patch's face to weights w of a linear frame.
 
-    The classic renderer lights display values, the others decode sRGB to albedo.
+    A frame that shows the face is I = B + w (W - B), where B and W are the frames with a black and a white face. The
+    classic renderer lights display values; the others first decode sRGB to albedo.
 
     Args:
         renderer_name: name of the renderer.

@@ -1,7 +1,8 @@
-"""Shadow maps of lamps: the distance at which light is stopped, by direction.
+"""Shadow maps of lamps: for each direction from a lamp, the distance at which its light is stopped.
 
-Directions are mapped by a paraboloid about the lamp's axis (Heidrich and Seidel 1998). Shadows are filtered by
-percentage-closer filtering over nine cells (Reeves, Salesin and Cook 1987), so that edges are soft by about two cells.
+Directions are mapped to cells by a paraboloid about the lamp's axis (Heidrich and Seidel, 1998). Shadows are filtered
+over nine cells (percentage-closer filtering; Reeves, Salesin and Cook, 1987), which gives edges that are soft over
+about two cells.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ Floats = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.int64]
 
 OWN_GLASS_M = 0.8
-"""Surfaces this near to a lamp are part of it and cast no shadows."""
+"""Surfaces nearer to a lamp than this belong to the lamp and cast no shadows, metres."""
 
 BORDER = 2
-"""Cells at the border of a map in which nothing stops light."""
+"""Width in cells of the border of a map, in which nothing stops light."""
 
 _LEVEL, _EDGE_ON = 0.9, 1e-6
 _SLACK_M, _MOST_TILT, _STEEP = 0.15, 6.0, 2.5
@@ -34,11 +35,11 @@ _LARGEST, _FRACTION_BITS = 0.3, 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """Size and field of view of a map.
+    """Size and field of view of a shadow map.
 
     Attributes:
-        cells: cells along each side.
-        zoom: 1 for the half space in front of the lamp; larger values for a narrower field in finer cells.
+        cells: number of cells along each side.
+        zoom: 1 for the half space in front of the lamp; larger values give a narrower field of view with finer cells.
     """
 
     cells: int
@@ -46,27 +47,27 @@ class Layout:
 
     @property
     def grain_rad(self) -> float:
-        """The smallest angle between neighbouring cells, radians."""
+        """Smallest angle between neighbouring cells, radians."""
         return 2 / (self.cells * self.zoom)
 
     @property
     def half_angle_rad(self) -> float:
-        """The angle between the axis and the corners of the map, radians."""
+        """Angle between the lamp's axis and the corners of the map, radians."""
         return 2 * math.atan(math.sqrt(2) / self.zoom)
 
     def empty(self) -> Floats:
-        """(cells, cells) float32 map in which nothing stops light."""
+        """(cells, cells) float32 shadow map in which nothing stops light."""
         return np.full((self.cells, self.cells), np.inf, np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LampFrame:
-    """Position and axes of a lamp, and the projection of directions into its map.
+    """Position and axes of a lamp, and the projection of directions onto the cells of its shadow map.
 
     Attributes:
-        place_m: (3,) float32 position in the world.
-        frame: (3, 3) float32 rows: unit vectors across, up and along the lamp's axis.
-        layout: size and field of view of its map.
+        place_m: (3,) float32 world position.
+        frame: (3, 3) float32; the rows are unit vectors across, up and along the lamp's axis.
+        layout: size and field of view of the shadow map.
     """
 
     place_m: Floats
@@ -75,7 +76,7 @@ class LampFrame:
 
     @staticmethod
     def of(place_m: Array, axis: Array, layout: Layout) -> LampFrame:
-        """The frame of a lamp at a position (3,) that shines along an axis (3,)."""
+        """The frame of a lamp at position `place_m` (3,) that shines along `axis` (3,)."""
         along = axis / np.linalg.norm(axis)
         across = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < _LEVEL else (0.0, 1.0, 0.0))
         across /= np.linalg.norm(across)
@@ -83,14 +84,17 @@ class LampFrame:
         return LampFrame(place_m=place_m.astype(np.float32), frame=frame.astype(np.float32), layout=layout)
 
     def places(self, unit: Floats) -> tuple[Floats, Floats]:
-        """Columns and rows (N,) of (3, N) unit vectors, integers at cell centres; outside the map for those behind."""
+        """Columns and rows, (N,) each, of the directions `unit` (3, N) in the map; whole numbers are centres of cells.
+
+        Directions behind the lamp get positions outside the map.
+        """
         across, up, along = self.frame @ unit
         scale = np.float32(self.layout.zoom * self.layout.cells / 2) / np.maximum(1 + along, np.float32(1e-3))
         middle = np.float32(self.layout.cells / 2 - 0.5)
         return across * scale + middle, up * scale + middle
 
     def directions(self, column: Indices, row: Indices) -> Floats:
-        """(N, 3) unit vectors in the world through the centres of (N,) cells."""
+        """(N, 3) world unit vectors from the lamp through the centres of (N,) cells."""
         across, up = ((2 * (cell + 0.5) / self.layout.cells - 1) / self.layout.zoom for cell in (column, row))
         square = across * across + up * up
         unit = np.stack([2 * across, 2 * up, 1 - square], axis=1) / (1 + square)[:, None]
@@ -109,8 +113,8 @@ class ShadowMap:
 
     Attributes:
         lamp_frame: position and axes of the lamp.
-        stop_m: (cells, cells) float32 distance at which light is stopped, by direction; infinite where nothing stops
-            it, and in the border. It must not be changed afterwards.
+        stop_m: (cells, cells) float32 distance in metres at which light is stopped, by direction; infinite where
+            nothing stops it, and in the border. It must not be changed after construction.
     """
 
     lamp_frame: LampFrame
@@ -124,11 +128,11 @@ class ShadowMap:
         object.__setattr__(self, "_most_m", cv2.dilate(self.stop_m, nine))
 
     def through(self, unit: Floats, away_m: FloatImage, facing: FloatImage, up: FloatImage) -> Floats:
-        """(N,) share of the light that reaches surfaces, 0..1.
+        """(N,) share of the lamp's light that reaches each surface, 0..1.
 
         Args:
             unit: (3, N) unit vectors from the lamp to the surfaces.
-            away_m: (N,) distances from the lamp.
+            away_m: (N,) distances of the surfaces from the lamp, metres.
             facing: (N,) cosines between the surfaces' normals and the direction to the lamp.
             up: (N,) upward components of the normals; level ground does not shadow itself.
         """
@@ -148,7 +152,7 @@ class ShadowMap:
         return through
 
     def _at_edges(self, middle: npt.NDArray[np.int32], x: Floats, y: Floats, reach_m: Floats) -> Floats:
-        """Shares of light where some of the nine cells around a direction stop it."""
+        """Shares of light for directions in whose nine surrounding cells at least one stops the light."""
         cells, stop_m = self.lamp_frame.layout.cells, self.stop_m.reshape(-1)
         through = np.zeros_like(reach_m)
         for down, high in zip((-cells, 0, cells), _weights(y), strict=True):
@@ -158,15 +162,21 @@ class ShadowMap:
 
 
 def _weights(share: Floats) -> tuple[Floats, Floats, Floats]:
-    """Weights of three cells for a box two cells wide whose middle is `share` (0..1) beyond the second cell's."""
+    """Weights of three cells for a box filter two cells wide, whose middle lies `share` (0..1) beyond the middle
+    of the second cell.
+    """
     half = np.full_like(share, 0.5)
     return half - half * share, half, half * share
 
 
 def first_hits(corners_m: Floats, lamp_frame: LampFrame) -> Floats:
-    """(cells, cells) float32 distances at which (N, 3, 3) triangles stop a lamp's light.
+    """(cells, cells) float32 distances at which triangles stop a lamp's light.
 
-    Back faces are skipped: the front of the same body is nearer.
+    Back faces are skipped, because the front of the same body is nearer.
+
+    Args:
+        corners_m: (N, 3, 3) triangles in world coordinates.
+        lamp_frame: position and axes of the lamp.
     """
     layout = lamp_frame.layout
     corners = _split(corners_m - lamp_frame.place_m, lamp_frame.frame[2])
@@ -195,7 +205,9 @@ def first_hits(corners_m: Floats, lamp_frame: LampFrame) -> Floats:
 
 
 def _split(corners: Floats, axis: Floats) -> Floats:
-    """Front faces before a lamp, subdivided until the map's projection of each is nearly straight."""
+    """Front faces of triangles in front of a lamp, cut into parts until the map's curved projection of each is
+    nearly straight.
+    """
     left = corners[np.einsum("nd,nd->n", _normals(corners), corners[:, 0]) < 0]
     small = [np.zeros((0, 3, 3), np.float32)]
     while len(left):
@@ -222,9 +234,15 @@ def _quartered(corners: Floats) -> Floats:
 
 
 def stop_behind(stop_m: Floats, points_m: Floats, spacing_m: float, lamp_frame: LampFrame) -> None:
-    """Adds a body, given by (N, 3) points with a spacing, to a map, in place.
+    """Adds a body to a shadow map, in place.
 
-    Light is stopped at the body's far side, so that it does not shadow itself; its shadow begins at its soles.
+    Light is stopped at the body's far side, so that the body does not shadow itself.
+
+    Args:
+        stop_m: (cells, cells) float32 distances of the map; changed in place.
+        points_m: (N, 3) points on the body's surface.
+        spacing_m: distance between neighbouring points.
+        lamp_frame: position and axes of the lamp.
     """
     layout = lamp_frame.layout
     away = np.ascontiguousarray(points_m.T) - lamp_frame.place_m[:, None]

@@ -1,4 +1,4 @@
-"""Points on triangles on regular grids, without random draws."""
+"""Points on regular grids on triangles, without random draws."""
 
 from __future__ import annotations
 
@@ -12,21 +12,22 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 
 def longest_edges(corners: npt.NDArray[Real]) -> npt.NDArray[Real]:
-    """(N,) lengths of the longest edges of (N, 3, 3) triangles."""
+    """(N,) lengths of the longest edge of each of (N, 3, 3) triangles."""
     along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     longest = np.maximum(np.linalg.norm(along, axis=1), np.linalg.norm(across, axis=1))
     return np.asarray(np.maximum(longest, np.linalg.norm(across - along, axis=1)), corners.dtype)
 
 
 def points_on(corners: npt.NDArray[Real], steps: npt.NDArray[np.int64]) -> Iterator[npt.NDArray[Real]]:
-    """Points on triangles, on a regular grid of each.
+    """Points on a regular grid on each triangle.
 
     Args:
-        corners: (N, 3, 3) triangles.
-        steps: (N,) int64 number of parts that each edge is cut into, at least 1.
+        corners: (N, 3, 3) corners of the triangles.
+        steps: (N,) int64, the number of parts into which each edge of a triangle is cut, at least 1.
 
     Yields:
-        (M, 3) points of all triangles with one number of steps, in growing order of steps.
+        One (M, 3) array for each distinct value in `steps`, smallest first: the points of all triangles with that
+        value.
     """
     along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     for step in np.unique(steps).tolist():

@@ -1,4 +1,4 @@
-"""The camera's response in torch, for gradients. Rooms that collect never import it."""
+"""The camera's response in torch, for gradients. Packages that collecting uses never import this module."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from gear.camera.response import Response
 
 
 def apply(response: Response, light: torch.Tensor) -> torch.Tensor:
-    """`Response.curve` on tensors, differentiable once.
+    """`Response.curve` for tensors; differentiable once.
 
     Args:
-        response: the camera setting.
-        light: (...) float, linear, 0..1; clamped, as the frame's full scale clips it.
+        response: exposure and tone curve.
+        light: (...) float linear light, clamped to 0..1 as the frame's full scale clips it.
 
     Returns:
-        (...) of the same dtype, picture values 0..1, not rounded to bytes.
+        (...) picture values 0..1 with the dtype of `light`, not rounded to bytes.
     """
     with torch.no_grad():
         x = light.clamp(0.0, 1.0)
@@ -38,7 +38,7 @@ def apply(response: Response, light: torch.Tensor) -> torch.Tensor:
 
 
 def face_light(renderer_name: str, face: torch.Tensor) -> torch.Tensor:
-    """The torch twin of `gear.camera.face_light`: picture values 0..1 to weights 0..1 of the same shape."""
+    """`gear.camera.response.face_light` for tensors: picture values 0..1 to weights 0..1 of the same shape."""
     return face if renderer_name == "classic" else decode_srgb(face)
 
 
@@ -54,7 +54,7 @@ def decode_srgb(values: torch.Tensor) -> torch.Tensor:
 
 
 def _encoded(light: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Linear light 0..1 to sRGB values 0..1, and the slopes there."""
+    """sRGB values 0..1 of linear light 0..1, and the derivatives of sRGB with respect to light."""
     base = light.clamp_min(0.0031308)
     power = base ** (1 / 2.4)
     is_dark = light <= 0.0031308

@@ -1,12 +1,12 @@
-"""Puddles and wet open ground in linear frames, by label and position of each pixel.
+"""Puddles and wet ground in linear frames, by the semantic label and the position of each pixel.
 
     L' = L + f (S - L)                        damp ground
     L'' = L' (1 - p) + p (L d (1 - F) + R F)    with puddles on it
 
-p is the share of still water, noise that is fixed to the town; F is its Fresnel reflectance; d darkens the bottom. f is
-the reflectance of a film of water on rough ground. R and S are the street as still water and as damp ground reflect it
-(`gear.camera.reflection`), with neutral surfaces. None of these depends on any patch, so frames stay linear in every
-albedo, and a patch changes only pixels that show it.
+p is the share of still water, a fixed random pattern of the town. F is the Fresnel reflectance of water, and d darkens
+the bottom of a puddle. f is the reflectance of a film of water on rough ground. R and S are the street as still water
+and as damp ground reflect it (`gear.camera.reflection`), rendered with neutral surfaces. None of these depends on any
+patch, so frames stay linear in every albedo and a patch changes only pixels that show it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.noise import TILE_PX, periodic_noise, sampled, smooth_step
+from gear.camera.fractal import TILE_PX, periodic_noise, sampled, smooth_step
 from gear.camera.reflection import Reflection
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, UInt16Image
 from gear.values.rng import derive_rng
@@ -28,15 +28,19 @@ _Floats = npt.NDArray[np.float32]
 _Mask = npt.NDArray[np.bool_]
 
 TILE_M = 96.0
-"""Period of the pattern of puddles in metres."""
+"""Period of the pattern of puddles, metres."""
 
 WATER_F0 = 0.02
 BOTTOM = 0.6
 FILM_F0, FILM_F90 = 0.03, 0.55
-"""Reflectance of damp ground from above and at a grazing angle; below that of a mirror, since ground is rough."""
+"""Reflectance of damp ground seen from above and at a grazing angle; lower than that of a mirror, because the
+ground is rough.
+"""
 
 LEVEL_M = (0.2, 0.5)
-"""Height differences up to which ground has the reflection in full, and from which on none of it."""
+"""Height differences between ground and mirror, metres: up to the first the reflection is full, beyond the
+second there is none.
+"""
 
 _ALL = 0.999
 
@@ -49,16 +53,16 @@ _RIPPLE_SLOPE = 0.12
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Water:
-    """The water of one weather on the ground of one town.
+    """The water on the ground of one town in one weather.
 
     Attributes:
         town: name of the town, which determines the pattern of puddles.
-        share: share of open ground under water, 0..1.
+        share: share of open ground that is under water, 0..1.
         ripples: strength of ripples by falling rain, 0..1.
         film: wetness of the ground between puddles, 0..1.
-        mirrored: (rows, columns, 3) float32 light of sky and houses, by the sine of elevation (row 0 is level, the
-            last one overhead) and azimuth (column 0 is east, counter-clockwise); 1.0 is the frame's full scale. It is
-            reflected where the street's reflection is unknown.
+        mirrored: (rows, columns, 3) float32 light of sky and houses, reflected where the street's reflection is
+            unknown; 1.0 is the frame's full scale. Rows are sines of the elevation, from level (row 0) to overhead;
+            columns are azimuths, counter-clockwise from east.
     """
 
     town: str
@@ -75,15 +79,16 @@ class Water:
         camera: CameraRecord,
         reflection: Reflection | None = None,
     ) -> UInt16Image:
-        """The frame with water.
+        """Adds puddles and wet ground to a frame.
 
         Args:
             linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`.
-            depth_m: (H, W) float32 planar z, NaN where nothing is.
-            open_ground: (H, W) bool, where water may be.
+            depth_m: (H, W) float32 planar z, NaN where nothing was hit.
+            open_ground: (H, W) bool, True where there may be water.
             camera: the camera that takes the picture.
-            reflection: the reflected street, for ground at its height. Other ground, and unknown parts of the street,
-                reflect `mirrored`. Without it puddles reflect `mirrored`, and there is no film.
+            reflection: the reflected street, for ground at the height of its mirror. Ground at other heights, and
+                unknown parts of the street, reflect `mirrored`. If None, puddles reflect `mirrored` and there is no
+                film.
 
         Returns:
             (H, W, 3) uint16, a new array, rounded.
@@ -130,13 +135,14 @@ class Water:
         up: _Floats,
         level: _Floats,
     ) -> _Floats:
-        """(N, 3) reflected light in units of the frame: of the street where it is known, else of `mirrored`.
+        """(N, 3) reflected light in units of the frame: that of the street where it is known, otherwise that of
+        `mirrored`.
 
         Args:
             reflection: the reflected street, or None.
             picture: its sharp or soft picture.
-            east, north, up: (N,) components of directions of any length.
-            level: (N,) share of the street's reflection by the ground's height, 0..1.
+            east, north, up: (N,) components of the directions, which may have any length.
+            level: (N,) share of the street's reflection that the ground's height leaves, 0..1.
         """
         full = np.float32(LINEAR_FULL_SCALE)
         if reflection is None or picture is None:
@@ -148,7 +154,7 @@ class Water:
         return np.asarray(light * full, dtype=np.float32)
 
     def _sky(self, east: _Floats, north: _Floats, up: _Floats) -> _Floats:
-        """(N, 3) light of `mirrored` in directions of any length."""
+        """(N, 3) light of `mirrored` in directions (N,) of any length."""
         if not len(east):
             return np.zeros((0, 3), np.float32)
         rows, columns = self.mirrored.shape[:2]
@@ -159,7 +165,7 @@ class Water:
         return sampled(self.mirrored, azimuth_rad * np.float32(columns / (2 * np.pi)), row)
 
     def _stirred(self, sine: _Floats, distance_m: _Floats, at_px: list[_Floats]) -> _Floats:
-        """(N,) sines of the elevations that are reflected, perturbed by ripples."""
+        """(N,) sines of the elevations of the reflected rays, perturbed by ripples."""
         if self.ripples <= 0:
             return sine
         scale = TILE_M / _RIPPLE_TILE_M
@@ -170,7 +176,13 @@ class Water:
 
 
 def _fresnel(sine: _Floats, above: float, grazing: float) -> _Floats:
-    """(N,) reflectance by the sine of elevation: Schlick's approximation (1994) of Fresnel's formula."""
+    """(N,) reflectance from the sine of elevation, by Schlick's approximation (1994) of Fresnel's formula.
+
+    Args:
+        sine: (N,) sines of the elevation.
+        above: reflectance seen from straight above.
+        grazing: reflectance at a grazing angle.
+    """
     flat = (1 - sine) ** 2
     return np.asarray(above + (grazing - above) * flat * flat * (1 - sine), dtype=np.float32)
 
@@ -178,7 +190,7 @@ def _fresnel(sine: _Floats, above: float, grazing: float) -> _Floats:
 def _towards(
     rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp], depth_m: _Floats, camera: CameraRecord
 ) -> list[_Floats]:
-    """Vectors from the camera to the surfaces of pixels: east, north and up, (N,) each, metres."""
+    """Vectors from the camera to the surfaces of N pixels, in metres, as three (N,) arrays: east, north and up."""
     pinhole = camera.intrinsics
     x = (columns.astype(np.float32) - np.float32(pinhole.cx_px)) * depth_m * np.float32(1 / pinhole.fx_px)
     y = (rows.astype(np.float32) - np.float32(pinhole.cy_px)) * depth_m * np.float32(1 / pinhole.fy_px)
@@ -188,5 +200,5 @@ def _towards(
 
 @cache
 def _pattern(town: str) -> npt.NDArray[np.float32]:
-    """(`TILE_PX`, `TILE_PX`) noise of a town, equal in every process."""
+    """(`TILE_PX`, `TILE_PX`) fractal texture of a town; the same in every process."""
     return periodic_noise(derive_rng(0, "puddles", town), _OCTAVES, _SLOPE)

@@ -1,1 +1,4 @@
-"""Compositors put patches into stored pictures, differentiably. Collecting never imports this package."""
+"""Compositors put patches into stored pictures, differentiably with respect to the patches.
+
+Attacks use them. Collecting never imports this package.
+"""

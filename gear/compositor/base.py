@@ -1,4 +1,4 @@
-"""The base class of compositors, which replace some pixels of stored pictures by pixels that depend on patches."""
+"""The base class of compositors: they replace the pixels of stored pictures that show a patch."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ Sizes = tuple[tuple[int, int], ...]
 """Height and width of each patch, pixels."""
 
 CACHE_BYTES = 4 << 30
-"""Default memory for prepared samples: each takes about 2 MB at 512 x 256 and 20 MB at 2048 x 1024."""
+"""Default memory limit for prepared samples. One sample takes about 2 MB at 512 x 256 and 20 MB at 2048 x 1024."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """One view of one sample, prepared for patches of given sizes.
+    """One view of one sample, prepared for patches of given sizes, so that composing again is quick.
 
     Attributes:
-        picture: (3, H, W) uint8, as stored.
+        picture: (3, H, W) uint8, the stored picture.
         where: (N,) int64 row-major indices of the pixels that are composed.
-        inner: data of the compositor for these pixels.
+        inner: data for these pixels, of a type that each compositor chooses.
         inner_bytes: memory of `inner` in bytes.
     """
 
@@ -45,19 +45,22 @@ class Prepared:
 
     @property
     def nbytes(self) -> int:
-        """Memory of picture, indices and inner data in bytes."""
+        """Memory of this object in bytes."""
         return self.picture.nbytes + self.where.nbytes + self.inner_bytes
 
 
 class BaseCompositor:
-    """Implements `gear.contracts.attacks.Compositor`; subclasses choose the pixels and compute their values.
+    """Base class of compositors; implements `gear.contracts.attacks.Compositor`.
+
+    Subclasses choose the pixels to replace and compute their values.
 
     Args:
         dataset: the split whose samples are composed; its pictures are the background.
         device: torch device to compute on.
-        rounding: whether patches and pictures are rounded to bytes, as files are; gradients pass straight through.
-        cache_bytes: memory for prepared samples.
-        cache: a cache that several compositors share, instead of a new one of `cache_bytes`.
+        rounding: whether patches and pictures are rounded to bytes, as files are. Gradients pass the rounding
+            unchanged.
+        cache_bytes: memory limit for prepared samples.
+        cache: a cache that several compositors share; None for a new one of `cache_bytes`.
     """
 
     def __init__(
@@ -76,22 +79,27 @@ class BaseCompositor:
 
     @property
     def surfaces(self) -> int:
-        """Number of patches that the scene takes."""
+        """Number of patches that `compose` expects: the number of patch surfaces in the scene."""
         return len(self.dataset.sidecar(0).record.surfaces)
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """(B, 3, H, W) float32 pictures in 0..1 of the samples with the patches on their surfaces.
+        """Composes pictures of samples with the given patches on their surfaces.
 
-        Differentiable to the patches. Pixels that no surface reaches are the dataset's own, bit for bit.
+        The result is differentiable with respect to the patches. Pixels that show no surface are equal to the dataset's
+        pixels, bit for bit.
 
         Args:
-            patches: one per surface, sRGB in 0..1: (3, h, w) for all samples, or (B, 3, h, w), one per sample.
-            samples: indices in the dataset.
+            patches: one tensor for each surface, sRGB in 0..1: (3, h, w) for all samples, or (B, 3, h, w) with a patch
+                for each sample.
+            samples: B indices in the dataset.
             view: name of the camera.
+
+        Returns:
+            (B, 3, H, W) float32 in 0..1.
 
         Raises:
             ValueError: the number or the shape of the patches is wrong.
-            DatasetError: the dataset lacks what is needed.
+            DatasetError: the dataset lacks files that the compositor needs.
         """
         shown = [self._checked(patch, len(samples)) for patch in patches]
         sizes: Sizes = tuple((int(patch.shape[-2]), int(patch.shape[-1])) for patch in shown)
@@ -126,15 +134,15 @@ class BaseCompositor:
 
     @abstractmethod
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
-        """(columns, 3) or (B, columns, 3) of each patch's pyramid."""
+        """The pyramid of each patch as a list of colours: (columns, 3), or (B, columns, 3) for a batch of patches."""
 
     @abstractmethod
     def _composed(self, inner: Sequence[Any], columns: Sequence[Tensor]) -> Tensor:
-        """(N, 3) values in 0..1 of the composed pixels, view after view.
+        """(N, 3) values in 0..1 of the composed pixels of all views, concatenated.
 
         Args:
             inner: `Prepared.inner` of each view.
-            columns: from `_columns`, one per surface.
+            columns: result of `_columns`, one for each surface.
         """
 
     def _checked(self, patch: Tensor, batch: int) -> Tensor:
@@ -154,7 +162,7 @@ class BaseCompositor:
 
 
 class _Paste(torch.autograd.Function):
-    """Writes values into pictures in place; the gradient is read back at the same pixels."""
+    """Writes values into pictures in place. The backward pass reads the gradient at the same pixels."""
 
     @staticmethod
     def forward(ctx: Any, values: Tensor, where: Tensor, pictures: Tensor) -> Tensor:
@@ -170,11 +178,11 @@ class _Paste(torch.autograd.Function):
 
 
 def products(matrices: Sequence[SparseMatrix], columns: Tensor) -> Tensor:
-    """Light of one surface's pixels, view after view.
+    """Sparse product for each view: the light of the pixels of one surface.
 
     Args:
-        matrices: one per view, (N_i, columns).
-        columns: (columns, 3) for all views, or (B, columns, 3), one per view.
+        matrices: for each view, a matrix (N_i, columns).
+        columns: (columns, 3) for all views, or (B, columns, 3) with one entry for each view.
 
     Returns:
         (sum of N_i, 3).
@@ -191,10 +199,10 @@ def rounded(values: Tensor) -> Tensor:
 
 
 def picture_of(sample: Any, view: str, dataset: Dataset[Any]) -> UInt8Image:
-    """A sample's stored picture of one view, (H, W, 3) uint8.
+    """The stored picture of one view of a sample, (H, W, 3) uint8.
 
     Raises:
-        DatasetError: there is no such view.
+        DatasetError: the dataset has no such view.
     """
     if view not in sample.images:
         raise DatasetError(dataset.root, f"has no view {view!r}; there are: {', '.join(sample.images)}")

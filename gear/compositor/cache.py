@@ -8,11 +8,11 @@ from typing import Generic, Protocol, TypeVar
 
 
 class Sized(Protocol):
-    """An object that reports its memory."""
+    """Protocol of objects that know how much memory they take."""
 
     @property
     def nbytes(self) -> int:
-        """Memory in bytes."""
+        """Memory of the object in bytes."""
         ...
 
 
@@ -20,7 +20,9 @@ ThingT = TypeVar("ThingT", bound=Sized)
 
 
 class Cache(Generic[ThingT]):
-    """Objects by key; the least recently used one is dropped first. Not safe for several threads."""
+    """A dictionary of objects with a limit in bytes; the least recently used object is dropped first. Not
+    thread-safe.
+    """
 
     def __init__(self, max_bytes: int) -> None:
         self._max_bytes = max_bytes
@@ -31,7 +33,10 @@ class Cache(Generic[ThingT]):
         return len(self._things)
 
     def get(self, key: Hashable, make: Callable[[], ThingT]) -> ThingT:
-        """The object with a key; `make` creates it if it is missing. An object larger than the cache is not stored."""
+        """Returns the object for a key; if it is missing, `make` creates it and it is stored.
+
+        An object that is larger than the whole cache is returned but not stored.
+        """
         if key in self._things:
             self._things.move_to_end(key)
             return self._things[key]

@@ -1,8 +1,11 @@
-"""The paper's compositor: a patch is pasted by homography, with its own colours.
+"""The compositor of the CARLA-GeAR paper: a patch is pasted by homography, with its own colours.
 
-It ignores light, air and occluders; the `transport` compositor has them. It differs from the reference code in three
-points: the mask is the surface's outline instead of the pixels that are not black; all patches are kept; and a patch
-that is small in the picture is filtered (2 x 2 samples per pixel, trilinear) instead of subsampled.
+It ignores light, air and occluders; the `transport` compositor models them. It differs from the reference code in three
+points:
+- Its mask is the outline of the surface. The reference code takes all pixels that are not black.
+- It keeps all patches of a picture.
+- It filters patches that are small in the picture (2 x 2 samples per pixel, trilinear). The reference code subsamples
+  them.
 
 Source: CARLA-GeAR (Nesti et al., 2022), section on patch generation; Nesti et al., WACV 2022.
 """
@@ -32,17 +35,18 @@ _FOUR_SAMPLES = SampleScheme(supersampled=True, extrapolates=False, smooths=Fals
 _NOWHERE = np.zeros((1, 1), np.bool_)
 
 PIXELS_AT_ONCE = 1 << 17
-"""Pixels that are tested for coverage at a time; samples of a whole picture would take a gigabyte."""
+"""Number of pixels whose coverage is tested at once. Testing a whole picture at once would take a gigabyte."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Outline:
-    """The N pixels that surfaces cover, as the pinhole and its lens project them.
+    """The N pixels that surfaces cover, by pinhole projection and lens.
 
     Attributes:
-        background: (N, 3) float32 values of the stored picture, 0..1, times the uncovered share.
-        matrices: one per surface, (N, columns).
-        covers: one per surface, (N, 1) float32 share of each pixel that it covers and no nearer surface does.
+        background: (N, 3) float32 values of the stored picture, 0..1, multiplied by the share of the pixel that no
+            surface covers.
+        matrices: for each surface, a matrix (N, columns).
+        covers: for each surface, (N, 1) float32: the share of each pixel that it covers and no nearer surface does.
     """
 
     background: Tensor
@@ -51,7 +55,7 @@ class _Outline:
 
 
 class HomographyCompositor(BaseCompositor):
-    """The paper's compositor, for any dataset. `BaseCompositor` documents its arguments."""
+    """The compositor of the CARLA-GeAR paper; it works with every dataset. `BaseCompositor` documents its arguments."""
 
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
         return [pyramid_of(int(p.shape[-2]), int(p.shape[-1])).spread(p) for p in patches]

@@ -1,8 +1,8 @@
-"""The texture of a face and its mip levels as linear functions of the patch.
+"""The texture of a patch and its mip levels, as linear functions of the patch's pixels.
 
-A patch is resized to the face by area averages, and each mip level is half as large as the last. Both are separable:
-level = rows @ patch @ columns.T. Levels that are finer than the patch are not computed: reads of their texels are
-replaced by reads of the patch's pixels.
+The patch is first resized to the texture's size by area averages; then each mip level has half the sides of the
+previous one. Both operations treat rows and columns separately: level = rows @ patch @ columns.T. Levels that are finer
+than the patch are not computed; reads of their texels are replaced by reads of the patch's pixels.
 """
 
 from __future__ import annotations
@@ -24,25 +24,30 @@ Ints = npt.NDArray[np.int64]
 
 
 Halving = Literal["middles", "areas"]
-"""How an axis with an odd number of texels is halved.
+"""How a mip level with an odd number of texels along an axis is halved.
 
-`middles` reads it bilinearly at the centres of the larger texels, as blits do; `areas` averages the area that each of
-them covers. Even numbers of texels are averaged in pairs.
+`middles` reads it bilinearly at the centres of the new, larger texels, as blits on a GPU do. `areas` averages the area
+that each new texel covers. Even numbers of texels are averaged in pairs by both.
 """
 
 
 def halving_of(renderer: str, driver: str) -> Halving:
-    """The halving of mip levels that a renderer uses with a driver.
+    """The rule of halving that a renderer uses with a graphics driver.
 
-    Filament halves with its own blits on every driver. OpenGL leaves it to the driver: Mesa's blit, NVIDIA's
-    averages areas (measured on an H100: composed pictures are 7 levels off with the other rule, 0.4 with this one).
+    Filament halves with its own blits on every driver. OpenGL leaves it to the driver: Mesa blits, NVIDIA averages
+    areas (measured on an H100: with the wrong rule composed pictures differ by up to 7 levels of 255, with the right
+    one by 0.4).
+
+    Args:
+        renderer: name of the renderer.
+        driver: description of the OpenGL driver.
     """
     return "areas" if renderer != "filament" and "nvidia" in driver.casefold() else "middles"
 
 
 @cache
 def halving_matrix(size: int, halving: Halving = "middles") -> Array:
-    """(max(1, size // 2), size) matrix from one mip level to the next along one axis, read-only."""
+    """(max(1, size // 2), size) matrix that computes the next mip level along one axis; read-only."""
     target = max(1, size // 2)
     if halving == "areas":
         return box_matrix(size, target)
@@ -57,7 +62,14 @@ def halving_matrix(size: int, halving: Halving = "middles") -> Array:
 
 @lru_cache(maxsize=16)
 def axis_matrices(patch_px: int, face_px: int, halving: Halving = "middles") -> tuple[Array, ...]:
-    """Matrices from a patch's pixels to the texels of each mip level along one axis, from the finest to one texel."""
+    """For each mip level, from the finest to a single texel: the matrix from a patch's pixels to the level's texels
+    along one axis.
+
+    Args:
+        patch_px: number of the patch's pixels along the axis.
+        face_px: number of the texture's texels along the axis.
+        halving: rule of halving.
+    """
     matrices = [box_matrix(patch_px, face_px)]
     while matrices[-1].shape[0] > 1:
         matrices.append(frozen(halving_matrix(matrices[-1].shape[0], halving) @ matrices[-1]))
@@ -66,11 +78,11 @@ def axis_matrices(patch_px: int, face_px: int, halving: Halving = "middles") -> 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reads:
-    """How the texels along one axis of a level are read: from k columns each, with weights.
+    """For each of the texels along one axis of a level: the k columns that it is read from, and their weights.
 
     Attributes:
-        index: (texels, k) int64.
-        weight: (texels, k) float64, rows sum to 1.
+        index: (texels, k) int64 indices of columns.
+        weight: (texels, k) float64 weights; rows sum to 1.
     """
 
     index: Ints
@@ -79,14 +91,14 @@ class Reads:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pyramid:
-    """All texels of a face's mip levels as one list of columns, for patches of one size.
+    """The texels of all mip levels of a texture as one list of columns, for patches of one size.
 
     Attributes:
         height_px, width_px: size of the patch.
-        halving: how one level is made from the last.
-        rows, columns: per level, the matrices of both axes.
-        folded: number of the finest levels that are read from the patch instead.
-        starts: per level, the first of its columns; 0, the patch, for folded levels.
+        halving: rule of halving.
+        rows, columns: for each level, the matrices of both axes.
+        folded: number of the finest levels that are not computed; they are read from the patch.
+        starts: for each level, the index of its first column; 0 (the patch) for the levels that are not computed.
         size: number of columns.
     """
 
@@ -105,18 +117,20 @@ class Pyramid:
         return len(self.starts)
 
     def shape(self, level: int) -> tuple[int, int]:
-        """Rows and columns of a level's texels."""
+        """Number of rows and columns of a level's texels."""
         return self.rows[level].shape[0], self.columns[level].shape[0]
 
     def reads(self, level: int) -> tuple[Reads, Reads, int]:
-        """How a level is read: along its rows, along its columns, and the number of columns from row to row."""
+        """How a level is read: the reads along its rows, those along its columns, and the stride (number of
+        columns) from row to row.
+        """
         if level < self.folded:
             return _nonzero(self.rows[level]), _nonzero(self.columns[level]), self.width_px
         height, width = self.shape(level)
         return _identity(height), _identity(width), width
 
     def spread(self, patch: Tensor) -> Tensor:
-        """The columns of a patch, differentiable: (..., 3, h, w) linear light to (..., size, 3)."""
+        """The columns of a patch: (..., 3, h, w) linear light to (..., size, 3); differentiable."""
         import torch
 
         levels = [patch]
@@ -125,14 +139,16 @@ class Pyramid:
         return torch.cat([texels.flatten(-2) for texels in levels], dim=-1).transpose(-1, -2).contiguous()
 
     def _is_patch(self, level: int) -> bool:
-        """Whether a folded level's texels equal the patch's pixels. An equal size is not enough: 37 rows that are
-        stretched to 600 and halved to 37 again are mixed."""
+        """Whether a level that is not computed has texels equal to the patch's pixels.
+
+        An equal size is not enough: 37 rows that are enlarged to 600 and halved to 37 again are mixed.
+        """
         return self.shape(level) == (self.height_px, self.width_px) and all(
             bool((matrix.diagonal() == 1).all()) for matrix in (self.rows[level], self.columns[level])
         )
 
     def _next(self, last: Tensor, patch: Tensor, level: int) -> Tensor:
-        """A level from the last one, or from the patch where there is no last one."""
+        """A level, computed from the previous one; the first computed level is made from the patch."""
         import torch
 
         size = tuple(last.shape[-2:])
@@ -149,7 +165,7 @@ class Pyramid:
 
 @lru_cache(maxsize=16)
 def pyramid_of(height_px: int, width_px: int, halving: Halving = "middles") -> Pyramid:
-    """The pyramid for patches of a size."""
+    """The pyramid for patches of a given size; cached."""
     rows = list(axis_matrices(height_px, FACE_SIZE_PX[1], halving))
     columns = list(axis_matrices(width_px, FACE_SIZE_PX[0], halving))
     # The shorter axis keeps one texel while the longer one is halved further.

@@ -1,4 +1,4 @@
-"""Compositors by name."""
+"""Finds compositors by name."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from gear.dataset.reading import Dataset
 
 COMPOSITORS = ("transport", "homography")
-"""Names of compositors, the default first."""
+"""Names of all compositors; the first one is the default."""
 
 
 def open_compositor(
@@ -27,19 +27,19 @@ def open_compositor(
     cache_bytes: int = CACHE_BYTES,
     cache: Cache[Prepared] | None = None,
 ) -> BaseCompositor:
-    """A compositor for the samples of one dataset.
+    """Makes a compositor for the samples of one dataset.
 
     Args:
         name: one of `COMPOSITORS`.
-        dataset: with probes, for `transport`.
+        dataset: the split whose samples are composed; `transport` needs one that was collected with probes.
         device: torch device to compute on.
         rounding: whether patches and pictures are rounded to bytes, as files are.
-        cache_bytes: memory for prepared samples.
-        cache: a cache that several compositors share, instead of a new one of `cache_bytes`.
+        cache_bytes: memory limit for prepared samples.
+        cache: a cache that several compositors share; None for a new one of `cache_bytes`.
 
     Raises:
-        UnknownNameError: there is no such compositor.
-        DatasetError: the dataset has no probes, and they are needed.
+        UnknownNameError: there is no compositor with this name.
+        DatasetError: the compositor needs probes and the dataset has none.
     """
     more: dict[str, Any] = {"device": device, "rounding": rounding, "cache_bytes": cache_bytes, "cache": cache}
     if name == "transport":

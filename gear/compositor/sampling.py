@@ -1,7 +1,8 @@
-"""Texture samples of the pixels that show a surface.
+"""Texture samples of the pixels that show a patch.
 
-Every pixel has a few samples: a position on the face, a mip level and a weight; its colour is their weighted mean.
-Samples outside the face have weight 0, because probes already contain the share of a pixel that the face covers.
+Each pixel has a few samples: a position on the patch's surface, a mip level and a weight. Its colour is their weighted
+mean. Samples beside the surface have weight 0, because the probes already contain the share of a pixel that the surface
+covers.
 """
 
 from __future__ import annotations
@@ -25,13 +26,13 @@ _QUARTERS = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Samples:
-    """Samples of N pixels, S each.
+    """Texture samples of N pixels, S for each.
 
     Attributes:
-        u, v: (N, S) positions on the face, 0..1 to the right and down.
+        u, v: (N, S) positions on the surface, 0..1 to the right and down.
         level: (N, S) mip level, not rounded; 0 is the finest.
-        weight: (N, S) float64; rows sum to 1.
-        coverage: (N,) share of the weight that is on the face, before rows are scaled to 1.
+        weight: (N, S) float64 weights; rows sum to 1.
+        coverage: (N,) share of the weight that lay on the surface before rows were scaled to sum 1.
     """
 
     u: Array
@@ -43,13 +44,13 @@ class Samples:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SampleScheme:
-    """The positions of samples in a pixel, as a renderer and a camera take them.
+    """How a renderer and a camera take texture samples.
 
     Attributes:
-        supersampled: whether a pixel has 2 x 2 samples (`film` of all renderers but `classic`).
-        extrapolates: whether a face that only touches a pixel is still sampled at the pixel's centre, as OpenGL's
+        supersampled: whether each pixel has 2 x 2 samples (quality `film` of all renderers but `classic`).
+        extrapolates: whether a surface that only touches a pixel is still sampled at the pixel's centre, as OpenGL's
             multi-sampling does.
-        smooths: whether edges were smoothed by the filter of `fast`.
+        smooths: whether edges are smoothed by the filter of quality `fast`.
         effects: active effects of the camera, in the order in which they are applied.
     """
 
@@ -60,7 +61,7 @@ class SampleScheme:
 
     @staticmethod
     def of(renderer_name: str, quality: Quality, effects: tuple[Effect, ...]) -> SampleScheme:
-        """The scheme of a renderer and quality, with the camera's active effects."""
+        """The scheme of a renderer and its quality, with the camera's active effects."""
         is_film = quality == "film"
         return SampleScheme(
             supersampled=is_film and renderer_name != "classic",
@@ -87,13 +88,13 @@ def unit_from_image(truth: SurfaceTruth, surface: SurfaceRecord, camera: CameraR
 def take_samples(
     scheme: SampleScheme, unit: Array, pixels: tuple[Array, Array], mask: Mask, exposure: Exposure
 ) -> Samples:
-    """The texture samples of some pixels.
+    """Computes the texture samples of some pixels.
 
     Args:
         scheme: how samples are taken.
-        unit: (3, 3) homography from `unit_from_image`.
+        unit: (3, 3) homography, from `unit_from_image`.
         pixels: (N,) columns and (N,) rows, index pixels.
-        mask: (H, W) bool, pixels whose id is the face.
+        mask: (H, W) bool, True for pixels whose id is that of the surface.
         exposure: camera and scene.
     """
     x, y = (np.asarray(axis, dtype=np.float64)[:, None] for axis in pixels)
@@ -102,7 +103,7 @@ def take_samples(
         x, y, weight = _smoothed(x, y, mask)
 
     def inverse_depth(x: Array, y: Array) -> Array:
-        """The third row of the homography is the inverse of depth."""
+        """Inverse of planar depth, from the third row of the homography."""
         return np.asarray(unit[2, 0] * x + unit[2, 1] * y + unit[2, 2])
 
     traced = PixelSamples(x=x, y=y, weight=weight, inverse_depth=inverse_depth)
@@ -128,7 +129,7 @@ def take_samples(
 
 
 def _on_face(unit: Array, x: Array, y: Array) -> tuple[Array, Array, Mask]:
-    """Positions on the face, and whether they are in front of the camera."""
+    """Positions u and v on the surface, and whether they are in front of the camera."""
     u, v, depth = (row[0] * x + row[1] * y + row[2] for row in unit)
     in_front = depth > 1e-12
     safe = np.where(in_front, depth, 1.0)
@@ -136,7 +137,9 @@ def _on_face(unit: Array, x: Array, y: Array) -> tuple[Array, Array, Mask]:
 
 
 def _level(unit: Array, x: Array, y: Array, step_px: float) -> Array:
-    """Mip levels: log2 of the longer of a sample's two edges in texels, as isotropic filtering has it."""
+    """Mip levels: the base-2 logarithm of the longer edge of a sample's footprint in texels, as in isotropic
+    filtering.
+    """
     width, height = FACE_SIZE_PX
     u, v, _ = _on_face(unit, x, y)
     edges = []
@@ -147,7 +150,9 @@ def _level(unit: Array, x: Array, y: Array, step_px: float) -> Array:
 
 
 def _smoothed(x: Array, y: Array, mask: Mask) -> tuple[Array, Array, Array]:
-    """The 3 x 3 edge filter of `fast`: at the border of the visible mask, over the neighbours that show the face."""
+    """The 3 x 3 edge filter of quality `fast`: pixels at the border of the visible mask are averaged with those
+    neighbours that show the surface.
+    """
     padded = np.pad(mask, 1)
     inner = np.pad(mask, 1, mode="edge")  # the picture's border is no edge
     column, row = x[:, 0].astype(int), y[:, 0].astype(int)

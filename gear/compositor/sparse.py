@@ -1,4 +1,4 @@
-"""Products with constant sparse matrices, differentiable to the dense factor."""
+"""Products of constant sparse matrices with dense ones, differentiable with respect to the dense matrix."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from torch import Tensor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SparseMatrix:
-    """A sparse matrix and its transpose, both in CSR form: the product forward and the product for gradients.
+    """A sparse matrix and its transpose in CSR form: one for the forward product, one for gradients.
 
     Attributes:
         forward: (N, M) sparse CSR.
@@ -26,7 +26,7 @@ class SparseMatrix:
 
     @staticmethod
     def of(matrix: Any, device: torch.device) -> SparseMatrix:
-        """From a SciPy CSR matrix of float32, on a device."""
+        """Converts a SciPy CSR matrix of float32 and puts it on a device."""
         return SparseMatrix(_csr(matrix, device), _csr(matrix.T.tocsr(), device))
 
     @property
@@ -37,7 +37,9 @@ class SparseMatrix:
 
 
 def stacked_product(matrices: Sequence[SparseMatrix], dense: Tensor) -> Tensor:
-    """Products of several matrices with one (M, k) float32, below each other, differentiable to `dense`."""
+    """The products of several matrices with one (M, k) float32 matrix, stacked vertically; differentiable with
+    respect to `dense`.
+    """
     product: Tensor = _Product.apply(dense, matrices)  # type: ignore[no-untyped-call]
     return product
 

@@ -1,10 +1,10 @@
-"""The exact compositor: light is linear, so two probe renders of a surface determine how any patch on it looks.
+"""The exact compositor. Light is linear, so two probe renders of a surface determine how any patch on it looks.
 
     picture = response(B + sum over i of (M_i p_i) (W_i - B))
 
-B and W_i are the probes (`gear.dataset.probe_files`); p_i is patch i as light, with its coarser levels; M_i is a sparse
-matrix that samples it as the renderer samples its texture. Noise, if the dataset has any, is that of the stored
-sample.
+B and W_i are the probes (`gear.dataset.probe_files`): B with all surfaces black, W_i with surface i white. p_i is patch
+i as light, with its mip levels. M_i is a sparse matrix that samples it as the renderer samples its texture. If the
+dataset has sensor noise, the noise of the stored sample is added.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from gear.values.frames import LINEAR_FULL_SCALE
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Light:
-    """What the N composed pixels of a view are computed from.
+    """The data from which the N composed pixels of a view are computed.
 
     Attributes:
         black: (N, 3) float32 linear light with all surfaces black, 1.0 is full scale.
-        matrices: one per surface, (N, columns of the patch's pyramid).
-        gains: one per surface, (N, 3) float32: light with that surface white minus `black`.
-        response: tone curve of the camera.
-        effects: effects of the camera that are not linear, such as noise, as functions of (N, 3) light, in order.
+        matrices: for each surface, the sampling matrix (N, columns of the patch's pyramid).
+        gains: for each surface, (N, 3) float32: light with that surface white minus `black`.
+        response: exposure and tone curve of the camera.
+        effects: the camera's effects that are not linear, such as noise, as functions of (N, 3) light, in order.
     """
 
     black: Tensor
@@ -51,7 +51,7 @@ class _Light:
     effects: tuple[Callable[[Tensor], Tensor], ...]
 
     def shown(self, light: Tensor) -> Tensor:
-        """(N, 3) linear light to (N, 3) picture values 0..1."""
+        """Converts (N, 3) linear light to (N, 3) picture values 0..1."""
         for effect in self.effects:
             light = effect(light)
         return torch_response.apply(self.response, light)
@@ -62,7 +62,7 @@ class _Light:
 
 
 class TransportCompositor(BaseCompositor):
-    """The exact compositor, for datasets with probes. `BaseCompositor` documents its arguments."""
+    """The exact compositor; it needs a dataset with probes. `BaseCompositor` documents its arguments."""
 
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
         renderer = self._renderer
@@ -80,7 +80,7 @@ class TransportCompositor(BaseCompositor):
         return torch.cat([view.shown(part) for view, part in zip(inner, parts, strict=True)])
 
     def _pyramid(self, size: tuple[int, int]) -> Pyramid:
-        """The pyramid for patches of (height, width), as the dataset's renderer filters them."""
+        """The pyramid for patches of size (height, width), as the dataset's renderer filters textures."""
         renderer = self._renderer
         driver = str(self.dataset.manifest["renderer"].get("driver"))
         return pyramid_of(*size, halving_of(renderer, driver))
@@ -126,7 +126,7 @@ class TransportCompositor(BaseCompositor):
     def _matrix(
         self, sample: Any, number: int, view: str, pixels: tuple[Any, Any], gain: Any, size: tuple[int, int]
     ) -> SparseMatrix:
-        """The sampling matrix of one surface; rows of pixels that it gives no light are empty."""
+        """The sampling matrix of one surface. Rows of pixels that get no light from the surface are empty."""
         record, pyramid = sample.record, self._pyramid(size)
         surface, camera = record.surfaces[number], record.camera(view)
         lit = np.flatnonzero(gain.any(axis=1))

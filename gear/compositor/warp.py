@@ -1,4 +1,4 @@
-"""Samples of a surface's texture as one sparse matrix: pixels by columns of a patch's pyramid."""
+"""Texture samples as one sparse matrix, from the columns of a patch's pyramid to pixels."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from gear.values.geometry import Array
 
 
 def warp_matrix(samples: Samples, pyramid: Pyramid) -> Any:
-    """The weights with which each pixel reads the columns of a pyramid: trilinear, with a texture that repeats.
+    """The weights with which each pixel reads the columns of a pyramid: trilinear filtering of a texture that repeats.
 
     Args:
-        samples: of N pixels.
-        pyramid: for patches of one size.
+        samples: texture samples of N pixels.
+        pyramid: pyramid for patches of one size.
 
     Returns:
-        (N, columns) SciPy CSR matrix of float32 whose rows sum to 1.
+        (N, columns) SciPy CSR matrix of float32; rows sum to 1.
     """
     count, each = samples.weight.shape
     pixel = np.repeat(np.arange(count), each)

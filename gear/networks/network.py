@@ -1,4 +1,4 @@
-"""The base of gear's networks: a torch graph behind the `Model` protocol."""
+"""The base class of gear's networks: a torch module that implements the `Model` protocol."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ IMAGENET_STD = (0.229, 0.224, 0.225)
 
 
 class Network(nn.Module, ABC):
-    """A torch graph with its normalisation, losses and predictions.
+    """A torch module with its normalisation, losses and predictions.
 
     Attributes:
-        graph: the network itself, with official key names.
-        options: as the user gave them.
-        device: on which the graph runs.
+        graph: the torch module itself, with the parameter names of the published weights.
+        options: options that the user gave.
+        device: torch device on which the graph runs.
         has_quick_copy: whether predictions on a CPU use a copy of the graph that `gear.networks.fused_inference` makes.
-            Only for graphs in which the output of each convolution goes to its normalisation alone.
+            Only allowed if the output of each convolution goes to its normalisation and nowhere else.
     """
 
     has_quick_copy: ClassVar[bool] = False
@@ -49,13 +49,18 @@ class Network(nn.Module, ABC):
         self.eval()
 
     def module(self) -> nn.Module:
-        """The graph, whose state dict is what weights files hold."""
+        """The graph; its state dict is what weights files store."""
         return self.graph
 
     def forward(self, views: Mapping[str, Tensor], targets: Sequence[Any] | None = None) -> Mapping[str, Tensor]:
-        """Outputs of a batch of (B, 3, H, W) pictures in 0..1, or its losses where the batch's samples are given.
+        """Outputs by name for a batch of pictures; or the losses by name, if `targets` are given.
 
-        Inputs may be on any device; outputs are on the network's device, in float32.
+        Args:
+            views: (B, 3, H, W) pictures in 0..1 by camera, on any device.
+            targets: the samples of the batch, with ground truth; None for outputs.
+
+        Returns:
+            float32 tensors on the network's device.
         """
         if targets is None:
             return self._outputs(self.run, views)
@@ -68,15 +73,15 @@ class Network(nn.Module, ABC):
         return {name: tensor.float() for name, tensor in raw.items()}
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """Feature maps by name; none unless a subclass declares some."""
+        """The modules whose outputs are named feature maps (for defenses and attacks); none by default."""
         return {}
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """The task's prediction for one sample."""
+        """The prediction for one sample, in the form that the task defines."""
         return self.predict_many([views])[0]
 
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[Any]:
-        """The task's predictions of several samples; pictures of one size go through the graph together."""
+        """The predictions for several samples. Pictures of equal size go through the graph as one batch."""
         sizes = [sample[self._views[0]].shape[:2] for sample in samples]
         answers: list[Any] = [None] * len(samples)
         for size in dict.fromkeys(sizes):
@@ -90,11 +95,10 @@ class Network(nn.Module, ABC):
         return answers
 
     def for_predictions(self, batch: Mapping[str, Tensor]) -> Network:
-        """A network that predicts the same up to rounding and faster: on a CPU, this one with a quick copy of its
-        graph.
+        """A faster network with the same predictions up to rounding: on a CPU it uses a quick copy of the graph.
 
         Args:
-            batch: as for `forward`; a new copy is traced with its first sample.
+            batch: (B, 3, H, W) pictures in 0..1 by camera; a new copy is traced with the first sample.
         """
         if not self.has_quick_copy or self.device.type != "cpu":
             return self
@@ -105,34 +109,41 @@ class Network(nn.Module, ABC):
         )
 
     def _with(self, graph: nn.Module) -> Network:
-        """This network with another graph; everything else is shared."""
+        """This network with another graph; all other attributes are shared."""
         other = copy.copy(self)
         other._modules = self._modules | {"graph": graph}
         return other
 
     @abstractmethod
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Outputs by name for pictures in 0..1 on the network's device."""
+        """Outputs by name for pictures in 0..1 on the network's device; subclasses implement this."""
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `losses`: the outputs, and more for networks with heads that are used only in training."""
+        """The input of `losses`: the outputs, and more for networks with heads that only training uses."""
         return self.run(pictures)
 
     def run_for_predictions(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `predictions`: the outputs, or other tensors from which a network predicts faster."""
+        """The input of `predictions`: the outputs, or something smaller for networks that can predict faster
+        from it.
+        """
         return self.run(pictures)
 
     @abstractmethod
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Scalar losses by name, which training minimises."""
+        """Scalar losses by name; training minimises their sum. Subclasses implement this."""
 
     @abstractmethod
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
-        """The task's predictions from what `run_for_predictions` returns, for pictures of (height, width)."""
+        """The predictions for each picture, in the form that the task defines; subclasses implement this.
+
+        Args:
+            outputs: result of `run_for_predictions`.
+            size_px: height and width of the pictures.
+        """
 
 
 class Normalise(nn.Module):
-    """(x - mean) / std by channel; mean and std are not part of the saved state."""
+    """A layer that computes (x - mean) / std for each channel; mean and std are not part of the saved weights."""
 
     mean: Tensor
     std: Tensor
@@ -143,24 +154,24 @@ class Normalise(nn.Module):
         self.register_buffer("std", torch.tensor(std).view(1, -1, 1, 1), persistent=False)
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """(B, 3, H, W) of 0..1, normalised."""
+        """Normalises (B, 3, H, W) pictures in 0..1."""
         return (pictures - self.mean) / self.std
 
 
 def as_batch(
     samples: Sequence[Mapping[str, UInt8Image]], views: Sequence[str], device: torch.device | None = None
 ) -> dict[str, Tensor]:
-    """Pictures of one size as `Model.forward` takes them: (B, 3, H, W) float32 in 0..1 by camera name.
+    """Stacks pictures of one size to the input of `Model.forward`: (B, 3, H, W) float32 in 0..1 by camera name.
 
-    They are copied to the device, if one is given, as bytes and converted there.
+    If a device is given, the pictures are copied to it as bytes and converted to float32 there.
     """
     stacked = {name: _channels_first([sample[name] for sample in samples]) for name in views}
     return {name: torch.from_numpy(one).to(device).float().div_(255) for name, one in stacked.items()}
 
 
 def _channels_first(pictures: Sequence[UInt8Image]) -> npt.NDArray[np.uint8]:
-    """(B, 3, H, W) in this memory order: torch's CPU backward pass of small strided convolutions fails with channels
-    last.
+    """(B, 3, H, W) uint8, contiguous in this order, because torch's CPU backward pass of small strided
+    convolutions fails with channels last.
     """
     height, width, channels = size = pictures[0].shape
     stacked = np.empty((len(pictures), channels, height, width), np.uint8)

@@ -1,4 +1,4 @@
-"""Options of all of gear's networks. torch is not imported, so that specs are quick to make."""
+"""Options that all of gear's networks have. The module does not import torch, so that plugin specs load quickly."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ SHIPPED = "shipped"
 NONE = "none"
 
 CIRCUMSTANCES = ("weights", "device", "precision", "seed")
-"""Options that do not affect how weights are used, such as the device."""
+"""Options that do not affect what a network computes with its weights, such as the device."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkOptions:
-    """Source of the weights, device and precision.
+    """Options of every network: source of the weights, device and precision.
 
     Attributes:
-        weights: `shipped` for the reference weights of the package mujoco-gear-weights, `none` for random ones from
-            `seed`, or the path of a safetensors file (`gear weights convert` makes one of a published file).
-        device: `auto` takes a GPU where there is one.
-        precision: `bfloat16` runs suitable operations at half precision, which is faster and accurate enough to
+        weights: `shipped` for the reference weights in the package mujoco-gear-weights, `none` for random weights drawn
+            with `seed`, or the path of a safetensors file (`gear weights convert` makes one from a published file).
+        device: `auto` takes a GPU if there is one.
+        precision: `bfloat16` runs suitable operations in half precision, which is faster and accurate enough to
             optimise patches; reported metrics use `float32`.
-        seed: of random weights.
+        seed: seed of random weights.
     """
 
     weights: str = SHIPPED
@@ -42,8 +42,8 @@ class SegmentationOptions(NetworkOptions):
 
     Attributes:
         input_scale: factor by which pictures are resized before the network; logits are interpolated to the picture's
-            size. null takes the factor that the weights were trained for, or 1 where they state none.
-        auxiliary: whether the graph has the heads that are used in training alone, as published files do.
+            size. null takes the factor with which the weights were trained, or 1 if they state none.
+        auxiliary: whether the network has the heads that only training uses; published files contain them.
     """
 
     input_scale: float | None = None

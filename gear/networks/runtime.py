@@ -1,4 +1,4 @@
-"""Settings of CPU and GPU in one place: allocator, threads, devices, precision, seeds of random weights."""
+"""Settings of CPU and GPU in one place: memory allocator, threads, devices, precision, seeds of random weights."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ TOP_PAD_BYTES = 256 << 20
 
 @functools.cache
 def prepare(threads: int = 0) -> None:
-    """Sets the allocator and the number of threads, once per process.
+    """Sets the memory allocator and the number of threads; further calls in a process do nothing.
 
-    glibc returns large activations to the kernel after every step and fetches them again; keeping them makes an
-    attack's step up to twice as fast. Only memory management changes, no result. Without glibc nothing is done.
+    glibc gives the memory of large activations back to the kernel after every step and requests it again. Keeping it
+    makes a step of an attack up to twice as fast. Results do not change. On systems without glibc the allocator is not
+    touched.
 
     Args:
-        threads: of torch; 0 for torch's own choice (`OMP_NUM_THREADS`, or what was set earlier), but at most one for
-            each core that this process may use.
+        threads: number of torch's threads; 0 for torch's own choice (`OMP_NUM_THREADS`, or an earlier setting), but at
+            most one for each core that this process may use.
     """
     torch.set_num_threads(threads or min(torch.get_num_threads(), cores()))
     if not sys.platform.startswith("linux"):
@@ -40,10 +41,10 @@ def prepare(threads: int = 0) -> None:
 
 
 def device_of(wish: Literal["auto", "cpu", "cuda"]) -> torch.device:
-    """The torch device that an option names.
+    """The torch device for the option `device`.
 
     Raises:
-        GearError: there is no such device.
+        GearError: the machine has no such device.
     """
     if wish == "cuda" and not torch.cuda.is_available():
         raise GearError("device cuda: torch sees no GPU here; use device=auto or device=cpu")
@@ -61,16 +62,17 @@ def is_quick_in_half(device: torch.device) -> bool:
 
 
 def autocast(device: torch.device, precision: Literal["auto", "float32", "bfloat16"]) -> torch.autocast:
-    """A context in which the graph runs at a precision; `auto` leaves the choice to torch."""
+    """A context in which a graph runs in the given precision; `auto` leaves the choice to torch."""
     return torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16")
 
 
 @contextlib.contextmanager
 def seeded(seed: int) -> Iterator[None]:
-    """Inside, layers draw their first weights from `seed`; the generators of torch are restored afterwards.
+    """Context in which layers draw their initial weights with `seed`; afterwards torch's generators have their old
+    state.
 
     Raises:
-        GearError: torch accepts no such seed.
+        GearError: torch does not accept the seed.
     """
     if not -(2**63) <= seed < 2**64:
         raise GearError(f"seed {seed} is beyond what torch takes (-2^63 to 2^64 - 1); take a smaller one")

@@ -1,4 +1,4 @@
-"""Finds weights files and reads their metadata, without importing torch."""
+"""Finds weights files and reads their metadata. The module does not import torch, so that listing them is quick."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gear.values.errors import GearError
 from gear.values.serial import Json
 
 GROUP = "gear.weights"
-"""Entry points of this group name a module whose `FOLDER` holds `models/` and `patches/`."""
+"""Group of entry points; each names a module whose `FOLDER` contains `models/` and `patches/`."""
 
 CHECKOUT = Path(__file__).resolve().parents[2] / "weights" / "gear_weights"
 
@@ -27,18 +27,20 @@ JSON_KEYS = ("metrics", "intervals", "options", "data", "look", "averaged")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WeightsFile:
-    """Header of a safetensors file.
+    """Header of a safetensors file: shapes of the tensors, and metadata.
+
+    gear writes these metadata, as far as they are known: `model`, `task`, `gear` (version), `source` and
+    `source_sha256` (of a published file), `licence`, `command`, `seed`, `look_hash` (hash of the appearance of the
+    training pictures) and `measured_look_hash` (the same for the pictures on which the metrics were measured, if it
+    differs). These are stored as JSON: `data` (training data), `metrics` (values by name), `intervals` (their 95 %
+    bounds), `options` (of the model, such as `input_scale`), `look` (`gear.measuring.appearance_hash.Look`) and
+    `averaged` (hashes of the two averaged states).
 
     Attributes:
-        path: of the file.
-        size_mb: of the file, in 10^6 bytes.
-        shapes: of the tensors, by key.
-        metadata: all texts. gear writes, as far as known: `model`, `task`, `gear` (version), `source` and
-            `source_sha256` (of a published file), `licence`, `command`, `seed`, `look_hash` (appearance of the training
-            pictures), `measured_look_hash` (of the pictures behind the metrics, where it differs), and as JSON `data`
-            (training data), `metrics` (values by name), `intervals` (their bounds of 95 %), `options` (of the model,
-            such as `input_scale`), `look` (`gear.measuring.appearance_hash.Look`) and `averaged` (hashes of the two
-            averaged states).
+        path: path of the file.
+        size_mb: size of the file in 10^6 bytes.
+        shapes: shape of each tensor, by key.
+        metadata: all metadata as texts.
     """
 
     path: Path
@@ -48,21 +50,21 @@ class WeightsFile:
 
     @property
     def numbers(self) -> int:
-        """Number of values in the file, including statistics."""
+        """Number of values in the file, including normalisation statistics."""
         return sum(math.prod(shape) for shape in self.shapes.values())
 
     def facts(self) -> dict[str, Json]:
-        """The metadata with JSON texts decoded; other texts stay as they are."""
+        """The metadata; JSON texts are decoded, other texts are unchanged."""
         return {key: _read(text) if key in JSON_KEYS else text for key, text in self.metadata.items()}
 
     def option(self, name: str) -> Json:
-        """The value that the file states for an option of the model; None where it states none."""
+        """The value that the metadata state for an option of the model; None if they state none."""
         options = self.facts().get("options")
         return options.get(name) if isinstance(options, dict) else None
 
 
 def inspect(path: str | Path) -> WeightsFile:
-    """Reads the header of a file.
+    """Reads the header of a weights file.
 
     Raises:
         GearError: the file does not exist, or is not safetensors.
@@ -82,7 +84,7 @@ def check_file(path: Path) -> None:
     """Checks that a weights file exists.
 
     Raises:
-        GearError: the file does not exist.
+        GearError: there is no such file.
     """
     if path.is_dir():
         raise GearError(f"{path}: is a folder; name the file in it")
@@ -97,10 +99,17 @@ def not_safetensors(path: str | Path, error: Exception) -> GearError:
 
 
 def resolve(weights: str, name: str) -> Path | None:
-    """The file that the option `weights` of network `name` refers to; None for random weights.
+    """The weights file for the option `weights` of a network.
+
+    Args:
+        weights: value of the option.
+        name: name of the network.
+
+    Returns:
+        None for random weights.
 
     Raises:
-        GearError: `shipped` was requested and no installed package has weights of this network.
+        GearError: `weights` is `shipped` and no installed package has weights of this network.
     """
     if weights == NONE:
         return None
@@ -118,22 +127,22 @@ def resolve(weights: str, name: str) -> Path | None:
 
 
 def trained_option(weights: str, name: str, option: str) -> Json:
-    """The value that a network's weights state for one of its options; None where they state none.
+    """The value that a network's weights file states for one of its options; None if it states none.
 
     Args:
         weights: value of the option `weights`.
-        name: of the network.
-        option: name of the option.
+        name: name of the network.
+        option: name of the option that is looked up.
 
     Raises:
-        GearError: these weights do not exist.
+        GearError: there is no such weights file.
     """
     path = resolve(weights, name)
     return None if path is None else inspect(path).option(option)
 
 
 def shipped(name: str) -> Path | None:
-    """Path of the reference weights of a network; None where no installed package has them."""
+    """Path of the reference weights of a network; None if no installed package has them."""
     for folder in shipped_folders():
         path = folder / "models" / f"{name}.safetensors"
         if path.is_file():
@@ -148,7 +157,9 @@ def shipped_networks() -> list[str]:
 
 @functools.cache
 def shipped_folders() -> tuple[Path, ...]:
-    """Folders of the installed weights packages, by name; in a checkout, the folder next to gear comes last.
+    """Folders of the installed weights packages, sorted by the packages' names.
+
+    In a checkout of the repository the folder next to gear comes last.
 
     Raises:
         GearError: a weights package cannot be imported, or has no folder.
@@ -171,7 +182,7 @@ def _read(text: str) -> Json:
 
 
 def shipped_patches() -> dict[str, Path]:
-    """Pre-computed patch folders of the installed weights packages, by name."""
+    """Folders of pre-computed patches in the installed weights packages, by name."""
     return {
         path.name: path
         for folder in reversed(shipped_folders())

@@ -1,9 +1,9 @@
-"""Imports torchvision next to a torch build that it was not compiled for.
+"""Imports torchvision next to a build of torch for which it was not compiled.
 
-torchvision's wheels are linked with CUDA. With the CPU build of torch their compiled operators do not load; then
-torchvision does not import, nor do packages that import it: timm, and most of transformers. `prepare` defines the
-operators that detectors need and imports torchvision with them; where the builds fit, it does nothing. Call it before
-importing torchvision, timm or transformers.
+torchvision's wheels are linked with CUDA. With the CPU build of torch their compiled operators do not load. Then
+torchvision cannot be imported, nor can packages that import it: timm, and most of transformers. `prepare` defines the
+operators that detectors need and imports torchvision with them. If the builds fit, it only imports torchvision. Call it
+before importing torchvision, timm or transformers.
 """
 
 from __future__ import annotations
@@ -27,22 +27,24 @@ SCHEMAS = (
     "roi_align(Tensor input, Tensor rois, float spatial_scale, SymInt pooled_height, SymInt pooled_width, "
     "int sampling_ratio, bool aligned) -> Tensor",
 )
-"""Operators as torchvision declares them; qnms, for quantised boxes, only has to exist."""
+"""Declarations of the operators, copied from torchvision. `qnms` (for quantised boxes) is declared but has no
+implementation.
+"""
 
 _libraries: list[torch.library.Library] = []
 
 
 @functools.cache
 def prepare() -> bool:
-    """Makes torchvision importable, once per process.
+    """Makes torchvision importable; further calls in a process do nothing.
 
-    Deformable convolution and the position-sensitive pools stay undefined where the builds do not fit.
+    If the builds do not fit, deformable convolution and position-sensitive pooling stay undefined.
 
     Returns:
-        Whether torchvision is installed.
+        True if torchvision is installed.
 
     Raises:
-        ImportError, RuntimeError: torchvision does not import for another reason.
+        ImportError, RuntimeError: torchvision cannot be imported for another reason.
     """
     if importlib.util.find_spec(NAME) is None:
         return False
@@ -57,7 +59,7 @@ def prepare() -> bool:
 
 
 def need() -> None:
-    """Calls `prepare`, for code that cannot run without torchvision.
+    """Like `prepare`, for code that cannot run without torchvision.
 
     Raises:
         GearError: torchvision is not installed.

@@ -1,4 +1,4 @@
-"""Two operators of torchvision that detectors need, in NumPy and plain torch, with the same results."""
+"""Two operators of torchvision that detectors need, written in NumPy and plain torch, with the same results."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ def nms(boxes: Tensor, scores: Tensor, iou_threshold: float) -> Tensor:
 
     Args:
         boxes: (N, 4) left, top, right, bottom.
-        scores: (N,); ties keep the order of the boxes.
+        scores: (N,) scores; boxes with equal scores keep their order.
         iou_threshold: a box whose IoU with a kept box of higher score exceeds this is dropped.
 
     Returns:
-        (K,) int64 indices of the kept boxes, by falling score.
+        (K,) int64 indices of the kept boxes, highest score first.
     """
     wide = torch.float64 if boxes.dtype == torch.float64 else torch.float32
     edges: Array = boxes.detach().to("cpu", wide).numpy()
@@ -49,12 +49,13 @@ def roi_align(
         features: (B, C, H, W).
         rois: (K, 5): index of the picture, then left, top, right, bottom in the picture's pixels.
         spatial_scale: factor from the picture's to the features' coordinates.
-        height, width: cells of the grid.
-        sampling_ratio: samples per cell and direction; 0 and less take as many as the cell spans feature pixels.
-        aligned: whether the centre of the first feature pixel is at 0.5 instead of 0.
+        height, width: number of cells of the grid.
+        sampling_ratio: number of samples in each direction of a cell; 0 or less takes as many as the cell spans feature
+            pixels.
+        aligned: True if the centre of the first feature pixel is at 0.5, False if it is at 0.
 
     Returns:
-        (K, C, height, width) in the features' dtype.
+        (K, C, height, width) with the dtype of the features.
     """
     wide = features.dtype if features.dtype in (torch.float32, torch.float64) else torch.float32
     with torch.autocast(features.device.type, enabled=False):
@@ -98,7 +99,7 @@ def _places(start: Tensor, size: Tensor, cells: int, samples: int) -> Tensor:
 def _bilinear(picture: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
     """(K, C, rows, columns) samples of a (1, C, H, W) picture at (K, columns) x and (K, rows) y coordinates.
 
-    Up to one pixel beyond the outermost pixel centres the border's value is used; farther out the value is 0.
+    Up to one pixel outside the outermost pixel centres the border's value is used; farther out the value is 0.
     """
     regions, columns, rows = len(xs), xs.shape[1], ys.shape[1]
     height, width = picture.shape[2:]

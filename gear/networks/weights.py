@@ -1,4 +1,4 @@
-"""Weights on disk: safetensors files, loaded strictly."""
+"""Reads and writes weights files (safetensors) and loads them strictly: every key and shape must fit."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from gear.networks.shipped import check_file, not_safetensors, resolve
 from gear.values.errors import GearError
 
 OPTIONAL = "num_batches_tracked"
-"""Counter that older files lack and that nothing uses."""
+"""Name of a counter that older files lack and that no computation uses."""
 
 SHORT = (torch.float16, torch.bfloat16, torch.float8_e4m3fn, torch.float8_e5m2)
-"""Number formats with fewer bits than gear's networks use."""
+"""Number formats with fewer bits than the float32 of gear's networks."""
 
 SHOWN_KEYS = 3
 
 HEADER_AT = 8
-"""Bytes before the header: a safetensors file is the header's length, the header as JSON, and the tensors."""
+"""Offset of the header in bytes: a safetensors file is the header's length, the header as JSON, and the tensors."""
 
 LEAST_SHARED = 0.25
-"""Share of a network's numbers that a file must have to count as its trunk: heads are small, and a few equal layers are
-a coincidence.
+"""Smallest share of a network's values that a file must contain to count as its trunk. Heads are small; a few
+equal layers can be a coincidence.
 """
 
 GraphT = TypeVar("GraphT", bound=nn.Module)
 
 
 def build_graph(make: Callable[[], GraphT], options: NetworkOptions, name: str) -> GraphT:
-    """A network's graph with the weights that its options ask for.
+    """Makes a network's graph with the weights that its options name.
 
     Args:
-        make: builds the graph; its layers draw their first weights from `options.seed`.
-        options: of the network.
-        name: of the model plugin, for the shipped weights.
+        make: function that builds the graph; its layers draw their initial weights with `options.seed`.
+        options: options of the network.
+        name: name of the model plugin, which determines the shipped weights.
 
     Raises:
         GearError: the weights do not exist, or belong to another network.
@@ -57,7 +57,10 @@ def build_graph(make: Callable[[], GraphT], options: NetworkOptions, name: str) 
 
 
 def load_into(network: nn.Module, path: str | Path) -> dict[str, str]:
-    """Loads a safetensors file into a network, strictly; returns the file's metadata.
+    """Loads a safetensors file into a network; every key and shape must fit.
+
+    Returns:
+        The file's metadata.
 
     Raises:
         GearError: the file does not exist, is not safetensors, or belongs to another network.
@@ -71,14 +74,14 @@ def load_into(network: nn.Module, path: str | Path) -> dict[str, str]:
 
 
 def load_trunk(network: nn.Module, path: str | Path) -> tuple[int, int]:
-    """Loads the tensors of another network's safetensors file that have the same keys and shapes; other weights are
-    kept.
+    """Loads those tensors of another network's file whose keys and shapes fit; the other weights are not changed.
 
     Returns:
-        How many of the network's numbers were loaded, and how many it has.
+        How many of the network's values were loaded, and how many values it has.
 
     Raises:
-        GearError: the file does not exist, is not safetensors, or shares less than `LEAST_SHARED` of the network.
+        GearError: the file does not exist, is not safetensors, or shares less than `LEAST_SHARED` of the network's
+            values.
     """
     given, _ = read(path)
     wanted = network.state_dict()
@@ -96,8 +99,13 @@ def load_trunk(network: nn.Module, path: str | Path) -> tuple[int, int]:
 
 
 def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> list[str]:
-    """The reasons why a state cannot be loaded: missing and unknown keys, other shapes or dtypes, and numbers that are
-    not finite. Empty if it fits.
+    """The reasons why a state does not fit a network; empty if it fits.
+
+    The reasons are missing and unknown keys, wrong shapes, wrong kinds of numbers, and numbers that are not finite.
+
+    Args:
+        wanted: the network's own tensors by key.
+        given: the tensors that are to be loaded.
     """
     missing = [key for key in wanted if key not in given and not key.endswith(OPTIONAL)]
     surplus = [key for key in given if key not in wanted]
@@ -124,7 +132,8 @@ def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> lis
 
 
 def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """The tensors of a safetensors file, in float32 where they are stored in fewer bits, and its metadata.
+    """Reads the tensors of a safetensors file and its metadata; shorter formats such as float16 are converted to
+    float32.
 
     Raises:
         GearError: the file does not exist, or is not safetensors.
@@ -140,18 +149,18 @@ def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
 
 
 def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> None:
-    """Writes a weights file atomically; see `serialised`."""
+    """Writes a weights file; it appears whole or not at all. `serialised` documents the arguments."""
     write_alone(Path(path), serialised(state, metadata, halves=halves))
 
 
 def serialised(state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> bytes:
-    """The bytes of a safetensors file; the same tensors and metadata give the same bytes.
+    """The bytes of a safetensors file; equal tensors and metadata give equal bytes.
 
     Args:
         state: tensors by key.
         metadata: texts by key; `gear.networks.shipped.WeightsFile` lists those that gear reads.
-        halves: whether tensors of two and more dimensions are stored in float16; statistics, biases, and tensors beyond
-            its range are not.
+        halves: whether tensors of two and more dimensions are stored in float16. Statistics, biases, and tensors with
+            values outside the range of float16 are never shortened.
     """
     tensors = {key: value.detach().cpu().clone().contiguous() for key, value in state.items()}
     if halves:
@@ -160,7 +169,7 @@ def serialised(state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halv
 
 
 def _in_order(data: bytes) -> bytes:
-    """The same safetensors file with sorted metadata: the library writes them in a random order."""
+    """The same safetensors file with sorted metadata, since the library writes them in random order."""
     length = int.from_bytes(data[:HEADER_AT], "little")
     header = json.loads(data[HEADER_AT : HEADER_AT + length])
     header["__metadata__"] = dict(sorted(header.get("__metadata__", {}).items()))
@@ -170,7 +179,7 @@ def _in_order(data: bytes) -> bytes:
 
 
 def _finite(tensor: Tensor) -> bool:
-    """Whether all numbers are finite; tensors without storage, as in lists of published keys, count as finite."""
+    """Whether all numbers are finite; tensors without storage (lists of published keys) count as finite."""
     return tensor.is_meta or bool(torch.isfinite(tensor).all())
 
 

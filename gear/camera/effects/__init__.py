@@ -41,7 +41,7 @@ EFFECTS: tuple[type[Effect], ...] = _find_effects()
 
 
 def _parameters() -> Iterator[DerivedField]:
-    """The parameters of all effects; a name that two effects share is refused by `with_fields`."""
+    """The parameters of all effects; `with_fields` refuses a name that two effects share."""
     for effect in EFFECTS:
         for field in dataclasses.fields(effect):  # type: ignore[arg-type]
             default: Any = dataclasses.field(default=field.default, default_factory=field.default_factory)
@@ -50,7 +50,9 @@ def _parameters() -> Iterator[DerivedField]:
 
 @with_fields(_parameters(), "\n".join(attribute_lines(effect) for effect in EFFECTS))
 class CameraEffects:
-    """What the camera adds to a picture: the parameters of every effect, all off by default."""
+    """Parameters of all camera effects in one object, for the config's `camera` section; by default all effects
+    are off.
+    """
 
     if TYPE_CHECKING:
 
@@ -62,26 +64,30 @@ class CameraEffects:
         self.active()
 
     def active(self) -> tuple[Effect, ...]:
-        """The effects that these parameters ask for, in the order in which they are applied.
+        """The effects that are switched on by these parameters, in the order in which they are applied.
 
         Raises:
-            FieldError: a parameter is out of its range; says which.
+            FieldError: a parameter is out of its range; the message names it.
         """
         effects = (self._effect(kind) for kind in EFFECTS)
         return tuple(effect for effect in effects if effect.is_active)
 
     def linear(self) -> CameraEffects:
-        """The same without the effects that are not linear in light, such as noise."""
+        """A copy in which effects that are not linear in light, such as noise, are switched off."""
         names = {f.name for kind in EFFECTS if kind.IS_LINEAR for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
         return CameraEffects(**{name: getattr(self, name) for name in names})
 
     def _effect(self, kind: type[Effect]) -> Effect:
-        """One effect with its parameters."""
+        """The effect of one class, with its parameters from this object."""
         names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]
         return kind(**{name: getattr(self, name) for name in names})
 
 
 def recorded_effects(camera: CameraRecord) -> tuple[Effect, ...]:
-    """The effects with `MOVES_PIXELS` that a camera's record holds: none for a pinhole, at most one."""
+    """The effects that move pixels (`Effect.MOVES_PIXELS`) and that a camera's record describes.
+
+    Returns:
+        No effect for a pinhole camera, otherwise one.
+    """
     found = (kind.from_record(camera) for kind in EFFECTS if kind.MOVES_PIXELS)
     return tuple(effect for effect in found if effect is not None)

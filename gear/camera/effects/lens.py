@@ -1,4 +1,4 @@
-"""Radial distortion of a lens, by the model of Brown and Conrady (Brown 1971)."""
+"""Radial distortion of a lens, by the model of Brown and Conrady (Brown, "Close-range camera calibration", 1971)."""
 
 from __future__ import annotations
 
@@ -27,10 +27,11 @@ _LEAST_SLOPE = 0.05
 class Lens:
     """Coefficients of radial distortion about the principal point.
 
-    A point that a pinhole sees at (x, y), in units of its focal length, appears at (x, y) (1 + k1 r² + k2 r⁴).
+    A point that a pinhole camera sees at (x, y), in units of its focal length, appears at (x, y) (1 + k1 r² + k2 r⁴)
+    with r² = x² + y².
 
     Attributes:
-        k1, k2: -0.5 to 0.5; barrel distortion below 0, pincushion distortion above.
+        k1, k2: -0.5 to 0.5. Negative values give barrel distortion, positive values pincushion distortion.
     """
 
     k1: float = 0.0
@@ -44,12 +45,12 @@ class Lens:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensMap:
-    """Where each pixel of a distorted picture comes from in the pinhole's.
+    """For each pixel of a distorted picture: its position in the picture of a pinhole camera.
 
     Attributes:
-        x, y: (H, W) float32 columns and rows of the pinhole picture, index pixels; read-only.
-        focal_px: horizontal focal length of the distorted picture. It is chosen so that the picture is filled to its
-            corners.
+        x, y: (H, W) float32 columns and rows in the pinhole picture, index pixels; read-only.
+        focal_px: horizontal focal length of the distorted picture in pixels. It is chosen so that no corner stays
+            empty.
     """
 
     x: FloatImage
@@ -59,10 +60,12 @@ class LensMap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LensDistortion(Effect):
-    """Colour, depth and ids move by one map: colour bilinearly in linear light, depth and ids from the nearest pixel.
+    """Radial lens distortion as a camera effect.
+
+    Colour is resampled bilinearly in linear light; depth and ids are taken from the nearest pixel.
 
     Attributes:
-        lens: radial distortion.
+        lens: coefficients of the distortion.
     """
 
     ORDER: ClassVar[int] = 20
@@ -85,7 +88,9 @@ class LensDistortion(Effect):
         return read_bilinear(light, found.x.astype(np.float64), found.y.astype(np.float64))
 
     def trace(self, samples: PixelSamples, exposure: Exposure) -> PixelSamples:
-        """(N, 1) whole pixels of the distorted picture to the (N, 4) pinhole pixels that each one mixes."""
+        """For (N, 1) whole pixels of the distorted picture: the (N, 4) pixels of the pinhole picture that each
+        one mixes.
+        """
         found = lens_map(self.lens, exposure.camera.intrinsics)
         at = (samples.y[:, 0].astype(int), samples.x[:, 0].astype(int))
         from_x, from_y = found.x[at].astype(np.float64), found.y[at].astype(np.float64)
@@ -101,10 +106,10 @@ class LensDistortion(Effect):
         )
 
     def check(self, camera: CameraRecord) -> None:
-        """Refuses a distortion that folds the picture of a camera over.
+        """Checks that the distortion does not fold the picture of a camera over (map two points to one).
 
         Raises:
-            FieldError: it does.
+            FieldError: the picture would fold over.
         """
         try:
             lens_map(self.lens, camera.intrinsics)
@@ -122,10 +127,10 @@ class LensDistortion(Effect):
         return None if camera.lens is None else cls(lens=Lens(k1=camera.lens.k1, k2=camera.lens.k2))
 
     def pixel_map(self, camera: CameraRecord) -> PixelMap:
-        """How the lens moves pixels.
+        """The map between the pixels of the distorted picture and those of the pinhole picture.
 
-        Beyond the picture's corners `forward` continues on a straight line: the polynomial would fold over there, or
-        grow without bounds.
+        Outside the picture's corners `forward` continues on a straight line, because the polynomial would fold over
+        there or grow without bounds.
 
         Raises:
             ValueError: the distortion folds the picture over.
@@ -150,7 +155,12 @@ class LensDistortion(Effect):
 
 
 def distort(view: RawView, lens: Lens, pinhole: Intrinsics) -> RawView:
-    """A pinhole's view as a lens shows it: colour is rounded, depth and ids are those of the nearest pixel.
+    """The view of a pinhole camera as a lens shows it: colour is rounded, depth and ids are those of the nearest pixel.
+
+    Args:
+        view: view of the pinhole camera.
+        lens: coefficients of the distortion.
+        pinhole: intrinsics of the pinhole camera.
 
     Raises:
         ValueError: the distortion folds the picture over.
@@ -169,9 +179,14 @@ def distort(view: RawView, lens: Lens, pinhole: Intrinsics) -> RawView:
 
 @lru_cache(maxsize=8)
 def lens_map(lens: Lens, pinhole: Intrinsics) -> LensMap:
-    """The map of a lens before a pinhole.
+    """The map from a distorted picture to the pinhole picture.
 
-    The distorted picture has a longer focal length where it would otherwise show what the pinhole does not see.
+    The distorted picture gets a longer focal length if it would otherwise show directions that the pinhole picture does
+    not contain.
+
+    Args:
+        lens: coefficients of the distortion.
+        pinhole: intrinsics of the pinhole camera.
 
     Raises:
         ValueError: the distortion folds the picture over.
@@ -193,12 +208,17 @@ def lens_map(lens: Lens, pinhole: Intrinsics) -> LensMap:
 
 
 def undistorted(lens: Lens, distorted: Array) -> Array:
-    """(..., 2) points behind the lens to where a pinhole sees them, both in focal lengths from the principal point.
+    """Pinhole positions of points in a distorted picture, by Newton's method on the radius.
 
-    Newton's method on the radius.
+    Args:
+        lens: coefficients of the distortion.
+        distorted: (..., 2) points from the principal point, in units of the focal length.
+
+    Returns:
+        (..., 2) points of the pinhole picture, in the same unit.
 
     Raises:
-        ValueError: the distortion folds the picture over there.
+        ValueError: the distortion folds the picture over at a point.
     """
     wanted = np.linalg.norm(distorted, axis=-1)
     radius = wanted.copy()
@@ -212,7 +232,7 @@ def undistorted(lens: Lens, distorted: Array) -> Array:
 
 
 def _fits(lens: Lens, pinhole: Intrinsics, zoom: float) -> bool:
-    """Whether the border of the distorted picture lies in the pinhole's."""
+    """Whether the border of the distorted picture lies inside the pinhole picture."""
     half = np.array([(pinhole.width_px - 1) / 2, (pinhole.height_px - 1) / 2])
     centre, focal = np.array([pinhole.cx_px, pinhole.cy_px]), np.array([pinhole.fx_px, pinhole.fy_px])
     ticks = np.linspace(-1, 1, 65)

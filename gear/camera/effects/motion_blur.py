@@ -21,20 +21,22 @@ if TYPE_CHECKING:
 Real = TypeVar("Real", np.float32, np.float64)
 
 MOMENTS = 9
-"""Moments of the shutter that are averaged; the middle one is the moment of the ground truth."""
+"""Number of moments, evenly spaced while the shutter is open, whose pictures are averaged. Ground truth is that
+of the middle one.
+"""
 
 _LEAST_DENOMINATOR = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionBlur(Effect):
-    """Each pixel is the mean along the path of its point over the picture while the shutter is open.
+    """Blur by the ego car's motion: each pixel is a mean along the path that its point takes over the picture.
 
-    The path follows from depth and the ego car's velocity: other road users are taken as standing still, rotation is
-    left out, the sky and the ego car's own bonnet stay sharp.
+    The path follows from depth and the ego car's velocity. Other road users are treated as if they stood still, and
+    rotation is neglected. The sky and the ego car's own bonnet stay sharp.
 
     Attributes:
-        shutter_s: exposure time, which smears what the moving ego car passes, 0 to 0.1 s; 0 is none.
+        shutter_s: exposure time in seconds, 0 to 0.1; 0 switches the blur off.
     """
 
     ORDER: ClassVar[int] = 10
@@ -47,7 +49,7 @@ class MotionBlur(Effect):
 
     @property
     def is_active(self) -> bool:
-        """Whether the shutter is open for any time."""
+        """Whether the exposure time is above 0."""
         return self.shutter_s > 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
@@ -68,7 +70,7 @@ class MotionBlur(Effect):
         return total / MOMENTS
 
     def trace(self, samples: PixelSamples, exposure: Exposure) -> PixelSamples:
-        """(N, S) samples to (N, 9 S) of the sharp picture."""
+        """Replaces (N, S) samples of the blurred picture by (N, 9 S) samples of the sharp picture (`MOMENTS` = 9)."""
         pinhole = exposure.camera.intrinsics
         inverse = np.maximum(samples.inverse_depth(samples.x, samples.y), 0.0)
         xs, ys = [], []
@@ -84,14 +86,16 @@ class MotionBlur(Effect):
         )
 
     def _shifts(self, exposure: Exposure) -> Iterator[npt.NDArray[np.float64]]:
-        """(3,) metres in the camera's frame by which the camera is ahead at each moment."""
+        """For each moment: (3,) displacement of the camera in metres from its position at the middle moment,
+        camera frame.
+        """
         rotation = exposure.camera.world_from_camera_transform.rotation
         velocity = rotation.T @ np.asarray(exposure.scene.ego.velocity_world_mps)
         for moment in np.linspace(-0.5, 0.5, MOMENTS):
             yield velocity * moment * self.shutter_s
 
     def _paths(self, truth: RawView, exposure: Exposure) -> Iterator[tuple[FloatImage, FloatImage]]:
-        """(H, W) float32 columns and rows that each pixel reads, for each moment."""
+        """For each moment: (H, W) float32 columns and rows of the sharp picture that the pixels read."""
         pinhole, depth_m = exposure.camera.intrinsics, truth.depth_m
         if exposure.geoms is not None:
             # The ego car's own parts move with the camera: as sharp as what is endlessly far.
@@ -116,7 +120,7 @@ def _moved(
     shift_m: npt.NDArray[Real],
     exposure: Exposure,
 ) -> tuple[npt.NDArray[Real], npt.NDArray[Real]]:
-    """Where points appear in a camera that is shifted; x and y are relative to the principal point."""
+    """Where points appear in the picture of a shifted camera; x and y are relative to the principal point."""
     kind, pinhole = x.dtype.type, exposure.camera.intrinsics
     scale = 1 / np.maximum(1 - shift_m[2] * inverse_depth, kind(_LEAST_DENOMINATOR))
     from_x = (x - kind(pinhole.fx_px) * shift_m[0] * inverse_depth) * scale

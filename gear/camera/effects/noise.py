@@ -21,12 +21,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Noise(Effect):
-    """Gaussian noise whose variance is a constant plus a part that grows with light.
+    """Gaussian sensor noise whose variance is a constant plus a part that is proportional to light.
 
-    The draws depend on the sample's seed, its index and the camera's name alone: twins have the same noise.
+    The random draws depend only on the sample's seed, its index and the camera's name, so a patched sample and its
+    unpatched twin have the same noise.
 
     Attributes:
-        shot_noise: standard deviation at full scale, 0 to 20 percent of full scale; it grows with the root of light.
+        shot_noise: standard deviation at full scale, 0 to 20 percent of full scale; it grows with the square root of
+            light.
         read_noise: standard deviation in the dark, 0 to 20 percent of full scale.
     """
 
@@ -43,7 +45,7 @@ class Noise(Effect):
 
     @property
     def is_active(self) -> bool:
-        """Whether there is noise of either kind."""
+        """Whether one of the two standard deviations is above 0."""
         return self.shot_noise > 0 or self.read_noise > 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
@@ -57,16 +59,16 @@ class Noise(Effect):
         return replace(view, linear_rgb=clipped.astype(np.uint16))
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """See `Effect.apply_torch`; not clipped."""
+        """See `Effect.apply_torch`; the result is not clipped."""
         return self._noisy(light, light.new_tensor(_draws(exposure).transpose(2, 0, 1)))
 
     def torch_at(self, pixels: tuple[Pixels, Pixels], exposure: Exposure, like: Tensor) -> Callable[[Tensor], Tensor]:
-        """See `Effect.torch_at`; not clipped."""
+        """See `Effect.torch_at`; the result is not clipped."""
         normal = like.new_tensor(_draws(exposure)[pixels])
         return lambda light: self._noisy(light, normal)
 
     def _noisy(self, light: Tensor, normal: Tensor) -> Tensor:
-        """Light with standard normal draws of the same shape."""
+        """The light plus noise; `normal` holds standard normal draws of the same shape."""
         variance = light * (self.shot_noise / 100) ** 2 + (self.read_noise / 100) ** 2
         # The root has no finite slope at 0.
         return light + variance.clamp_min(1e-12).sqrt() * normal

@@ -1,4 +1,4 @@
-"""Bilinear reads of pictures in torch."""
+"""Bilinear interpolation of pictures in torch."""
 
 from __future__ import annotations
 
@@ -13,11 +13,15 @@ if TYPE_CHECKING:
 
 
 def read_bilinear(light: Tensor, x: Array, y: Array) -> Tensor:
-    """(B, C, H, W) light at (H, W) places: (B, C, H, W), differentiable to the light.
+    """Reads pictures at given positions by bilinear interpolation; differentiable with respect to the pictures.
 
     Args:
-        light: float tensor.
-        x, y: (H, W) columns and rows, index pixels; beyond the border the nearest pixel is read.
+        light: (B, C, H, W) float pictures.
+        x, y: (H, W) columns and rows to read, index pixels. Positions outside the picture read its nearest border
+            pixel.
+
+    Returns:
+        (B, C, H, W) values at these positions.
     """
     height, width = light.shape[-2:]
     column, row = np.clip(x, 0, width - 1).astype(np.float64), np.clip(y, 0, height - 1).astype(np.float64)

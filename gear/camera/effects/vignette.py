@@ -1,4 +1,4 @@
-"""Vignette: a lens gives less light to the corners of the picture."""
+"""Vignette: the corners of the picture are darker than its middle."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vignette(Effect):
-    """Light falls off with the fourth power of the cosine of the angle to the middle of the picture.
+    """Darkening by the cos^4 law: light decreases with the fourth power of the cosine of the angle to the optical axis.
 
     Attributes:
         vignette: share of light that the corners lose, 0 to 0.95.
@@ -35,7 +35,7 @@ class Vignette(Effect):
 
     @property
     def is_active(self) -> bool:
-        """Whether the corners lose any light."""
+        """Whether the corners lose light."""
         return self.vignette > 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
@@ -54,7 +54,7 @@ class Vignette(Effect):
 
 @lru_cache(maxsize=8)
 def vignette_map(strength: float, width_px: int, height_px: int) -> FloatImage:
-    """(H, W) float32 shares of light, read-only: 1 in the middle, 1 - `strength` in the corners."""
+    """(H, W) float32 factors on light, read-only: 1 in the middle, 1 - `strength` in the corners."""
     x, y = np.meshgrid(np.linspace(-1, 1, width_px), np.linspace(-1, 1, height_px))
     aspect = height_px / width_px
     square = (x**2 + (aspect * y) ** 2) / (1 + aspect**2)

@@ -1,9 +1,9 @@
 """AdaBins as a gear network.
 
-The position encoding of its transformer has room for at most 500 patches of 32 x 32 pixels, and the transformer needs
-one token more than it has queries. A picture with more patches (2048 x 1024 has 2048) is reduced, one with fewer is
-enlarged, at its aspect ratio; the depth is then resized to the picture. KITTI's 1216 x 352 has 418 patches and is not
-resized.
+The position encoding of AdaBins' transformer has room for at most 500 patches of 32 x 32 pixels, and the transformer
+needs at least one token more than it has queries. A picture with more patches (2048 x 1024 has 2048) is reduced and one
+with fewer is enlarged, at its aspect ratio; the predicted depth is resized back. KITTI's 1216 x 352 has 418 patches and
+is not resized.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from gear.networks.network import Normalise
 
 BINS = "bin_centres_m"
 CHAMFER_WEIGHT = 0.1
-"""Weight beta of the bins' loss (equation 6 of the paper)."""
+"""Weight beta of the loss on bins (equation 6 of the paper)."""
 
 OLD_NAMES = (
     ("adaptive_bins_layer.embedding_conv.", "adaptive_bins_layer.conv3x3."),
@@ -30,11 +30,14 @@ OLD_NAMES = (
         "adaptive_bins_layer.patch_transformer.embedding_convPxP.",
     ),
 )
-"""Two layers have other names in the published files than in the authors' current code."""
+"""Names of two layers in the published files, which differ from those in the authors' current code."""
 
 
 class AdaBins(DepthNetwork):
-    """AdaBins (Bhat et al., CVPR 2021). Its outputs are `depth_m` and `bin_centres_m` (B, bins), in metres."""
+    """AdaBins (Bhat et al., CVPR 2021).
+
+    Its outputs are `depth_m` (B, H, W) and `bin_centres_m` (B, bins), both in metres.
+    """
 
     options: AdaBinsOptions
 
@@ -43,7 +46,7 @@ class AdaBins(DepthNetwork):
         self._normalise = Normalise().to(self.device).eval()
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """Depth at the picture's size and the picture's bins, in metres."""
+        """Depth at the size of the picture, and the bins of the picture; both in metres."""
         height, width = (int(side) for side in picture.shape[2:])
         seen = resized(picture, *fitting(height, width, least=self.options.queries + 1))
         half_m, centres_m = self.graph(self._normalise(seen))
@@ -51,7 +54,9 @@ class AdaBins(DepthNetwork):
         return {DEPTH: depth_m[:, 0], BINS: centres_m}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """The paper's two losses: scale-invariant error of the pixels, and Chamfer distance between bins and depths."""
+        """The two losses of the paper: scale-invariant error of the pixels, and Chamfer distance between bins
+        and true depths.
+        """
         cap_m = self.options.max_depth_m
         return {
             "silog": adabins_silog(outputs[DEPTH], depth_m, cap_m=cap_m),
@@ -59,7 +64,7 @@ class AdaBins(DepthNetwork):
         }
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """`stem` at half the picture's sides, `trunk` at a 32nd, `decoder` at half."""
+        """The feature maps `stem` at 1/2 of the picture's sides, `trunk` at 1/32 and `decoder` at 1/2."""
         return {
             "stem": self.graph.get_submodule("encoder.original_model.blocks.0"),
             "trunk": self.graph.get_submodule("encoder.original_model.conv_head"),
@@ -68,7 +73,7 @@ class AdaBins(DepthNetwork):
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """A published state with the key names of the graph."""
+    """Renames the keys of published weights to those of the graph."""
     renamed = {}
     for key, tensor in state.items():
         for old, new in OLD_NAMES:

@@ -1,4 +1,6 @@
-"""AdaBins' graph (Bhat et al., CVPR 2021), written from the paper, under the key names of the published weights."""
+"""AdaBins' graph (Bhat et al., CVPR 2021), written from the paper, with the parameter names of the published
+weights.
+"""
 
 from __future__ import annotations
 
@@ -13,24 +15,26 @@ from gear.networks.depth.options import AdaBinsOptions
 from gear.networks.depth.packages import need_timm
 
 TAPPED = (0, 1, 2, 4)
-"""Blocks of the encoder whose outputs the decoder takes: 1/2, 1/4, 1/8 and 1/16 of the picture's sides."""
+"""Blocks of the encoder whose outputs the decoder uses, at 1/2, 1/4, 1/8 and 1/16 of the picture's sides."""
 
 WIDTH = 128
-"""Channels of the feature map and of the transformer's tokens."""
+"""Number of channels of the feature map and of the transformer's tokens."""
 
 PATCH_PX = 16
-"""Side of a token's patch in the feature map, which has half the picture's sides."""
+"""Side in cells of the patch of the feature map that becomes one token; the feature map has half the picture's
+sides.
+"""
 
 MOST_PATCHES = 500
-"""Number of position encodings."""
+"""Number of position encodings, and therefore the largest number of tokens."""
 
 HIDDEN = 256
 LEAST_WIDTH = 0.1
-"""Added to every bin's width before normalisation, so that no bin is empty."""
+"""Value added to the width of every bin before normalisation, so that no bin is empty."""
 
 
 class AdaBinsGraph(nn.Module):
-    """Encoder, decoder, and a small transformer that divides the depth range into bins anew for each picture."""
+    """Encoder, decoder, and a small transformer that chooses the depth bins anew for each picture."""
 
     def __init__(self, options: AdaBinsOptions) -> None:
         super().__init__()
@@ -41,7 +45,7 @@ class AdaBinsGraph(nn.Module):
         self.conv_out = nn.Sequential(nn.Conv2d(options.queries, options.bins, 1), nn.Softmax(dim=1))
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Depth and bins.
+        """Predicts depth and bins.
 
         Args:
             pictures: (B, 3, H, W), normalised; `patches(H, W)` must lie between queries + 1 and 500.
@@ -72,13 +76,14 @@ class Encoder(nn.Module):
         self.original_model.classifier = nn.Identity()
 
     def widths(self) -> list[int]:
-        """Channels of the five feature maps."""
+        """Number of channels of each of the five feature maps."""
         channels = {entry["module"]: entry["num_chs"] for entry in self.original_model.feature_info}
         return [*(channels[f"blocks.{index}"] for index in TAPPED), self.original_model.conv_head.out_channels]
 
     def forward(self, pictures: Tensor) -> list[Tensor]:
-        """Feature maps at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's sides; the last one is taken before its
-        normalisation.
+        """The feature maps at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's sides.
+
+        The last one is taken before its normalisation.
         """
         network = self.original_model
         found = network.bn1(network.conv_stem(pictures))
@@ -115,7 +120,7 @@ class Decoder(nn.Module):
 
 
 class Up(nn.Module):
-    """Interpolation to the size of the encoder's map, then two convolutions over both maps."""
+    """One upsampling step: interpolation to the size of the encoder's map, then two convolutions over both maps."""
 
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
@@ -125,14 +130,16 @@ class Up(nn.Module):
         )  # fmt: skip
 
     def forward(self, coarse: Tensor, beside: Tensor) -> Tensor:
-        """(B, outputs, h, w) of the size of `beside`."""
+        """(B, outputs, h, w) features with the height and width of `beside`, the encoder's map."""
         enlarged = functional.interpolate(coarse, beside.shape[2:], mode="bilinear", align_corners=True)
         found: Tensor = self._net(torch.cat([enlarged, beside], dim=1))
         return found
 
 
 class AdaptiveBins(nn.Module):
-    """mini-ViT (Bhat et al., section 3.2): a transformer that gives the widths of the bins and attention maps."""
+    """The module mini-ViT (Bhat et al., section 3.2): a transformer that predicts the widths of the bins and
+    attention maps.
+    """
 
     def __init__(self, queries: int, bins: int) -> None:
         super().__init__()
@@ -144,7 +151,7 @@ class AdaptiveBins(nn.Module):
         )
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
-        """(B, bins) shares of the range that sum to 1, and (B, queries, h, w) attention maps."""
+        """(B, bins) widths as shares of the depth range, which sum to 1, and (B, queries, h, w) attention maps."""
         tokens = self.patch_transformer(features)
         widths = functional.relu(self.regressor(tokens[0])) + LEAST_WIDTH
         queries = tokens[1 : self.queries + 1]
@@ -153,7 +160,7 @@ class AdaptiveBins(nn.Module):
 
 
 class PatchTransformer(nn.Module):
-    """Four layers of attention between the patches of a map."""
+    """A transformer with four layers of attention between the patches of a feature map."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -176,7 +183,15 @@ def patches(height: int, width: int) -> int:
 
 
 def fitting(height: int, width: int, least: int, most: int = MOST_PATCHES) -> tuple[int, int]:
-    """The size nearest to a picture's, at its aspect ratio, that has `least` to `most` patches."""
+    """The size nearest to a picture's, at its aspect ratio, that has between `least` and `most` patches.
+
+    Args:
+        height, width: size of the picture.
+        least, most: smallest and largest number of patches.
+
+    Returns:
+        Height and width.
+    """
     count = patches(height, width)
     if least <= count <= most:
         return height, width

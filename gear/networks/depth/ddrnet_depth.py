@@ -1,4 +1,4 @@
-"""A depth network on the trunk of DDRNet-23-slim with one output channel: the logarithm of depth."""
+"""gear's fast depth network: the graph of DDRNet-23-slim with one output channel, the logarithm of depth."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from gear.networks.network import Normalise
 from gear.networks.segmentation.ddrnet import DDRNet23Slim
 
 MIDDLE_M = 10.0
-"""Depth for an output of 0, so that training starts near typical depths of streets."""
+"""Depth for a network output of 0, in metres. It is a typical depth in streets, near which training starts."""
 
 RANGE_M = (0.05, 1000.0)
-"""Predictions are clamped to this range, so that all numbers are finite."""
+"""Range to which predicted depths are clamped, in metres, so that all numbers are finite."""
 
 LAST_STD = 0.05
 
 RMS_UNIT_M = 20.0
-"""A root mean square error of this size counts as much as a logarithmic error of 1."""
+"""A root mean square error of this many metres counts as much in the loss as a logarithmic error of 1."""
 
 
 def ddrnet_depth_graph() -> DDRNet23Slim:
-    """The trunk with one output channel and random weights; the last layer has small weights, so that training starts
-    near 10 m.
+    """DDRNet-23-slim with one output channel and random weights.
+
+    The last layer has small weights, so that predictions are near 10 m at the start of training.
     """
     graph = DDRNet23Slim(1, auxiliary=False)
     nn.init.normal_(graph.final_layer.conv2.weight, std=LAST_STD)
@@ -36,7 +37,7 @@ def ddrnet_depth_graph() -> DDRNet23Slim:
 
 
 class DdrnetDepth(DepthNetwork):
-    """gear's fast depth network: depth = 10 m * exp(channel), with the channel interpolated before the exponential."""
+    """gear's fast depth network: depth = 10 m * exp(channel). The channel is interpolated before the exponential."""
 
     multiple_px: ClassVar[int] = 8
     graph: DDRNet23Slim
@@ -53,8 +54,10 @@ class DdrnetDepth(DepthNetwork):
         return {DEPTH: MIDDLE_M * resized(channel.float(), height, width)[:, 0].clamp(least, most).exp()}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """Scale-invariant error (dominated by outliers), mean relative error (robust), and root mean square error in
-        units of `RMS_UNIT_M`.
+        """Three losses: scale-invariant error, mean relative error, and root mean square error in units of
+        `RMS_UNIT_M`.
+
+        The scale-invariant error is dominated by outliers; the mean relative error is robust to them.
         """
         cap_m = self.options.max_depth_m
         return {
@@ -64,5 +67,5 @@ class DdrnetDepth(DepthNetwork):
         }
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The feature maps of the trunk, by the names of `gear.networks.segmentation.ddrnet`."""
+        """The feature maps of the graph, with the names of `gear.networks.segmentation.ddrnet`."""
         return self.graph.taps()

@@ -1,9 +1,9 @@
-"""GLPDepth (Kim et al., arXiv 2201.07436): a mix transformer and a light decoder, as the graph of transformers.
+"""GLPDepth (Kim et al., arXiv 2201.07436): a mix transformer as encoder and a light decoder, from transformers.
 
-Pictures go in as RGB in 0..1, without subtraction of a mean. The graph needs sides that are multiples of 32. Other
-pictures are extended by reflection at the top and evenly at the left and right, and the depth is cut back: resampling
-would change apparent sizes and therefore depths. The picture stays aligned at the bottom and the middle, as in the
-KITTI crops on which the published weights were trained.
+The network takes RGB in 0..1, without subtraction of a mean. Sides must be multiples of 32. Pictures of other sizes are
+extended by reflection at the top and evenly at the left and right, and the predicted depth is cut back. They are not
+resized, because that would change apparent sizes and therefore depths. The picture stays aligned at the bottom and the
+middle, as in the KITTI crops on which the published weights were trained.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from gear.networks.depth.packages import need_transformers
 MULTIPLE_PX = 32
 
 LEAST_PX = MULTIPLE_PX // 2 + 1
-"""Smallest side of a picture; smaller ones are too small for reflection."""
+"""Smallest side of a picture in pixels; smaller pictures cannot be extended by reflection."""
 
 
 class Glpn(DepthNetwork):
-    """GLPDepth; `graph` is a `GLPNForDepthEstimation` whose output is a share, 0..1, of the maximum depth."""
+    """GLPDepth; `graph` is a `GLPNForDepthEstimation` whose output 0..1 is the share of the maximum depth."""
 
     options: GlpnOptions
     least_px: ClassVar[int] = LEAST_PX
@@ -44,7 +44,7 @@ class Glpn(DepthNetwork):
         return {"silog": silog(outputs[DEPTH], depth_m, cap_m=self.options.max_depth_m)}
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """`stem` at a quarter of the picture's sides, `trunk` at a 32nd, `decoder` at full size."""
+        """The feature maps `stem` at 1/4 of the picture's sides, `trunk` at 1/32 and `decoder` at full size."""
         graph = self.graph
         return {
             "stem": graph.get_submodule("glpn.encoder.patch_embeddings.0.proj"),
@@ -54,11 +54,11 @@ class Glpn(DepthNetwork):
 
 
 def glpn_graph(options: GlpnOptions) -> nn.Module:
-    """The graph of transformers with random weights.
+    """The GLPN of transformers with random weights.
 
-    The encoder is initialised as SegFormer (Xie et al., NeurIPS 2021), the decoder as torch initialises convolutions.
-    The standard deviation of 0.02 that transformers uses for all layers leaves depth-wise convolutions, which have nine
-    inputs, almost without signal.
+    The encoder is initialised as in SegFormer (Xie et al., NeurIPS 2021), the decoder by torch's default for
+    convolutions. transformers itself draws all layers with a standard deviation of 0.02, which leaves depth-wise
+    convolutions (nine inputs) almost without signal.
     """
     need_transformers()
     from transformers import GLPNConfig, GLPNForDepthEstimation
@@ -93,7 +93,9 @@ def _draw(layer: nn.Module) -> None:
 
 
 def mirrored(picture: Tensor, multiple_px: int) -> Tensor:
-    """Pads (B, C, H, W) to multiples by reflection, at the top and evenly left and right."""
+    """Extends (B, C, H, W) pictures by reflection, at the top and evenly left and right, until sides are
+    multiples of `multiple_px`.
+    """
     height, width = picture.shape[2:]
     top, across = -height % multiple_px, -width % multiple_px
     left, right = across // 2, across - across // 2

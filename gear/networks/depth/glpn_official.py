@@ -1,4 +1,4 @@
-"""Key names of GLPDepth's published checkpoints, and those of the graph of transformers for the same tensors."""
+"""Translates parameter names of GLPDepth's published checkpoints to those of the GLPN in transformers."""
 
 from __future__ import annotations
 
@@ -28,15 +28,16 @@ NUMBERED: tuple[tuple[str, str], ...] = (
     (r"^glpn\.encoder\.block(\d)\.", "glpn.encoder.block.{}."),
     (r"^glpn\.encoder\.norm(\d)\.", "glpn.encoder.layer_norm.{}."),
 )
-"""Stages, which published files count from 1."""
+"""Names of stages, which published files count from 1."""
 
 JOINT = ".attn.kv."
-"""In published files keys and values are outputs of one layer, of which the first half are the keys."""
+"""Layers that compute keys and values together in published files; the first half of their outputs are the keys."""
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """A published state with the key names of transformers. Keys that are those of transformers, or unknown, are
-    kept.
+    """Renames the keys of published weights to those of transformers.
+
+    Keys that already have transformers' names, and unknown keys, are kept.
     """
     renamed: dict[str, Tensor] = {}
     for key, tensor in state.items():

@@ -1,7 +1,7 @@
 """Losses of monocular depth. Pixels without ground truth, such as the sky, are NaN and do not count.
 
-Depths are (B, H, W) distances along the optical axis in metres. Means are over the known pixels of the whole batch; a
-batch without known pixels has loss 0 without gradient.
+Depths are (B, H, W) distances along the optical axis in metres. Means are taken over the known pixels of the whole
+batch; a batch without known pixels has loss 0 and no gradient.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from torch import Tensor
 from torch.nn import functional
 
 LEAST_M = 1e-3
-"""Lower limit of depths in logarithms; no object is nearer."""
+"""Lower limit of depths before taking logarithms, metres; no object is nearer."""
 
 LEAST_SQUARE = 1e-12
-"""Keeps the gradient of a square root finite where the error is 0."""
+"""Value added under a square root, so that its gradient stays finite where the error is 0."""
 
 CAP_M = 80.0
-"""Depth up to which KITTI's benchmark is usually trained and evaluated."""
+"""Greatest depth that counts by default, in metres, as in most training and evaluation on KITTI."""
 
 
 def known(depth_m: Tensor, cap_m: float | None = CAP_M) -> Tensor:
-    """Boolean mask of the pixels that have ground truth of at most `cap_m` (None for no limit)."""
+    """Boolean mask of the pixels whose ground truth is known and at most `cap_m` (None for no limit)."""
     is_known = torch.isfinite(depth_m) & (depth_m > LEAST_M)
     return is_known if cap_m is None else is_known & (depth_m <= cap_m)
 
@@ -29,18 +29,18 @@ def known(depth_m: Tensor, cap_m: float | None = CAP_M) -> Tensor:
 def silog(
     predicted_m: Tensor, depth_m: Tensor, *, balance: float = 0.5, scale: float = 1.0, cap_m: float | None = CAP_M
 ) -> Tensor:
-    """Scale-invariant logarithmic error: scale * sqrt(mean(g^2) - balance * mean(g)^2), where g is the difference of
-    logarithms.
+    """Scale-invariant logarithmic error: scale * sqrt(mean(g^2) - balance * mean(g)^2).
 
-    Eigen et al., NeurIPS 2014, equation 3, under a root. GLPDepth (arXiv 2201.07436, equation 3) uses balance 0.5,
-    AdaBins (CVPR 2021, equation 4) balance 0.85 and scale 10: see `adabins_silog`.
+    g is the difference of the logarithms of predicted and true depth. The formula is the square root of equation 3 in
+    Eigen et al., NeurIPS 2014. GLPDepth (arXiv 2201.07436, equation 3) uses balance 0.5; AdaBins (CVPR 2021, equation
+    4) uses balance 0.85 and scale 10, see `adabins_silog`.
 
     Args:
-        predicted_m: (B, H, W), above 0.
+        predicted_m: (B, H, W) predicted depth, above 0.
         depth_m: (B, H, W) ground truth, NaN where unknown.
-        balance: 0 gives the root mean square of g; 1 ignores a wrong scale.
+        balance: 0 gives the root mean square of g; 1 ignores an error that is the same factor everywhere.
         scale: factor of the result.
-        cap_m: greatest ground-truth depth that counts; None for no limit.
+        cap_m: greatest true depth that counts; None for no limit.
     """
     mask = known(depth_m, cap_m)
     count = mask.sum().clamp_min(1)
@@ -63,9 +63,10 @@ def log_l1(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M)
 
 
 def root_mean_square(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float = CAP_M) -> Tensor:
-    """Root mean square error in metres; predictions beyond `cap_m` are cut to `cap_m`, as in the evaluation.
+    """Root mean square error in metres; predictions beyond `cap_m` are set to `cap_m`, as in the evaluation.
 
-    Reported by Eigen et al., NeurIPS 2014. Logarithmic errors weigh near pixels most, this error far ones.
+    The metric is that of Eigen et al., NeurIPS 2014. Logarithmic errors give near pixels the most weight; this error
+    gives it to far pixels.
     """
     mask = known(depth_m, cap_m)
     errors = torch.where(mask, predicted_m.clamp_max(cap_m) - torch.where(mask, depth_m, 0.0), 0.0)
@@ -75,7 +76,7 @@ def root_mean_square(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float = CAP
 
 
 def smooth_l1(predicted_m: Tensor, depth_m: Tensor, *, beta_m: float = 1.0, cap_m: float | None = CAP_M) -> Tensor:
-    """Mean smooth L1 error in metres: squares below `beta_m`, absolute beyond (Girshick, ICCV 2015)."""
+    """Mean smooth L1 error in metres: quadratic below `beta_m`, linear above (Girshick, ICCV 2015)."""
     mask = known(depth_m, cap_m)
     target_m = torch.where(mask, depth_m, predicted_m.detach())
     return functional.smooth_l1_loss(predicted_m, target_m, beta=beta_m, reduction="sum") / mask.sum().clamp_min(1)
@@ -84,14 +85,14 @@ def smooth_l1(predicted_m: Tensor, depth_m: Tensor, *, beta_m: float = 1.0, cap_
 def bins_chamfer(centres_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
     """Chamfer distance between bin centres and depths (Fan et al., CVPR 2017; AdaBins, CVPR 2021, equation 5).
 
-    For each picture: the mean over its known pixels of the squared distance to the nearest bin, plus the mean over the
-    bins of the squared distance to the nearest known depth; then the mean over pictures with known pixels. In one
-    dimension nearest neighbours are found by sorting, so no table of pixels by bins is made.
+    For each picture it is the sum of two means: over known pixels, the squared distance to the nearest bin; over bins,
+    the squared distance to the nearest known depth. The result is the mean over pictures that have known pixels. In one
+    dimension nearest neighbours are found by sorting, so no table of pixels by bins is needed.
 
     Args:
         centres_m: (B, bins) centres in any order.
         depth_m: (B, H, W) ground truth, NaN where unknown.
-        cap_m: greatest ground-truth depth that counts; None for no limit.
+        cap_m: greatest true depth that counts; None for no limit.
     """
     terms = []
     for centres, picture, mask in zip(centres_m, depth_m, known(depth_m, cap_m), strict=True):
@@ -105,7 +106,7 @@ def bins_chamfer(centres_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CA
 
 
 def _nearest(ordered: Tensor, wanted: Tensor) -> Tensor:
-    """For each of `wanted` the nearest of the ascending `ordered`, with its gradient."""
+    """For each value of `wanted`, the nearest value in the ascending `ordered`, with its gradient."""
     with torch.no_grad():
         above = torch.searchsorted(ordered.detach(), wanted.detach()).clamp(1, max(len(ordered) - 1, 1))
         above = above.clamp_max(len(ordered) - 1)

@@ -1,4 +1,4 @@
-"""Base of gear's depth networks: input size, ground truth, predictions."""
+"""The base class of gear's depth networks: input size, ground truth and predictions."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ DEPTH = "depth_m"
 
 
 class DepthNetwork(Network):
-    """A network with the output `depth_m` (B, H, W): distance along the optical axis in metres, at the picture's size.
+    """Base class of depth networks.
+
+    The main output is `depth_m` (B, H, W): distance along the optical axis in metres, at the picture's size.
 
     Attributes:
         input_scale: factor by which pictures are resized before the network.
-        multiple_px: the sides of the network's input are multiples of this.
-        least_px: smallest side of the network's input.
+        multiple_px: the sides of the network's input are multiples of this number of pixels.
+        least_px: smallest side of the network's input, pixels.
     """
 
     options: DepthOptions
@@ -38,14 +40,14 @@ class DepthNetwork(Network):
 
         Args:
             graph: torch module.
-            options: as the user gave them.
-            input_scale: used where neither the options nor the weights state one.
+            options: options that the user gave.
+            input_scale: default, used if neither the options nor the weights state one.
         """
         super().__init__(graph, options, views=(VIEW,))
         self.input_scale = input_scale if options.input_scale is None else options.input_scale
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`depth_m` at the picture's size, and further outputs of the network."""
+        """`depth_m` at the picture's size, and further outputs of the network, by name."""
         picture = pictures[VIEW]
         height, width = (int(side) for side in picture.shape[2:])
         outputs = dict(self.estimate(resized(picture, self._seen(height), self._seen(width))))
@@ -53,7 +55,7 @@ class DepthNetwork(Network):
         return outputs
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The network's losses against `depth_m` of the samples."""
+        """The losses of the network's outputs against the samples' `depth_m`, by name."""
         depth_m = torch.from_numpy(np.stack([target.depth_m for target in targets])).to(outputs[DEPTH])
         return self.depth_losses(outputs, depth_m)
 
@@ -67,16 +69,28 @@ class DepthNetwork(Network):
 
     @abstractmethod
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """`depth_m` (B, h, w) of any size for (B, 3, H, W) pictures in 0..1, and further outputs for the losses."""
+        """Runs the graph; subclasses implement this.
+
+        Args:
+            picture: (B, 3, H, W) in 0..1.
+
+        Returns:
+            `depth_m` (B, h, w) of any size, and further outputs that the losses need.
+        """
 
     @abstractmethod
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """Losses by name against (B, H, W) depth in metres, NaN where unknown."""
+        """Losses by name; subclasses implement this.
+
+        Args:
+            outputs: result of `run`.
+            depth_m: (B, H, W) true depth in metres, NaN where unknown.
+        """
 
 
 def resized(maps: Tensor, height: int, width: int) -> Tensor:
-    """(B, C, H, W) resized bilinearly, with averaging where it gets smaller; the same tensor where the size is the
-    same.
+    """Resizes (B, C, H, W) maps bilinearly; reducing averages (anti-aliasing). Maps of the wanted size are
+    returned unchanged.
     """
     if tuple(maps.shape[2:]) == (height, width):
         return maps

@@ -1,4 +1,4 @@
-"""Options of the depth networks. torch is not imported, so that specs are quick to make."""
+"""Options of the depth networks. The module does not import torch, so that plugin specs load quickly."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ HEADS = (1, 2, 5, 8)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DepthOptions(NetworkOptions):
-    """Options of every depth network.
+    """Options that every depth network has.
 
     Attributes:
-        max_depth_m: greatest depth that is trained on; networks with a bounded output predict no more.
+        max_depth_m: greatest depth used in training, metres; networks with a bounded output predict no greater depth.
         input_scale: factor by which pictures are resized before the network; the depth is resized back. null takes the
-            factor that the weights were trained for, or the network's default where the weights state none.
+            factor with which the weights were trained, or the network's default if the weights state none.
     """
 
     max_depth_m: float = 80.0
@@ -37,12 +37,12 @@ class DepthOptions(NetworkOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GlpnOptions(DepthOptions):
-    """GLPDepth, by default with the encoder of the published weights, MiT-b4.
+    """Options of GLPDepth; the defaults are those of the published weights, with the encoder MiT-b4.
 
     Attributes:
-        blocks: transformer blocks of each of the four stages.
-        widths: channels of each stage, divisible by 1, 2, 5 and 8 (its attention heads).
-        decoder_width: channels of the decoder.
+        blocks: number of transformer blocks in each of the four stages.
+        widths: number of channels of each stage, divisible by 1, 2, 5 and 8 (its number of attention heads).
+        decoder_width: number of channels of the decoder.
     """
 
     blocks: tuple[int, int, int, int] = (3, 8, 27, 3)
@@ -61,7 +61,7 @@ class GlpnOptions(DepthOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GlpnB0Options(GlpnOptions):
-    """GLPDepth with the smallest encoder, MiT-b0."""
+    """Options of GLPDepth with the smallest encoder, MiT-b0."""
 
     blocks: tuple[int, int, int, int] = (2, 2, 2, 2)
     widths: tuple[int, int, int, int] = (32, 64, 160, 256)
@@ -70,14 +70,15 @@ class GlpnB0Options(GlpnOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AdaBinsOptions(DepthOptions):
-    """AdaBins, by default as published.
+    """Options of AdaBins; the defaults are those of the published weights.
 
     Attributes:
         encoder: an EfficientNet of timm, `tf_efficientnet_b0` to `tf_efficientnet_b8`.
-        features: channels of the decoder's widest layer, divisible by 16; each further layer has half as many.
+        features: number of channels of the decoder's widest layer, divisible by 16; each further layer has half as
+            many.
         bins: number of depth bins.
         queries: number of transformer tokens that are compared with the feature map.
-        min_depth_m: lower end of the depth range.
+        min_depth_m: lower end of the depth range, metres.
     """
 
     encoder: str = "tf_efficientnet_b5"

@@ -1,4 +1,4 @@
-"""Optional packages of depth networks, imported with a clear error where they are missing."""
+"""Imports the optional packages of depth networks; a missing package gives a clear error."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from gear.values.errors import GearError
 
 
 def need_transformers() -> None:
-    """Imports transformers.
+    """Imports the package transformers.
 
     Raises:
-        GearError: it is not installed.
+        GearError: transformers is not installed.
     """
     torchvision_import.prepare()
     _need("transformers")
 
 
 def need_timm() -> None:
-    """Imports timm.
+    """Imports the package timm.
 
     Raises:
-        GearError: timm, or torchvision, which timm imports, is not installed.
+        GearError: timm is not installed, or torchvision is not, which timm imports.
     """
     torchvision_import.need()
     _need("timm")

@@ -1,4 +1,4 @@
-"""Faster R-CNN (Ren et al., 2015) with a feature pyramid, on torchvision's graph."""
+"""Faster R-CNN (Ren et al., 2015) with a feature pyramid, on the model of torchvision."""
 
 from __future__ import annotations
 
@@ -28,27 +28,28 @@ OBJECTNESS, RPN_DELTAS, ANCHORS_PX = "objectness", "rpn_bbox_regression", "ancho
 PROPOSALS, LOGITS, DELTAS = "proposals_px", "class_logits", "box_regression"
 
 MAPS = ("0", "1", "2", "3", "pool")
-"""Feature maps at 1/4 to 1/64 of the graph's input, by torchvision's names."""
+"""Names that torchvision gives to the feature maps at 1/4 to 1/64 of the graph's input."""
 
 SURE_BACKGROUND = 20.0
-"""Background logit of padded proposals."""
+"""Background logit of the empty proposals that fill up a picture's list."""
 
 
 class FasterRcnnDetector(Detector):
     """Faster R-CNN as a gear network.
 
-    Outputs: `objectness` (B, N) and `rpn_bbox_regression` (B, N, 4) of the anchors `anchors_px` (B, N, 4);
-    `class_logits` (B, R, 91) and `box_regression` (B, R, 364) of the proposals `proposals_px` (B, R, 4). R is fixed; a
-    picture with fewer proposals is filled up with empty boxes of background. Boxes are left, top, right, bottom in edge
-    pixels of the picture. Losses: `loss_classifier`, `loss_box_reg`, `loss_objectness`, `loss_rpn_box_reg`.
+    Outputs of the region proposal network, for N anchors: `objectness` (B, N), `rpn_bbox_regression` (B, N, 4) and
+    `anchors_px` (B, N, 4). Outputs of the second stage, for R proposals: `class_logits` (B, R, 91), `box_regression`
+    (B, R, 364) and `proposals_px` (B, R, 4). R is fixed; a picture with fewer proposals is filled up with empty boxes
+    of background. Boxes are left, top, right, bottom in edge pixels of the picture. Losses are `loss_classifier`,
+    `loss_box_reg`, `loss_objectness` and `loss_rpn_box_reg`.
     """
 
     generator = "rpn.anchor_generator"
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Outputs of the proposal network's head and of the box heads.
+        """Outputs of the region proposal network and of the second stage.
 
-        Pictures are processed one by one: convolutions over a batch round differently from those over one picture, and
+        Pictures are processed one by one. Convolutions over a batch round differently from those over one picture, and
         the smallest difference may change which proposals are kept, and with them all further outputs.
         """
         each = [self._run_one(picture[None]) for picture in pictures[VIEW]]
@@ -73,8 +74,8 @@ class FasterRcnnDetector(Detector):
         }
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Feature maps, outputs of the proposal network's head, anchors in the graph's pixels, and the picture's
-        size.
+        """The inputs of `losses`: feature maps, outputs of the region proposal network, anchors in pixels of the
+        graph's input, and the picture's size.
         """
         from torchvision.models.detection.rpn import concat_box_prediction_layers
 
@@ -92,10 +93,10 @@ class FasterRcnnDetector(Detector):
         }
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The losses of torchvision; background that lies mostly in ignored objects is never sampled.
+        """The losses of torchvision; background that lies mostly inside ignored objects is never sampled.
 
-        Anchors and proposals are sampled with `options.seed`, so the same ones each time. In training mode the
-        generator of torch samples them.
+        Anchors and proposals are sampled with `options.seed`, so each call samples the same ones. In training mode
+        torch's own generator samples them.
         """
         wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
         graph: Any = self.graph
@@ -106,7 +107,7 @@ class FasterRcnnDetector(Detector):
             return self._box_losses(outputs, proposals, wanted) | proposal_losses
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
-        """Detections of each picture, by falling score."""
+        """Detections of each picture, highest score first."""
         heads: Any = self.graph.get_submodule("roi_heads")
         answers = []
         for proposals, logits, deltas in zip(outputs[PROPOSALS], outputs[LOGITS], outputs[DELTAS], strict=True):
@@ -118,7 +119,7 @@ class FasterRcnnDetector(Detector):
         return answers
 
     def _proposals(self, outputs: Mapping[str, Tensor]) -> list[Tensor]:
-        """(R, 4) boxes of each picture in the graph's pixels, by falling score; without gradient."""
+        """(R, 4) boxes of each picture in pixels of the graph's input, highest score first; without gradient."""
         rpn: Any = self.graph.get_submodule("rpn")
         anchors = outputs[ANCHORS]
         boxes = rpn.box_coder.decode(outputs[RPN_DELTAS].detach(), list(anchors)).view(anchors.shape)
@@ -170,9 +171,9 @@ class FasterRcnnDetector(Detector):
 
 
 def _without_ignored(labels: Sequence[Tensor], boxes: Sequence[Tensor], wanted: Sequence[Targets]) -> list[Tensor]:
-    """Labels in which background that lies mostly in ignored objects is -1, which is never sampled.
+    """Labels in which background that lies mostly inside ignored objects is -1, so that it is never sampled.
 
-    A picture that would have nothing left keeps its background.
+    If a picture would have no background left, it keeps all of it.
     """
     answers = []
     for label, box, target in zip(labels, boxes, wanted, strict=True):
@@ -184,8 +185,8 @@ def _without_ignored(labels: Sequence[Tensor], boxes: Sequence[Tensor], wanted: 
 
 @contextlib.contextmanager
 def _as_in_training(rpn: Any) -> Iterator[None]:
-    """Inside, the proposal network of torchvision keeps as many proposals as in training; its layers stay in their
-    modes.
+    """Context in which torchvision's region proposal network keeps as many proposals as in training; its layers
+    stay in their modes.
     """
     was, rpn.training = rpn.training, True
     try:

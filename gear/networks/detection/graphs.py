@@ -1,4 +1,4 @@
-"""The graphs of the detectors, with the key names of torchvision."""
+"""The torch modules of the detectors, with the parameter names of torchvision."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from gear.networks.efficientnet_lite0 import CHANNELS as LITE0_CHANNELS
 from gear.networks.efficientnet_lite0 import OnLite0, features_of_lite0
 
 TRAINABLE_STAGES = 3
-"""Trainable stages of the published detectors; the stem and the first stage keep their ImageNet weights."""
+"""Number of trainable stages of the published detectors; the stem and the first stage keep their ImageNet weights."""
 
 CHANNELS = 128
-"""Channels of the reference detectors' pyramid and heads."""
+"""Number of channels of the pyramid and the heads of gear's reference detectors."""
 
 GROUPS = 32
 
 STRIDES_PX = (8, 16, 32, 64, 128)
 ANCHOR_STRIDES = 1.5
-"""Side of the smallest anchor of a feature map, in strides of the map; the published networks have 4."""
+"""Side of the smallest anchor of a feature map, in strides of the map; it is 4 in the published networks."""
 
 OCTAVES = (1.0, 2 ** (1 / 3), 2 ** (2 / 3))
 ASPECT_RATIOS = (0.5, 1.0, 2.0)
-"""Height over width."""
+"""Height divided by width of the anchors."""
 
 LITE0_LEVELS = (2, 3, 4)
-"""Indices into `gear.networks.efficientnet_lite0.LEVELS` of the maps at 1/8, 1/16 and 1/32."""
+"""Indices in `gear.networks.efficientnet_lite0.LEVELS` of the feature maps at 1/8, 1/16 and 1/32."""
 
 LITE0_HEAD_DEPTH = 2
-"""Convolutions in each of its heads; RetinaNet has four, which would take half of each step on a CPU."""
+"""Number of convolutions in each head on EfficientNet-Lite0; RetinaNet's four would take half of each step on a CPU."""
 
 
 def fasterrcnn_r50_fpn(least_score: float) -> nn.Module:
@@ -92,7 +92,13 @@ def retinanet_lite0_fpn(classes: int, least_score: float) -> nn.Module:
 def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -> nn.Module:
     """RetinaNet of torchvision with narrower heads, group normalisation and smaller anchors.
 
-    The network sees pictures at about half their size, where a person of 32 pixels is 16 high and 6 wide.
+    The network receives pictures at about half their size, where a person of 32 pixels height is 16 pixels high and 6
+    wide.
+
+    Args:
+        backbone: trunk with a feature pyramid.
+        classes: number of classes, background included.
+        least_score: smallest score of a detection that is reported.
     """
     torchvision_import.need()
     from torchvision.models.detection import RetinaNet
@@ -111,7 +117,7 @@ def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -
 
 
 class LitePyramid(OnLite0):
-    """EfficientNet-Lite0 with a feature pyramid; takes the place of torchvision's `BackboneWithFPN`."""
+    """EfficientNet-Lite0 with a feature pyramid, instead of torchvision's `BackboneWithFPN`."""
 
     out_channels = CHANNELS
 
@@ -126,14 +132,14 @@ class LitePyramid(OnLite0):
         self.fpn = FeaturePyramidNetwork(channels, CHANNELS, extra_blocks=LastLevelP6P7(CHANNELS, CHANNELS))
 
     def lite0(self) -> nn.Module:
-        """The EfficientNet-Lite0."""
+        """The trunk, an EfficientNet-Lite0."""
         return self.body
 
     def forward(self, pictures: Tensor) -> Mapping[str, Tensor]:
-        """Feature maps by level, as torchvision numbers them.
+        """Feature maps by level, with torchvision's names.
 
-        Their memory format is channels last: on the CPU, gradients of depth-wise convolutions take up to ten times as
-        long in the other format, and a whole training step a seventh longer.
+        They are in channels-last memory format. In the other format, gradients of depth-wise convolutions take up to
+        ten times as long on a CPU, and a whole training step takes a seventh longer.
         """
         stages = self.body(pictures.contiguous(memory_format=torch.channels_last))
         maps: Mapping[str, Tensor] = self.fpn(OrderedDict((str(i), each) for i, each in enumerate(stages)))

@@ -1,8 +1,8 @@
-"""Base of gear's 2D detectors: input size, ground truth, predictions.
+"""The base class of gear's 2D detectors: input size, ground truth and predictions.
 
-Outputs are in pixels of the picture, for any size of the network's input. Losses are in pixels of the graph's input, as
-in torchvision: there, all anchors that contain an object completely have exactly the same overlap and are trained on
-it; in other units rounding would break these ties.
+Outputs are in pixels of the picture, at whatever size the network runs. Losses are in pixels of the graph's input, like
+those of torchvision: there, all anchors that contain an object completely have exactly equal overlaps, and all of them
+are trained on the object. In other units rounding would make the overlaps unequal.
 """
 
 from __future__ import annotations
@@ -21,26 +21,28 @@ from gear.networks.network import IMAGENET_MEAN, IMAGENET_STD, Network, Normalis
 
 VIEW = "left"
 DIVISOR_PX = 32
-"""Sides of the graph's input are padded to multiples of this, as in torchvision."""
+"""The sides of the graph's input are padded to multiples of this, as in torchvision."""
 
 ANCHORS, PICTURE = "anchors", "picture_px"
-"""Further inputs of the losses: (B, N, 4) in the graph's pixels; (B, 2) height and width."""
+"""Names of two further inputs of the losses: anchors (B, N, 4) in pixels of the graph's input, and the pictures'
+height and width (B, 2).
+"""
 
 MOSTLY = 0.5
-"""Background is not trained on if this share of it lies in ignored objects."""
+"""Background is not used in training if at least this share of its area lies inside ignored objects."""
 
 Size = tuple[int, int]
-"""Height and width."""
+"""Height and width in pixels."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sizing:
-    """The preprocessing of pictures to the graph's input.
+    """How a picture is converted to the graph's input.
 
     Attributes:
         inner_px: function from height and width of the picture to those of the graph's input.
-        smooth: whether reducing averages; torchvision's detectors do not average.
-        mean, std: of each channel, for normalisation.
+        smooth: whether reducing averages (anti-aliasing); torchvision's detectors do not.
+        mean, std: normalisation of the three channels.
     """
 
     inner_px: Callable[[Size], Size]
@@ -64,17 +66,17 @@ class Targets:
     ignored: Tensor
 
     def as_torchvision(self) -> dict[str, Tensor]:
-        """The dictionary that torchvision's losses take."""
+        """The dictionary that the losses of torchvision expect."""
         return {"boxes": self.boxes, "labels": self.labels}
 
 
 class Detector(Network):
-    """A torchvision graph with COCO detections as predictions."""
+    """A detection model of torchvision as a gear network; predictions have COCO's categories."""
 
     options: DetectorOptions
     has_quick_copy = True
     generator: ClassVar[str] = "anchor_generator"
-    """Name under which the graph keeps its anchor generator."""
+    """Name of the graph's attribute that holds its anchor generator."""
 
     def __init__(
         self, graph: nn.Module, options: DetectorOptions, *, sizing: Sizing, categories: Sequence[int | None]
@@ -83,8 +85,8 @@ class Detector(Network):
 
         Args:
             graph: detection model of torchvision.
-            options: as the user gave them.
-            sizing: how the graph's input is made.
+            options: options that the user gave.
+            sizing: how a picture is converted to the graph's input.
             categories: COCO's category id of each class of the graph; None for classes that COCO does not have.
         """
         super().__init__(graph, options, views=(VIEW,))
@@ -93,12 +95,16 @@ class Detector(Network):
         self.normalise = Normalise(sizing.mean, sizing.std).to(self.device).eval()
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The backbone's stages, `layer1` (1/4 of the graph's input) to `layer4` (1/32)."""
+        """The feature maps at the ends of the backbone's stages, `layer1` (1/4 of the graph's input) to `layer4`
+        (1/32).
+        """
         body = self.graph.get_submodule("backbone.body")
         return {name: body.get_submodule(name) for name in ("layer1", "layer2", "layer3", "layer4")}
 
     def seen(self, pictures: Tensor) -> Tensor:
-        """(B, 3, h, w) input of the graph: normalised, resized, padded with zeros at the bottom and on the right."""
+        """(B, 3, h, w) input of the graph: the pictures resized, normalised, and padded with zeros at the bottom
+        and the right.
+        """
         size = size_of(pictures)
         inner, (height, width) = self.sizing.inner_px(size), self.seen_px(size)
         pixels = self.normalise(pictures)
@@ -109,12 +115,17 @@ class Detector(Network):
         return functional.pad(pixels, (0, width - inner[1], 0, height - inner[0]))
 
     def seen_px(self, picture_px: Size) -> Size:
-        """Height and width of the graph's input for a picture, padding included."""
+        """Height and width of the graph's input for a picture, including the padding."""
         height, width = self.sizing.inner_px(picture_px)
         return height + -height % DIVISOR_PX, width + -width % DIVISOR_PX
 
     def anchors(self, picture_px: Size, grids: Sequence[Size]) -> Tensor:
-        """(N, 4) anchors in the graph's pixels, for feature maps of these sizes."""
+        """(N, 4) anchors in pixels of the graph's input.
+
+        Args:
+            picture_px: height and width of the picture.
+            grids: height and width of each feature map.
+        """
         from torchvision.models.detection.image_list import ImageList
 
         shape = self.seen_px(picture_px)
@@ -124,14 +135,16 @@ class Detector(Network):
         return found
 
     def shrinkage(self, picture_px: Size) -> Tensor:
-        """(4,) factors from box coordinates in the picture to those in the graph's input."""
+        """(4,) factors from box coordinates in the picture to box coordinates in the graph's input."""
         height, width = self.sizing.inner_px(picture_px)
         inner = torch.tensor([width, height] * 2, dtype=torch.float32, device=self.device)
         return inner / torch.tensor([picture_px[1], picture_px[0]] * 2, dtype=torch.float32, device=self.device)
 
     def targets(self, sample: Any, picture_px: Size) -> Targets:
-        """Ground truth of a sample. Objects of classes that the network lacks are ignored, as are boxes without an
-        area, whose sides have no logarithm to learn.
+        """Ground truth of a sample.
+
+        Objects of classes that the network does not have are ignored. So are boxes without area, because the logarithms
+        of their sides cannot be learnt.
         """
         shrinkage = self.shrinkage(picture_px)
         number = {category: index for index, category in enumerate(self.categories) if category is not None}
@@ -149,7 +162,11 @@ class Detector(Network):
         )
 
     def detections(self, found: Mapping[str, Tensor]) -> tuple[Detection, ...]:
-        """The detections of one picture; classes that COCO has no category for are left out."""
+        """The detections of one picture; classes without a COCO category are left out.
+
+        Args:
+            found: torchvision's result for the picture: `boxes`, `scores` and `labels`.
+        """
         columns = (found["boxes"].tolist(), found["labels"].tolist(), found["scores"].tolist())
         return tuple(
             Detection(category_id=category, box_px=(left, top, right, bottom), score=score)
@@ -164,7 +181,7 @@ class Detector(Network):
 
 OFFICIAL_CLASSES = 91
 OFFICIAL_CATEGORIES = tuple(number if number in CATEGORY_NAMES else None for number in range(OFFICIAL_CLASSES))
-"""Classes of the published detectors are COCO's category ids, with gaps; 0 is the background."""
+"""Classes of the published detectors: their numbers are COCO's category ids, with gaps; 0 is the background."""
 
 
 def size_of(pictures: Tensor) -> Size:
@@ -173,13 +190,18 @@ def size_of(pictures: Tensor) -> Size:
 
 
 def picture_size(outputs: Mapping[str, Tensor]) -> Size:
-    """Height and width of a batch's pictures, from what `losses` is given."""
+    """Height and width of a batch's pictures, read from the inputs of `losses`."""
     height, width = outputs[PICTURE][0].tolist()
     return int(height), int(width)
 
 
 def fitted(min_size_px: int, max_size_px: int) -> Callable[[Size], Size]:
-    """torchvision's rule: the shorter side becomes `min_size_px`, unless the longer side would exceed `max_size_px`."""
+    """torchvision's rule for the input size: the shorter side becomes `min_size_px`, unless the longer side would
+    exceed `max_size_px`.
+
+    Returns:
+        Function from (height, width) of the picture to those of the input.
+    """
 
     def inner_px(size: Size) -> Size:
         scale = min(min_size_px / min(size), max_size_px / max(size))
@@ -189,13 +211,16 @@ def fitted(min_size_px: int, max_size_px: int) -> Callable[[Size], Size]:
 
 
 def scaled(scale: float) -> Callable[[Size], Size]:
-    """Both sides times a factor, rounded."""
+    """Rule for the input size: both sides times `scale`, rounded."""
     return lambda size: (max(1, round(size[0] * scale)), max(1, round(size[1] * scale)))
 
 
 def share_inside(boxes: Tensor, ignored: Tensor) -> Tensor:
-    """(N,) largest share, 0..1, of each of (N, 4) boxes' areas that lies in one of (M, 4) ignored boxes; 0 where M is
-    0.
+    """(N,) for each box, the largest share of its area, 0..1, that lies inside a single ignored box; 0 if M is 0.
+
+    Args:
+        boxes: (N, 4) left, top, right, bottom.
+        ignored: (M, 4).
     """
     if not len(ignored):
         return boxes.new_zeros(len(boxes))

@@ -1,4 +1,4 @@
-"""Published weights of detectors, with keys renamed for gear's networks."""
+"""Renames the keys of published detector weights for gear's networks."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ OLD_NAMES = (
     (r"(head\.\w+_head\.conv)\.4\.(weight|bias)", r"\1.2.0.\2"),
     (r"(head\.\w+_head\.conv)\.6\.(weight|bias)", r"\1.3.0.\2"),
 )
-"""Key names in files of 2019 and 2020, which lack the block around a convolution and count activations."""
+"""Key names in files of 2019 and 2020: they lack the block around a convolution, and they number activations as
+layers.
+"""
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The state of a published detector of torchvision with the key names of current torchvision versions."""
+    """Renames the keys of published torchvision weights to the names of current torchvision versions."""
     return {_renamed(key): value for key, value in state.items() if not key.endswith("num_batches_tracked")}
 
 

@@ -1,4 +1,4 @@
-"""Options of the detectors. torch is not imported, so that specs are quick to make."""
+"""Options of the detectors. The module does not import torch, so that plugin specs load quickly."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectorOptions(NetworkOptions):
-    """Options of every detector.
+    """Options that every detector has.
 
     Attributes:
         least_score: smallest score, 0..1, of a detection that is reported.
@@ -25,11 +25,11 @@ class DetectorOptions(NetworkOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OfficialDetectorOptions(DetectorOptions):
-    """Options of the published detectors.
+    """Options of the detectors with published weights.
 
     Attributes:
         min_size_px: pictures are resized so that their shorter side has this many pixels.
-        max_size_px: limit of the longer side, which takes precedence.
+        max_size_px: upper limit of the longer side; it overrules `min_size_px`.
     """
 
     min_size_px: int = 800
@@ -44,11 +44,11 @@ class OfficialDetectorOptions(DetectorOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReferenceDetectorOptions(DetectorOptions):
-    """Options of the detectors that gear trains.
+    """Options of the detectors that were trained on gear's own data.
 
     Attributes:
-        input_scale: factor by which pictures are resized before the network. null takes the factor that the weights
-            were trained for, or 0.5 where they state none.
+        input_scale: factor by which pictures are resized before the network. null takes the factor with which the
+            weights were trained, or 0.5 if they state none.
     """
 
     input_scale: float | None = None

@@ -1,4 +1,4 @@
-"""RetinaNet (Lin et al., Focal Loss for Dense Object Detection, 2017) on torchvision's graph."""
+"""RetinaNet (Lin et al., Focal Loss for Dense Object Detection, 2017), on the model of torchvision."""
 
 from __future__ import annotations
 
@@ -27,14 +27,15 @@ LITE_TAPS = (1, 2, 4, 6)
 
 FIRST_STRIDE_PX = 8
 LEVELS = 5
-"""Feature maps at 1/8 to 1/128 of the graph's input."""
+"""Number of feature maps, at 1/8 to 1/128 of the graph's input."""
 
 
 class RetinaNetDetector(Detector):
     """RetinaNet as a gear network.
 
-    Outputs: `cls_logits` (B, N, classes) and `bbox_regression` (B, N, 4) relative to `anchors_px` (B, N, 4), which are
-    left, top, right, bottom in edge pixels of the picture. Losses: `classification` and `bbox_regression`.
+    Outputs for N anchors: `cls_logits` (B, N, classes), `anchors_px` (B, N, 4), and `bbox_regression` (B, N, 4)
+    relative to the anchors. Anchors are left, top, right, bottom in edge pixels of the picture. Losses are
+    `classification` and `bbox_regression`.
     """
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
@@ -44,7 +45,9 @@ class RetinaNetDetector(Detector):
         return {LOGITS: outputs[LOGITS], DELTAS: outputs[DELTAS], ANCHORS_PX: anchors_px}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Outputs of both heads, the anchors in pixels of the graph's input, and the picture's size."""
+        """The inputs of `losses`: outputs of both heads, the anchors in pixels of the graph's input, and the
+        picture's size.
+        """
         picture = pictures[VIEW]
         features = list(self.graph.get_submodule("backbone")(self.seen(picture)).values())
         outputs: dict[str, Tensor] = dict(self.graph.get_submodule("head")(features))
@@ -71,7 +74,7 @@ class RetinaNetDetector(Detector):
         return losses
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
-        """Detections of each picture, by falling score."""
+        """Detections of each picture, highest score first."""
         graph: Any = self.graph
         size = (size_px[0], size_px[1])
         counts = self._counts(size)
@@ -106,6 +109,8 @@ class LiteRetinaNetDetector(RetinaNetDetector):
     """RetinaNet with an EfficientNet of timm as backbone."""
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The ends of the backbone's stages, `layer1` (1/4 of the graph's input) to `layer4` (1/32)."""
+        """The feature maps at the ends of the backbone's stages, `layer1` (1/4 of the graph's input) to `layer4`
+        (1/32).
+        """
         blocks = self.graph.get_submodule("backbone.body.blocks")
         return {f"layer{i}": blocks.get_submodule(str(stage)) for i, stage in enumerate(LITE_TAPS, start=1)}

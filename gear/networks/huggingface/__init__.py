@@ -1,1 +1,1 @@
-"""Networks of the transformers package, opened from a folder with its weights and configuration."""
+"""Networks of the transformers package, opened from a local folder that holds their weights and configuration."""

@@ -1,4 +1,4 @@
-"""Image processors of transformers that gear repeats in torch, with the defaults of their classes."""
+"""Image processors of transformers that gear implements in torch, with the default values of their classes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HALF = (0.5, 0.5, 0.5)
 STEPS = ("do_resize", "do_rescale", "do_normalize", "do_pad", "do_center_crop")
 
 FOR_LABELS_OR_OTHER_FILES = ("do_reduce_labels", "do_convert_annotations", "do_convert_rgb")
-"""Steps that do not change gear's pictures: these are RGB, and labels are not processed."""
+"""Steps that do not change gear's pictures: conversion to RGB, and steps for labels."""
 
 EVERYWHERE: Mapping[str, Any] = MappingProxyType(
     {"do_resize": True, "do_rescale": True, "rescale_factor": 1 / 255, "do_normalize": True, "do_pad": False,
@@ -27,11 +27,11 @@ EVERYWHERE: Mapping[str, Any] = MappingProxyType(
 NEEDED_PX: Mapping[str, int] = MappingProxyType(
     {"glpn": 32, "rt_detr": 32, "rt_detr_v2": 32, "d_fine": 32, "deimv2": 32}
 )
-"""By `model_type`: divisor of the sides, without which a network's feature maps of several scales do not match."""
+"""By `model_type`: number of which the sides must be multiples, so that feature maps of several scales fit together."""
 
 IN_PATCHES = ("beit", "data2vec-vision", "depth_anything", "dpt", "yolos", "zoedepth")
-"""By `model_type`: networks that process whole patches alone; a remainder on the right and at the bottom is not seen,
-and the output covers the rest of the picture.
+"""By `model_type`: networks that process only whole patches of this many pixels. They do not see the remainder
+at the right and the bottom; their output covers the rest of the picture.
 """
 
 
@@ -40,9 +40,9 @@ class Family:
     """One class of image processors.
 
     Attributes:
-        defaults: values of the keys of its file, where they differ from `EVERYWHERE`.
-        networks: `model_type` of the networks whose folders need not name the class.
-        is_square: whether a `size` of one number is height and width, instead of the shorter edge.
+        defaults: default values of the keys in its file, where they differ from `EVERYWHERE`.
+        networks: `model_type` of the networks that use this class when their folder does not name one.
+        is_square: meaning of a `size` of one number: True for height and width, False for the shorter edge.
     """
 
     defaults: Mapping[str, Any] = field(default_factory=dict)
@@ -50,11 +50,11 @@ class Family:
     is_square: bool = True
 
     def facts(self, said: Mapping[str, Any]) -> dict[str, Any]:
-        """The values of a file, completed with the class's defaults; null values are left out."""
+        """The values in a file, completed with the defaults of the class; null values are left out."""
         return {**EVERYWHERE, **self.defaults, **{key: value for key, value in said.items() if value is not None}}
 
     def steps(self) -> frozenset[str]:
-        """Keys `do_…` that gear accepts: steps that it implements, and keys that do not change the picture."""
+        """Keys `do_…` that gear accepts: steps that it implements, and steps that do not change the picture."""
         return frozenset((*STEPS, *FOR_LABELS_OR_OTHER_FILES, *(key for key in self.defaults if key.startswith("do_"))))
 
 
@@ -119,12 +119,12 @@ def family_of(said: Mapping[str, Any], model_type: str, path: Path) -> str:
     """The name in `FAMILIES` of a folder's image processor.
 
     Args:
-        said: content of its file.
-        model_type: of the folder's network, for files that name no class.
-        path: of the file.
+        said: content of preprocessor_config.json.
+        model_type: type of the folder's network, for files that name no class.
+        path: path of the file, for error messages.
 
     Raises:
-        GearError: gear does not know the class, or neither file nor network names one.
+        GearError: gear does not implement the class, or neither the file nor the network determines one.
     """
     named = said.get("image_processor_type") or said.get("feature_extractor_type")
     if named is not None:

@@ -1,4 +1,4 @@
-"""Opens networks of transformers from a folder: without network access, pickles, or the folder's own code."""
+"""Opens networks of transformers from a folder, without network access, pickles, or code from the folder."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from gear.values.errors import GearError
 ADAPTER = "write an adapter (docs/how-to/write-a-model.md)"
 
 SHOWN = 240
-"""Characters of transformers' messages that an error quotes."""
+"""Number of characters of transformers' messages that an error quotes."""
 
 OF_TIMM = {"in_chans": "num_channels", "out_indices": "out_indices", "output_stride": "output_stride"}
-"""Keys of `backbone_kwargs` for a backbone of timm before transformers 5, and their current names."""
+"""Keys of `backbone_kwargs` for a backbone of timm in files from before transformers 5, and their current names."""
 
 DILATED_STRIDE_PX = 16
-"""Stride of the last map of a dilated backbone, where the config states none."""
+"""Stride of the last feature map of a dilated backbone if the config states none."""
 
 
 def open_folder(options: FolderOptions, auto: str) -> nn.Module:
-    """The graph of a folder, in float32.
+    """Makes the network of a folder, in float32.
 
     Args:
-        options: of the network.
-        auto: name of the class of transformers that opens this kind of network.
+        options: options of the network, which name the folder.
+        auto: name of the class of transformers that opens this kind of network, such as `AutoModelForDepthEstimation`.
 
     Raises:
         GearError: the folder holds no network of this kind, or is damaged.
@@ -60,7 +60,7 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
 
 
 def start_from(folder_network: Any, auto: str) -> None:
-    """Loads the folder's own weights into a network of that folder: `gear train --init folder`.
+    """Loads the weights in a folder into a network that was made from it (`gear train --init folder`).
 
     Args:
         folder_network: a `gear.networks.huggingface.network.FolderNetwork`.
@@ -74,7 +74,7 @@ def start_from(folder_network: Any, auto: str) -> None:
 
 
 def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, Any]]:
-    """The graph, and what transformers reports about the folder's weights."""
+    """The network, and the report of transformers about missing and unexpected weights."""
     import transformers
 
     kind: Any = getattr(transformers, auto)
@@ -104,9 +104,9 @@ def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, 
 
 
 def _with_backbone(said: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A config.json in which a backbone of timm is described, instead of being named next to its options.
+    """Converts a config.json in which a timm backbone is named next to its options to one in which it is described.
 
-    transformers before version 5 wrote DETRs in the latter form; current versions look the name up on the network.
+    transformers wrote DETRs in the first form before version 5; current versions would look the name up on the network.
     """
     name, options = said.get("backbone"), said.get("backbone_kwargs", {})
     if said.get("use_timm_backbone") is not True or said.get("backbone_config") is not None or not name:
@@ -122,10 +122,10 @@ def _with_backbone(said: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _need_safetensors(folder: Path) -> None:
-    """Refuses pickles, since opening one runs code.
+    """Checks that the weights are safetensors; pickles are refused, since opening one runs code.
 
     Raises:
-        GearError: the folder has no safetensors, or its list of files names other files.
+        GearError: the folder has no safetensors, or its index names other files.
     """
     wanted = "open the network where you trust it and save it again with save_pretrained"
     if not any(folder.glob("*.safetensors")):
@@ -155,17 +155,21 @@ def _refused(folder: Path, auto: str, error: Exception) -> GearError:
 
 
 def in_one_line(error: Exception) -> str:
-    """An exception's type and the beginning of its text."""
+    """An exception's type and the start of its text, in one line."""
     said = " ".join(str(error).split())
     return f"{type(error).__name__}: {said if len(said) <= SHOWN else said[:SHOWN] + '...'}"
 
 
 def _check(graph: nn.Module, found: Mapping[str, Any], folder: Path) -> None:
-    """Refuses weights that transformers initialised at random because the folder lacks them, and numbers that are not
-    finite.
+    """Checks that the folder contains all weights and that they are finite numbers.
+
+    Args:
+        graph: the network.
+        found: report of transformers; it lists weights that were initialised at random.
+        folder: the folder.
 
     Raises:
-        GearError: there are such weights; a classifier, for example, has no head for depth.
+        GearError: weights are missing, such as a head for depth in a classifier's folder, or are not finite.
     """
     name = type(graph).__name__
     lost = sorted(key for key in found.get("missing_keys", ()) if not key.endswith(OPTIONAL))
@@ -184,7 +188,9 @@ def _check(graph: nn.Module, found: Mapping[str, Any], folder: Path) -> None:
 
 @contextlib.contextmanager
 def _offline() -> Iterator[None]:
-    """Inside, no library of Hugging Face accesses the network: `local_files_only` does not hold for backbones."""
+    """Context in which no library of Hugging Face accesses the network; `local_files_only` alone does not cover
+    backbones.
+    """
     from huggingface_hub import constants
 
     was = constants.HF_HUB_OFFLINE
@@ -197,7 +203,7 @@ def _offline() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _quietly() -> Iterator[None]:
-    """Inside, transformers prints neither progress bars nor tables; errors contain what matters of them."""
+    """Context in which transformers prints no progress bars and no tables; errors still contain the important part."""
     from transformers.utils import logging as settings
 
     had_bars, verbosity = settings.is_progress_bar_enabled(), settings.get_verbosity()

@@ -12,20 +12,20 @@ SYNONYMS = {
     "pottedplant": "potted plant", "route": "road", "signboard": "traffic sign", "sofa": "couch", "tree": "vegetation",
     "tvmonitor": "tv", "van": "car",
 }  # fmt: skip
-"""Synonyms from Pascal VOC, ADE20K and similar data sets, used where the name itself is unknown."""
+"""Synonyms from Pascal VOC, ADE20K and similar data sets; they are used for names that gear does not know."""
 
 
 def match(names: Mapping[int, str], known: Mapping[str, int]) -> tuple[dict[int, int], tuple[str, ...]]:
-    """Matches the classes of a network to known classes by name.
+    """Matches the classes of a network with gear's classes by name.
 
-    A name may list several, separated by commas or semicolons, as in ADE20K; the first known one counts.
+    A name may list several names, separated by commas or semicolons, as in ADE20K; the first known one is used.
 
     Args:
-        names: names of the network's classes, by number.
-        known: numbers of the known classes by name, in lower case.
+        names: class names of the network, by its class number.
+        known: gear's class numbers by name, in lower case.
 
     Returns:
-        Numbers of the known classes by the network's numbers, and the names without a match, in the network's order.
+        gear's class numbers by those of the network, and the names without a match in the network's order.
     """
     found = {}
     for index, name in names.items():

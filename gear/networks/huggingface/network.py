@@ -33,21 +33,21 @@ VIEW = "left"
 LOGITS, DEPTH, BOXES, PICTURE = "logits", "depth_m", "pred_boxes", "picture"
 
 UNKNOWN_LOGIT = -50.0
-"""Logit of classes that the network does not have."""
+"""Logit of the classes that the network does not have."""
 
 NEAREST_M = 1e-3
 
 METRIC_TYPES = ("glpn", "zoedepth")
-"""Families all of whose networks predict metres; others state it in `depth_estimation_type`."""
+"""Model types that always predict metres; other depth networks state it in `depth_estimation_type`."""
 
 logger = logging.getLogger(__name__)
 
 
 class FolderNetwork(Network):
-    """A network from a folder, with the image processor of its folder.
+    """Base class of networks from a folder; pictures pass the image processor of the folder.
 
     Attributes:
-        unmatched: names of its classes that the task does not have.
+        unmatched: names of the network's classes that the task does not have.
     """
 
     options: FolderOptions
@@ -63,10 +63,14 @@ class FolderNetwork(Network):
         return self.processor.apply(pictures[VIEW])
 
     def said(self, seen: Tensor, **labels: Any) -> Any:
-        """Runs the graph and returns its output.
+        """Runs the graph.
+
+        Args:
+            seen: input, from `seen`.
+            **labels: labels, for graphs that compute their own losses.
 
         Raises:
-            GearError: the graph fails on them, as with a config.json whose sizes can be built but do not fit.
+            GearError: the graph fails, as with a config.json whose sizes can be built but do not fit each other.
         """
         try:
             return self.graph(pixel_values=seen, **labels)
@@ -79,16 +83,30 @@ class FolderNetwork(Network):
             ) from error
 
     def restored(self, maps: Tensor, pictures: Mapping[str, Tensor], mode: str) -> Tensor:
-        """(B, C, H, W) maps at the size of the pictures, with the margins of the input cut off."""
+        """Maps at the size of the pictures: margins of the network's input are cut off and the rest is resized.
+
+        Args:
+            maps: (B, C, h, w) output of the graph.
+            pictures: the pictures by camera.
+            mode: interpolation mode of torch.
+
+        Returns:
+            (B, C, H, W).
+        """
         size = (int(pictures[VIEW].shape[2]), int(pictures[VIEW].shape[3]))
         return self.processor.restore(maps, size, mode)
 
     def matched(self, known: Mapping[str, int], whose: str) -> dict[int, int]:
-        """Our class numbers by those of the network, matched by name; names without a match go to `unmatched` and the
-        log.
+        """gear's class numbers by those of the network, matched by name.
+
+        Names without a match are stored in `unmatched` and logged.
+
+        Args:
+            known: gear's class numbers by name.
+            whose: name of the set of classes, for messages.
 
         Raises:
-            GearError: nothing matches, or the network's classes have no names.
+            GearError: no name matches, or the network's classes have no names.
         """
         config: Any = self.graph.config
         theirs: dict[int, str] = config.id2label
@@ -106,10 +124,10 @@ class FolderNetwork(Network):
 
 
 class FolderSegmenter(FolderNetwork):
-    """Semantic segmentation: `logits` (B, 19, H, W) over Cityscapes train ids.
+    """Semantic segmentation: the output is `logits` (B, 19, H, W) over Cityscapes train ids.
 
-    Probabilities of several classes of the network that are one of Cityscapes add up. Classes that the network lacks
-    have a logit of -50 and do not count in the loss.
+    If several classes of the network belong to one class of Cityscapes, their probabilities are added. Classes that the
+    network does not have get a logit of -50 and do not count in the loss.
     """
 
     def __init__(self, graph: nn.Module, options: FolderOptions) -> None:
@@ -145,7 +163,7 @@ class FolderSegmenter(FolderNetwork):
 
 
 class FolderDepth(FolderNetwork):
-    """Monocular depth: `depth_m` (B, H, W), metres."""
+    """Monocular depth: the output is `depth_m` (B, H, W) in metres."""
 
     options: DepthFolderOptions
 
@@ -186,10 +204,10 @@ class FolderDepth(FolderNetwork):
 
 
 class FolderDetector(FolderNetwork):
-    """DETR, RT-DETR, YOLOS and similar detectors.
+    """DETR, RT-DETR, YOLOS and similar detectors, with N object queries.
 
-    Outputs: `logits` (B, N, classes) and `pred_boxes` (B, N, 4), centre and size as shares of the picture's width and
-    height.
+    Outputs are `logits` (B, N, classes) and `pred_boxes` (B, N, 4): centre x, centre y, width and height as shares of
+    the picture's width and height.
     """
 
     options: DetectorFolderOptions
@@ -201,18 +219,19 @@ class FolderDetector(FolderNetwork):
         self._categories = self.matched({name: number for number, name in CATEGORY_NAMES.items()}, "COCO")
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`logits` and `pred_boxes`, one row for each of N object queries."""
+        """`logits` and `pred_boxes`, with one row for each of the N object queries."""
         said = self.said(self.seen(pictures))
         return {LOGITS: said.logits, BOXES: said.pred_boxes}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The graph's input and the picture's size, from which the network's own loss is computed."""
+        """The inputs of `losses`: the graph's input and the picture's size."""
         size = torch.tensor(pictures[VIEW].shape[2:], device=self.device)
         return {"seen": self.seen(pictures), PICTURE: size.expand(len(pictures[VIEW]), -1)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The network's own set loss, in float32, against the objects of classes that it has; other objects are
-        ignored.
+        """The set loss of the network itself, in float32.
+
+        Only objects of classes that the network has are targets; other objects are ignored.
         """
         height, width = outputs[PICTURE][0].tolist()
         labels = [self._labels(sample, torch.tensor([width, height] * 2)) for sample in targets]
@@ -220,7 +239,7 @@ class FolderDetector(FolderNetwork):
             return {"set_loss": self.said(outputs["seen"], labels=labels).loss}
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
-        """Detections of COCO classes with at least the least score, by falling score."""
+        """Detections of COCO classes whose score is at least `least_score`, highest score first."""
         scale = torch.tensor([size_px[1], size_px[0]] * 2, device=self.device)
         answers = []
         for logits, boxes in zip(outputs[LOGITS], outputs[BOXES], strict=True):
@@ -242,8 +261,8 @@ class FolderDetector(FolderNetwork):
         return answers
 
     def _scores(self, logits: Tensor) -> Tensor:
-        """(N, classes) probabilities of the classes. For networks with a softmax, all but the likeliest class of a
-        query are 0.
+        """(N, classes) probabilities. For networks with a softmax, only the most likely class of each query
+        keeps its value; the others are 0.
         """
         config: Any = self.graph.config
         if logits.shape[-1] == config.num_labels:

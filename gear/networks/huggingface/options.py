@@ -1,4 +1,4 @@
-"""Options of networks of Hugging Face. torch is not imported, so that specs are quick to make."""
+"""Options of networks of Hugging Face. The module does not import torch, so that plugin specs load quickly."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ class FolderOptions(NetworkOptions):
     """Options of a network from a local folder.
 
     Attributes:
-        folder: written by `save_pretrained`: config.json, model.safetensors and, optionally, preprocessor_config.json.
-            Nothing is downloaded, and neither pickles nor the folder's own code are run.
-        weights: `folder` for the folder's own, `none` for random ones from `seed`, or the path of a safetensors file
-            that gear has trained.
-        input_size: `processor` resizes pictures as the folder's image processor does; `picture` keeps their size,
-            except for what the network needs.
+        folder: folder written by `save_pretrained`, with config.json, model.safetensors and, optionally,
+            preprocessor_config.json. Nothing is downloaded. Pickles and code in the folder are not run.
+        weights: `folder` for the weights in the folder, `none` for random weights drawn with `seed`, or the path of a
+            safetensors file that gear has trained.
+        input_size: `processor` resizes pictures as the folder's image processor does; `picture` keeps their size, apart
+            from what the network requires.
     """
 
     folder: str = ""
@@ -36,7 +36,7 @@ class DepthFolderOptions(FolderOptions):
     Attributes:
         inverse_scale: for networks of relative depth, whose output is an inverse depth without unit: depth in metres is
             1 / (inverse_scale * output + inverse_shift). 0 for networks of metric depth, whose output is in metres.
-        inverse_shift: see `inverse_scale`, in 1/m.
+        inverse_shift: the shift in that formula, 1/m.
     """
 
     inverse_scale: float = 0.0

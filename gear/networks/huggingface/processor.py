@@ -1,4 +1,4 @@
-"""The operations of Hugging Face's image processors in torch, so that gradients pass them."""
+"""The steps of a Hugging Face image processor in torch, so that gradients can pass through them."""
 
 from __future__ import annotations
 
@@ -11,27 +11,29 @@ from torch.nn import functional
 from gear.networks.network import IMAGENET_MEAN, IMAGENET_STD, Normalise
 
 Size = tuple[int, int]
-"""Height and width."""
+"""Height and width in pixels."""
 
 Channels = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Processor:
-    """Resizing, normalisation and margins.
+    """Resizing, normalisation and margins of pictures before a network.
 
     Attributes:
-        mean, std: of each channel of a picture in 0..1.
+        mean, std: normalisation of the three channels of a picture in 0..1.
         size: as in the file: `height` and `width`, or `shortest_edge` and optionally `longest_edge`; empty for no
             resizing.
         mode: interpolation mode of torch.
         multiple_px: sides are multiples of this, which may be a fraction.
-        keeps_ratio: whether `height` and `width` are a frame to which the picture is fitted by the smaller change.
-        rounds_down: whether sides are rounded down to the multiple instead of to the nearest.
-        pads_to_px: at the end, the picture is padded with zeros on all sides to a multiple of this; 0 for no padding.
+        keeps_ratio: whether `height` and `width` only limit the size: the picture keeps its aspect ratio and is scaled
+            by whichever of the two factors changes it less.
+        rounds_down: whether sides are rounded down to a multiple; otherwise to the nearest.
+        pads_to_px: after all other steps, the picture is padded with zeros on all sides to a multiple of this; 0 for no
+            padding.
         has_margin: whether the picture is first extended by reflection.
-        aligns_corners: of the interpolation, which has no anti-aliasing then.
-        is_bgr: whether the network takes BGR.
+        aligns_corners: whether the interpolation aligns corners; such an interpolation has no anti-aliasing.
+        is_bgr: whether the network takes channels in the order blue, green, red.
     """
 
     mean: Channels = IMAGENET_MEAN
@@ -47,7 +49,7 @@ class Processor:
     is_bgr: bool = False
 
     def target(self, picture_px: Size) -> Size:
-        """Height and width to which a picture, with its reflected margin, is resized."""
+        """Height and width to which a picture, including its reflected margin, is resized."""
         height, width = picture_px
         size = self.size or {}
         if "shortest_edge" in size:
@@ -59,7 +61,7 @@ class Processor:
         return self._multiple(scales[0] * height), self._multiple(scales[1] * width)
 
     def apply(self, pictures: Tensor) -> Tensor:
-        """(B, 3, h, w) input of the network from (B, 3, H, W) pictures in 0..1."""
+        """Converts (B, 3, H, W) pictures in 0..1 to the network's input (B, 3, h, w)."""
         rows, columns = self._margin(_size(pictures))
         if rows or columns:
             pictures = functional.pad(pictures, (columns, columns, rows, rows), mode="reflect")
@@ -70,7 +72,9 @@ class Processor:
         return functional.pad(seen, (left, right, top, bottom))
 
     def restore(self, maps: Tensor, picture_px: Size, mode: str) -> Tensor:
-        """(B, C, H, W) over the picture from (B, C, h, w) over the network's input; the margins are cut off."""
+        """Converts (B, C, h, w) maps over the network's input to (B, C, H, W) maps over the picture, without the
+        margins.
+        """
         rows, columns = self._margin(picture_px)
         wide = (picture_px[0] + 2 * rows, picture_px[1] + 2 * columns)
         height, width = self.target(wide)
@@ -97,12 +101,14 @@ class Processor:
         return max(1, int(max(1, int(steps) if self.rounds_down else round(steps)) * self.multiple_px))
 
     def _margin(self, picture_px: Size) -> Size:
-        """Reflected rows at the top and bottom, and columns on the left and right."""
+        """Number of reflected rows at the top and the bottom each, and of reflected columns at the left and the
+        right each.
+        """
         rows, columns = (int(math.sqrt(side / 2) * 3) if self.has_margin else 0 for side in picture_px)
         return rows, columns
 
     def _filled(self, seen_px: Size) -> tuple[int, int, int, int]:
-        """Padded rows at the top and bottom, and columns on the left and right."""
+        """Numbers of padded rows at the top and the bottom, and of padded columns at the left and the right."""
         rows, columns = (-side % self.pads_to_px if self.pads_to_px else 0 for side in seen_px)
         return rows // 2, rows - rows // 2, columns // 2, columns - columns // 2
 
@@ -118,7 +124,7 @@ def _interpolated(maps: Tensor, size_px: Size, mode: str) -> Tensor:
 
 
 def _with_edges(picture_px: Size, edge_px: int, most_px: int | None) -> Size:
-    """The size at which the shorter edge is `edge_px`, or as near to it as the longer edge stays within `most_px`."""
+    """The size at which the shorter edge is `edge_px`, or less if the longer edge would otherwise exceed `most_px`."""
     short, long = min(picture_px), max(picture_px)
     exact: float = edge_px
     if most_px and long / short * edge_px > most_px:

@@ -1,4 +1,4 @@
-"""Reads and checks preprocessor_config.json, the file of an image processor of Hugging Face."""
+"""Reads and checks preprocessor_config.json, the file of a Hugging Face image processor."""
 
 from __future__ import annotations
 
@@ -24,19 +24,21 @@ MOST_PX = 1 << 15
 YOLOS_PATCH_PX = 16
 
 DETR_LONGEST_PX = 1333
-"""For files without `longest_edge`, which state `max_size` or nothing."""
+"""Longest edge for files without `longest_edge`, which state `max_size` or nothing."""
 
 
 def read_processor(folder: Path, *, resizes: bool = True, config: object = None) -> Processor:
-    """The image processor of a folder; without a file, ImageNet's normalisation and no resizing.
+    """The image processor of a folder. If the folder has no file for it, pictures are normalised as for ImageNet and
+    not resized.
 
     Args:
-        folder: of the network.
-        resizes: whether pictures are resized as the file says; what the network needs is done in any case.
-        config: of the network, as transformers has it, for its patch size.
+        folder: folder of the network.
+        resizes: whether pictures are resized as the file says. Changes of size that the network requires are made in
+            any case.
+        config: configuration object of transformers, for the network's patch size.
 
     Raises:
-        GearError: the file is not JSON, or asks for a step that gear does not have.
+        GearError: the file is not JSON, or contains a step that gear does not implement.
     """
     path, beside = folder / FILE, folder / "config.json"
     model_type = str(read_mapping(beside).get("model_type")) if beside.is_file() else ""
@@ -51,10 +53,10 @@ def read_processor(folder: Path, *, resizes: bool = True, config: object = None)
 
 
 def read_mapping(path: Path) -> dict[str, Any]:
-    """The mapping in a JSON file.
+    """Reads a JSON file that must contain a mapping.
 
     Raises:
-        GearError: the file holds no mapping.
+        GearError: the file contains no mapping.
     """
     try:
         facts = json.loads(read_regular(path).decode("utf-8"))
@@ -68,7 +70,9 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
 
 class _Facts:
-    """A file's values with its family's defaults. Every method raises a `GearError` for a value of another kind."""
+    """The values in a file with the defaults of its family. Every method raises `GearError` for a value of the
+    wrong type.
+    """
 
     def __init__(self, family: Family, said: Mapping[str, Any], path: Path) -> None:
         self.family = family
@@ -81,7 +85,7 @@ class _Facts:
         return GearError(f"{self._path}: {key} must be {wanted}, got {self._all.get(key)!r:.80}")
 
     def check_steps(self) -> None:
-        """Refuses steps that gear does not have."""
+        """Refuses steps that gear does not implement."""
         for key in (key for key in self._all if key.startswith("do_")):
             if self.flag(key) and key not in self.family.steps():
                 raise GearError(
@@ -91,28 +95,28 @@ class _Facts:
             raise GearError(f"{self._path}: pad_size is not supported; take it out, and pictures keep their own size")
 
     def flag(self, key: str) -> bool:
-        """Whether a step is switched on; steps that are not mentioned are off."""
+        """Whether a step is switched on; steps that the file does not mention are off."""
         value = self._all.get(key, False)
         if not isinstance(value, bool):
             raise self.refuse(key, "true or false")
         return value
 
     def number(self, key: str) -> float:
-        """The number above 0 under a key."""
+        """The number above 0 that belongs to a key."""
         value = self._all[key]
         if not (_is_number(value) and 0 < value <= MOST_PX):
             raise self.refuse(key, "a number above 0")
         return float(value)
 
     def pixels(self, key: str) -> int:
-        """The number of pixels above 0 under a key."""
+        """The whole number of pixels above 0 that belongs to a key."""
         value = self._all.get(key)
         if not _is_pixels(value):
             raise self.refuse(key, f"a whole number of pixels, 1 to {MOST_PX}")
         return int(value)
 
     def channels(self, key: str, *, is_positive: bool) -> Channels:
-        """The three numbers, one for each channel, under a key."""
+        """The three numbers, one for each channel, that belong to a key."""
         value = self._all[key]
         if (
             not isinstance(value, list | tuple)
@@ -123,14 +127,14 @@ class _Facts:
         return float(value[0]), float(value[1]), float(value[2])
 
     def mode(self) -> str:
-        """The interpolation mode of torch for the file's `resample`."""
+        """torch's interpolation mode for the file's `resample`."""
         value = self._all["resample"]
         if type(value) is not int or value not in RESAMPLING:
             raise self.refuse("resample", "nearest (0), bilinear (2) or bicubic (3)")
         return RESAMPLING[value]
 
     def size(self) -> dict[str, int]:
-        """`height` and `width`, or `shortest_edge` and optionally `longest_edge`."""
+        """The file's `size`: `height` and `width`, or `shortest_edge` and optionally `longest_edge`."""
         value = self._all["size"]
         if _is_pixels(value):
             if self.family.is_square:
@@ -188,7 +192,9 @@ def _multiple_px(name: str, facts: _Facts, size: dict[str, int] | None) -> float
 
 
 def _patch_px(config: object) -> int:
-    """Side of the network's patches, of which sides are multiples; 1 where the config states none."""
+    """Side of the network's patches in pixels, of which the input's sides are multiples; 1 if the config states
+    none.
+    """
     said = [getattr(each, "patch_size", None) for each in (config, getattr(config, "backbone_config", None))]
     return math.lcm(*(int(each) for each in said if _is_pixels(each)))
 

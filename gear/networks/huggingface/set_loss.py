@@ -1,4 +1,4 @@
-"""Set losses of transformers' detectors: in float32, and without background inside ignored objects."""
+"""Set losses of transformers' detectors, computed in float32 and without background inside ignored objects."""
 
 from __future__ import annotations
 
@@ -18,31 +18,40 @@ PAIRS = (
     ("enc_topk_logits", "enc_topk_bboxes"),
     ("enc_outputs_class", "enc_outputs_coord"),
 )
-"""Arguments of the losses with classes and boxes of queries: of the last layer, of all layers, of the encoder."""
+"""Names of the losses' arguments that hold classes and boxes of queries: of the last layer, of all layers, of
+the encoder.
+"""
 
 BATCH_FIRST = "enc_topk_logits"
-"""Losses with this argument take the queries of all layers as (B, layers, …), others as (layers, B, …)."""
+"""Losses that have this argument expect queries of all layers as (B, layers, …); other losses expect (layers, B, …)."""
 
 DENOISING, NOTHING_NOISED = "denoising_meta_values", {"dn_num_split": (0,)}
 NOISED = ("logits", "outputs_class")
-"""In training these begin with queries that are noised boxes of the objects, which always take part."""
+"""In training, the queries of these losses start with noised boxes of the objects; such queries are always used."""
 
 IGNORED = "ignored"
-"""Key of the labels for boxes that are neither targets nor background, in addition to `boxes`."""
+"""Key of the labels for boxes that are neither targets nor background; targets are under `boxes`."""
 
 NEAR = 0.4
 """A query whose IoU with a target's box exceeds this belongs to that target, as with RetinaNet's anchors."""
 
 SURE, FAR = 50.0, 10.0
-"""Background logit and box centre (in sides of the picture) of queries that take no part."""
+"""Background logit and box centre (in sides of the picture) given to queries that the loss must not use."""
 
 
 def set_loss(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any) -> Any:
-    """A loss of transformers for a network's output, computed in float32 whatever the output's precision.
+    """Calls a loss of transformers in float32, whatever the precision of the network's output.
 
-    Queries that lie mostly in ignored objects, and near no target, are replaced by certain background far away: nothing
-    is matched with them, and nothing is learnt from them. Where too few other queries would be left for a picture's
-    objects, all of its queries take part. For losses that match queries in groups, each group is treated separately.
+    Queries that lie mostly inside ignored objects and near no target are replaced by certain background far away. They
+    are then matched with no target and nothing is learnt from them. If too few other queries would be left for the
+    objects of a picture, all of its queries are used. Losses that match queries in groups get this treatment for each
+    group.
+
+    Args:
+        loss: loss function of transformers.
+        device_type: type of the torch device.
+        *said: arguments of the loss.
+        **more: keyword arguments of the loss.
     """
     call = signature(loss).bind(*said, **more)
     given = call.arguments
@@ -59,11 +68,11 @@ def set_loss(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any
 
 
 def is_hidden(boxes: Tensor, labels: Mapping[str, Tensor]) -> Tensor:
-    """(…, N) bool: which queries of a picture take no part in its loss.
+    """(…, N) bool: which queries of a picture the loss must not use.
 
     Args:
-        boxes: (…, N, 4) of the queries, centre and size as shares of the picture's.
-        labels: `boxes` of targets and `ignored`, in the same format.
+        boxes: (…, N, 4) boxes of the queries: centre and size as shares of the picture's size.
+        labels: `boxes` of targets and `ignored` boxes, in the same format.
     """
     from transformers.loss.loss_for_object_detection import box_iou
 
@@ -76,7 +85,7 @@ def is_hidden(boxes: Tensor, labels: Mapping[str, Tensor]) -> Tensor:
 
 
 def _hidden(boxes: Tensor, labels: Sequence[Mapping[str, Tensor]], batch: int, noised: int, group: int) -> Tensor:
-    """(…, N) bool for (…, N, 4) boxes, of which the dimension `batch` counts the pictures."""
+    """(…, N) bool for (…, N, 4) boxes; `batch` is the index of the dimension that counts pictures."""
     count = boxes.shape[-2] - noised
     group = group if count % group == 0 else count
     grouped = boxes[..., noised:, :].reshape(*boxes.shape[:-2], count // group, group, 4)
@@ -85,7 +94,7 @@ def _hidden(boxes: Tensor, labels: Sequence[Mapping[str, Tensor]], batch: int, n
 
 
 def _without(hidden: Tensor, logits: Tensor, boxes: Tensor, classes: int) -> tuple[Tensor, Tensor]:
-    """The queries, with the hidden ones replaced by certain background far away."""
+    """Logits and boxes, with the hidden queries replaced by certain background far away."""
     background, away = torch.full_like(logits, -SURE), torch.zeros_like(boxes)
     if logits.shape[-1] > classes:
         background[..., -1] = SURE

@@ -1,4 +1,4 @@
-"""BiSeNet with Xception39 (Yu et al., arXiv 1808.00897), under the key names of TorchSeg's published weights."""
+"""BiSeNet with Xception39 (Yu et al., arXiv 1808.00897), with the parameter names of TorchSeg's published weights."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ PLANES = 128
 
 
 def upsample(features: Tensor, size: torch.Size) -> Tensor:
-    """Bilinear with aligned corners, as everywhere in this network."""
+    """Bilinear interpolation with aligned corners, as everywhere in this network."""
     return functional.interpolate(features, size=size, mode="bilinear", align_corners=True)
 
 
 class SpatialPath(nn.Module):
-    """Four convolutions to 128 channels at 1/8."""
+    """Four convolutions that give 128 channels at 1/8 of the picture's sides."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -52,7 +52,7 @@ class AttentionRefinement(nn.Module):
 
 
 class FeatureFusion(nn.Module):
-    """Joins both paths; each channel is re-weighted by channel attention (feature fusion module)."""
+    """Joins the spatial and the context path and weights each channel by channel attention (feature fusion module)."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -66,14 +66,14 @@ class FeatureFusion(nn.Module):
         )
 
     def forward(self, spatial: Tensor, context: Tensor) -> Tensor:
-        """Two of (B, 128, H, W) to (B, 256, H, W)."""
+        """Two maps (B, 128, H, W) to one map (B, 256, H, W)."""
         fused: Tensor = self.conv_1x1(torch.cat([spatial, context], dim=1))
         weights: Tensor = self.channel_attention(fused)
         return fused + fused * weights
 
 
 class Head(nn.Module):
-    """Convolutions from features to one logit map per class."""
+    """Convolutions that compute one logit map for each class."""
 
     def __init__(self, inputs: int, planes: int, classes: int) -> None:
         super().__init__()
@@ -87,23 +87,23 @@ class Head(nn.Module):
 
 
 class BiSeNetX39(nn.Module):
-    """A spatial path at 1/8 and a context path down to 1/32 of the picture, fused at 1/8.
+    """BiSeNet: a spatial path at 1/8 of the picture's sides and a context path down to 1/32, joined at 1/8.
 
-    The authors' code interpolates inside and returns log-probabilities. This graph returns logits, whose `log_softmax`
-    they are, and the caller interpolates.
+    The authors' code interpolates to the picture's size and returns log-probabilities. This module returns the smaller
+    logit maps; the caller interpolates and may apply `log_softmax`.
 
     Attributes:
-        align_corners: how the maps are interpolated to the picture's size.
+        align_corners: how the maps must be interpolated to the picture's size.
     """
 
     align_corners = True
 
     def __init__(self, classes: int, *, auxiliary: bool = True) -> None:
-        """Makes the graph with random weights (He initialisation, fan-in).
+        """Makes the network with random weights (He initialisation, fan-in).
 
         Args:
             classes: number of classes.
-            auxiliary: whether it has the two heads that are used in training alone.
+            auxiliary: whether the network has the two heads that only training uses.
         """
         super().__init__()
         self.context_path = Xception39()
@@ -121,14 +121,15 @@ class BiSeNetX39(nn.Module):
                 nn.init.kaiming_normal_(module.weight, mode="fan_in", nonlinearity="relu")
 
     def forward(self, pictures: Tensor, *, auxiliary: bool = False) -> list[Tensor]:
-        """Logits at 1/8 of the picture's size.
+        """Logit maps, smaller than the picture.
 
         Args:
             pictures: (B, 3, H, W), normalised.
-            auxiliary: whether to return the maps of the training heads too.
+            auxiliary: whether the maps of the training heads are returned as well.
 
         Returns:
-            (B, classes, h, w) each: the main head at 1/8, then the training heads at 1/16 and 1/8.
+            Maps (B, classes, h, w): the main head's at 1/8 of the picture's sides, then those of the training heads at
+            1/16 and 1/8.
         """
         spatial = self.spatial_path(pictures)
         eighth, sixteenth, thirty_second = self.context_path(pictures)
@@ -145,10 +146,10 @@ class BiSeNetX39(nn.Module):
         return maps
 
     def taps(self) -> dict[str, nn.Module]:
-        """Feature maps by the names of Z-Mask's paper (Rossolini et al., AAAI 2023).
+        """Feature maps with the names that the Z-Mask paper uses (Rossolini et al., AAAI 2023).
 
-        `spatial_7x7` at 1/2 and `spatial_1x1` at 1/8 of the spatial path; `ct2`, `ct1` and `ct0` at 1/8, 1/16 and 1/32
-        of the context path.
+        `spatial_7x7` at 1/2 and `spatial_1x1` at 1/8 of the picture's sides belong to the spatial path; `ct2`, `ct1`
+        and `ct0` at 1/8, 1/16 and 1/32 to the context path.
         """
         return {
             "spatial_7x7": self.spatial_path.conv_7x7,
@@ -160,5 +161,5 @@ class BiSeNetX39(nn.Module):
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The network's own keys from a checkpoint: the criteria are dropped, the rest is kept."""
+    """The network's tensors from a published checkpoint; those of the loss modules are dropped."""
     return {key: value for key, value in state.items() if not key.startswith(("criterion.", "ohem_criterion."))}

@@ -1,4 +1,4 @@
-"""DDRNet-23-slim (Hong et al., arXiv 2101.06085), under the key names of its authors' published weights."""
+"""DDRNet-23-slim (Hong et al., arXiv 2101.06085), with the parameter names of its authors' published weights."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ BRANCH_PLANES = 128
 HEAD_PLANES = 64
 
 WRAPPER = "model."
-"""Prefix of the training wrapper that the authors save; its criterion has weights too."""
+"""Prefix of the training wrapper that the authors save; its loss module has weights too."""
 
 
 class DDRNet23Slim(nn.Module):
-    """Two branches, at 1/8 and down to 1/64 of the picture, that exchange features twice.
+    """Two branches, one at 1/8 of the picture's sides and one down to 1/64, that exchange features twice.
 
     Attributes:
-        align_corners: how the maps are interpolated to the picture's size.
+        align_corners: how the maps must be interpolated to the picture's size.
     """
 
     align_corners = False
 
     def __init__(self, channels: int, *, auxiliary: bool = True) -> None:
-        """Makes the graph with random weights (He initialisation, fan-out).
+        """Makes the network with random weights (He initialisation, fan-out).
 
         Args:
-            channels: of the output: number of classes, or 1 for a depth map.
-            auxiliary: whether it has the second head, which is used in training alone.
+            channels: number of output channels: number of classes, or 1 for a depth map.
+            auxiliary: whether the network has the second head, which only training uses.
         """
         super().__init__()
         high = PLANES * 2
@@ -62,14 +62,14 @@ class DDRNet23Slim(nn.Module):
                 nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
 
     def forward(self, pictures: Tensor, *, auxiliary: bool = False) -> list[Tensor]:
-        """Output maps at 1/8 of the picture's size.
+        """Output maps at 1/8 of the picture's sides.
 
         Args:
-            pictures: (B, 3, H, W), normalised; sides that are multiples of 8 keep both branches aligned.
-            auxiliary: whether to return the second head's map too.
+            pictures: (B, 3, H, W), normalised. Both branches stay aligned if H and W are multiples of 8.
+            auxiliary: whether the map of the second head is returned as well.
 
         Returns:
-            (B, channels, H / 8, W / 8) each: the main head's, then the second head's.
+            Maps (B, channels, H / 8, W / 8): the main head's, then the second head's.
         """
         relu = functional.relu
         eighth = self.layer2(relu(self.layer1(self.conv1(pictures))))
@@ -88,15 +88,15 @@ class DDRNet23Slim(nn.Module):
         return maps
 
     def taps(self) -> dict[str, nn.Module]:
-        """The residual stages and bottlenecks by the names of Z-Mask's paper (Rossolini et al., AAAI 2023).
+        """Feature maps with the names that the Z-Mask paper uses (Rossolini et al., AAAI 2023).
 
-        `rb1` at 1/4 and `rb2` at 1/8, before the branches separate; `rbb1` at 1/8 and `rbb2` at 1/64, at their ends.
-        All are taken before ReLU.
+        `rb1` at 1/4 and `rb2` at 1/8 of the picture's sides lie before the branches separate; `rbb1` at 1/8 and `rbb2`
+        at 1/64 lie at the ends of the branches. All are taken before the activation ReLU.
         """
         return {"rb1": self.layer1, "rb2": self.layer2, "rbb1": self.layer5_, "rbb2": self.layer5}
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The network's own keys from a checkpoint: the prefix of the training wrapper and its criterion are dropped."""
+    """The network's tensors from a published checkpoint, without the wrapper's prefix and without its loss module."""
     kept = {key: value for key, value in state.items() if not key.startswith("loss.")}
     return {key.removeprefix(WRAPPER): value for key, value in kept.items()}

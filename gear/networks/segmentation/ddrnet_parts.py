@@ -20,12 +20,12 @@ def conv1x1(inputs: int, outputs: int, stride: int = 1) -> nn.Conv2d:
 
 
 def upsample(features: Tensor, like: Tensor) -> Tensor:
-    """Bilinear interpolation to the height and width of another map; corners are not aligned."""
+    """Bilinear interpolation to the height and width of the map `like`; corners are not aligned."""
     return functional.interpolate(features, size=like.shape[2:], mode="bilinear", align_corners=False)
 
 
 class BasicBlock(nn.Module):
-    """Two 3x3 convolutions with a shortcut; the caller chooses whether ReLU follows the sum."""
+    """Two 3x3 convolutions with a shortcut; the caller decides whether a ReLU follows the sum."""
 
     def __init__(self, inputs: int, planes: int, stride: int = 1, *, rectify: bool = True) -> None:
         super().__init__()
@@ -44,7 +44,7 @@ class BasicBlock(nn.Module):
 
 
 class Bottleneck(nn.Module):
-    """1x1, 3x3 and 1x1 convolutions to twice the planes, with a shortcut; no ReLU follows the sum."""
+    """Convolutions 1x1, 3x3 and 1x1 with a shortcut; the output has twice the planes, and no ReLU follows the sum."""
 
     EXPANSION = 2
 
@@ -70,7 +70,7 @@ class Bottleneck(nn.Module):
 
 
 def shortcut(inputs: int, outputs: int, stride: int) -> nn.Sequential | None:
-    """A projection of a block's input to the size of its output; None where both are equal."""
+    """A 1x1 projection that gives a block's input the shape of its output; None if the shapes are equal."""
     if stride == 1 and inputs == outputs:
         return None
     return nn.Sequential(conv1x1(inputs, outputs, stride), nn.BatchNorm2d(outputs))
@@ -82,13 +82,13 @@ def stage(inputs: int, planes: int, stride: int = 1) -> nn.Sequential:
 
 
 def pre_activated(convolution: nn.Conv2d, *pooling: nn.Module) -> nn.Sequential:
-    """Pooling, if any, then batch normalisation, ReLU and a convolution."""
+    """A sequence of pooling (if any), batch normalisation, ReLU and convolution."""
     norm = nn.BatchNorm2d(convolution.in_channels)
     return nn.Sequential(*pooling, norm, nn.ReLU(inplace=True), convolution)
 
 
 class Dappm(nn.Module):
-    """Deep aggregation pyramid pooling: five scales, each refined with the result of the next finer one."""
+    """Deep aggregation pyramid pooling: five scales; each is refined with the result of the next finer scale."""
 
     def __init__(self, inputs: int, branch: int, outputs: int) -> None:
         super().__init__()
@@ -119,7 +119,7 @@ class Dappm(nn.Module):
 
 
 class Head(nn.Module):
-    """Two convolutions from features to the output channels."""
+    """Two convolutions that compute the output channels."""
 
     def __init__(self, inputs: int, planes: int, channels: int) -> None:
         super().__init__()

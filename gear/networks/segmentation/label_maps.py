@@ -1,7 +1,8 @@
-"""The most likely class of each pixel, from a network's smaller logit maps, without logits at the picture's size.
+"""The most likely class of each pixel, computed from smaller logit maps without logits at the picture's size.
 
-Full-size logits take 160 MB at 2048 x 1024: writing and reading them was two fifths of a light network's time.
-Processed in bands they stay in the CPU's cache, with the values of `torch.nn.functional.interpolate`.
+Logits at the size of a 2048 x 1024 picture take 160 MB, and writing and reading them took two fifths of the time of a
+fast network. Here they are interpolated in bands of rows that fit into the CPU's cache, with the same values as
+`torch.nn.functional.interpolate`.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ _BAND_PX = 16
 
 
 def best_class_at(logits: Tensor, size_px: tuple[int, ...], *, align_corners: bool) -> UInt8Image:
-    """(H, W) uint8: the class with the largest of (C, h, w) logits after interpolation; the first of equals.
+    """(H, W) uint8: the class with the largest logit after interpolation; of equal logits the first one.
 
     Args:
-        logits: float32, on the CPU.
-        size_px: height and width.
-        align_corners: as of torch's interpolation.
+        logits: (C, h, w) float32 on the CPU.
+        size_px: height H and width W of the picture.
+        align_corners: as in torch's interpolation.
     """
     height, width = size_px
     inner_height = int(logits.shape[1])
@@ -42,15 +43,17 @@ def best_class_at(logits: Tensor, size_px: tuple[int, ...], *, align_corners: bo
 
 
 def best_class(logits: Tensor) -> UInt8Image:
-    """(H, W) uint8: the class with the largest of (C, H, W) logits; the first of equals.
+    """(H, W) uint8: the class with the largest of (C, H, W) logits; of equal logits the first one.
 
-    Equal to `argmax(0)`, which reads memory out of order and takes twenty times as long on a CPU.
+    The result equals `argmax(0)`, which reads memory in an unfavourable order and takes twenty times as long on a CPU.
     """
     return _first_of_largest(logits.float().numpy()) if logits.device.type == "cpu" else _on_device(logits)
 
 
 def _on_device(logits: Tensor) -> UInt8Image:
-    """The same with operations that are fast on a GPU, whose own `argmax` may return any of equals."""
+    """`best_class` with operations that are fast on a GPU, whose own `argmax` may return any of several equal
+    logits.
+    """
     largest = logits.amax(0)
     best = torch.zeros(largest.shape, dtype=torch.uint8, device=logits.device)
     for index in reversed(range(len(logits))):
@@ -71,8 +74,9 @@ def _first_of_largest(logits: npt.NDArray[np.float32]) -> UInt8Image:
 def _rows(
     inner: int, outer: int, align_corners: bool
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.float32]]:
-    """For each row of a picture, the two rows of a map between which it lies and the weight of the second, in torch's
-    float32 arithmetic.
+    """For each row of the picture: the two rows of the map between which it lies, and the weight of the second one.
+
+    The arithmetic is in float32, as in torch.
     """
     row = np.arange(outer, dtype=np.float32)
     half, one = np.float32(0.5), np.float32(1)

@@ -20,7 +20,7 @@ TRAIN_ID_OF_LABEL_ID[[label.id for label in LABELS]] = [label.train_id for label
 
 
 class SegmentedSample(Protocol):
-    """What the losses read of a sample."""
+    """Protocol of the samples that the losses accept."""
 
     @property
     def label_ids(self) -> npt.NDArray[np.uint8]:
@@ -36,25 +36,28 @@ def train_ids(samples: Sequence[SegmentedSample], device: torch.device) -> Tenso
 
 
 STEP_PX = 2
-"""Training compares every second pixel of every second row: maps at 1/8 hold little more, and it takes a quarter of the
-time.
+"""Training compares only every second pixel of every second row. The maps at 1/8 hold little more detail, and
+this takes a quarter of the time.
 """
 
 
 def offsets_px(index: int) -> tuple[int, int]:
-    """Row and column of the first compared pixel in the picture at a position of the batch; four pictures together
-    cover every pixel position.
+    """Row and column of the first pixel that training compares in the picture with this index in the batch.
+
+    Four consecutive pictures together cover every pixel position.
     """
     return index // STEP_PX % STEP_PX, index % STEP_PX
 
 
 def sampled_logits(maps: Tensor, size_px: Sequence[int], *, align_corners: bool) -> Tensor:
-    """Bilinear interpolation of maps at the pixels that training compares, with the values of full-size interpolation.
+    """Bilinear interpolation of maps, computed only at the pixels that training compares.
+
+    The values equal those of interpolation to the full size.
 
     Args:
         maps: (B, C, h, w) float.
-        size_px: height and width of the pictures, at least `STEP_PX` each.
-        align_corners: whether the centres of the outermost cells and pixels coincide, or their outer borders.
+        size_px: height H and width W of the pictures, at least `STEP_PX` each.
+        align_corners: True if the centres of the outermost cells and pixels coincide, False if their outer borders do.
 
     Returns:
         (B, C, H // STEP_PX, W // STEP_PX).
@@ -71,7 +74,7 @@ def sampled_logits(maps: Tensor, size_px: Sequence[int], *, align_corners: bool)
 
 
 def sampled_ids(ids: Tensor) -> Tensor:
-    """(B, H // STEP_PX, W // STEP_PX): the entries of (B, H, W) ids at the pixels of `sampled_logits`."""
+    """The entries of (B, H, W) ids at the pixels of `sampled_logits`: (B, H // STEP_PX, W // STEP_PX)."""
     height, width = (side // STEP_PX * STEP_PX for side in ids.shape[1:])
     chosen = []
     for index, one in enumerate(ids):
@@ -83,20 +86,21 @@ def sampled_ids(ids: Tensor) -> Tensor:
 def hard_cross_entropy(
     logits: Tensor, ids: Tensor, *, easy: float, least: float, weights: Sequence[float] = ()
 ) -> Tensor:
-    """Cross-entropy over hard pixels: online hard example mining (Shrivastava et al., arXiv 1604.03540), by pixels.
+    """Mean cross-entropy over hard pixels: online hard example mining (Shrivastava et al., arXiv 1604.03540), applied
+    to pixels.
 
-    Pixels whose correct class has a probability below `easy` count; if they are fewer than `least` of all pixels, those
-    with the largest losses count.
+    A pixel counts if the probability of its correct class is below `easy`. If fewer than the share `least` of all
+    pixels count, the pixels with the largest losses count up to that share.
 
     Args:
         logits: (B, C, H, W).
-        ids: (B, H, W) int64, 255 is ignored.
-        easy: probability, 0..1; 1 keeps every pixel.
-        least: share of the pixels that are not ignored, 0..1.
-        weights: of the C classes in the mean; equal by default.
+        ids: (B, H, W) int64 class of each pixel; 255 is ignored.
+        easy: probability, 0..1; with 1 every pixel counts.
+        least: smallest share of the pixels that count, 0..1, without the ignored ones.
+        weights: weight of each of the C classes in the mean; () for equal weights.
 
     Returns:
-        The mean over the pixels that count; 0 where no pixel has a class.
+        Scalar; 0 if no pixel has a class.
     """
     each = functional.cross_entropy(logits, ids, ignore_index=IGNORED_TRAIN_ID, reduction="none").flatten()
     known = (ids != IGNORED_TRAIN_ID).flatten()
@@ -119,18 +123,20 @@ SHARES = (
 """Share of each train id among the pixels of 1005 pictures of gear's towns."""
 
 BALANCED: tuple[float, ...] = tuple(math.log(1.02 + share) ** -0.5 for share in SHARES)
-"""Weights by class, from 2 (road) to 7: square roots of those in Paszke et al., "ENet", arXiv 1606.02147, section 5.2,
-because hard example mining already leaves out most pixels of frequent classes.
+"""Weight of each class in the loss, from 2 (road) to 7: the square root of the weight by Paszke et al., "ENet",
+arXiv 1606.02147, section 5.2. The root is taken because hard example mining already leaves out most pixels of
+frequent classes.
 """
 
 
 class SegmentationLosses:
-    """Hard cross-entropy of the main head and of the training heads.
+    """Hard cross-entropy of the main head and of the training heads; see `hard_cross_entropy`.
 
     Attributes:
-        easy, least: see `hard_cross_entropy`.
-        auxiliary_weight: weight of each training head in the sum that is minimised.
-        weights: by class; () for equal ones.
+        easy: pixels whose correct class has a lower probability count.
+        least: smallest share of the pixels that count.
+        auxiliary_weight: weight of each training head in the sum that training minimises.
+        weights: weight of each class; () for equal weights.
     """
 
     def __init__(
@@ -139,9 +145,11 @@ class SegmentationLosses:
         self.easy, self.least, self.auxiliary_weight, self.weights = easy, least, auxiliary_weight, tuple(weights)
 
     def __call__(self, outputs: Mapping[str, Tensor], targets: Sequence[SegmentedSample]) -> dict[str, Tensor]:
-        """`cross_entropy` of the output `logits`, and one weighted loss for each further output, by its name.
+        """Losses by name: `cross_entropy` for the output `logits`, and one weighted loss for each training head.
 
-        Outputs are (B, 19, H, W) at the size of the labels, or as `sampled_logits` returns them.
+        Args:
+            outputs: (B, 19, H, W) logits by name, at the size of the labels or as `sampled_logits` returns them.
+            targets: the samples of the batch.
         """
         ids = train_ids(targets, outputs["logits"].device)
         if outputs["logits"].shape[2:] != ids.shape[1:]:

@@ -1,4 +1,4 @@
-"""Networks that assign to every pixel one of the 19 classes that Cityscapes evaluates."""
+"""Networks that assign one of the 19 classes that Cityscapes evaluates to every pixel."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ VIEW = "left"
 LOGITS = "logits"
 MAPS = "maps"
 AUXILIARY = "auxiliary"
-"""Outputs of training heads are `auxiliary_0`, `auxiliary_1` and so on."""
+"""Prefix of the names of the training heads' outputs: `auxiliary_0`, `auxiliary_1` and so on."""
 
 STRIDE_PX = 8
-"""Output maps are at 1/8 of the network's input, whose sides are multiples of this."""
+"""Stride of the output maps; the sides of the network's input are multiples of it."""
 
 LABEL_ID_OF_TRAIN_ID = tuple(
     label.id for label in sorted(LABELS, key=lambda label: label.train_id) if label.train_id != IGNORED_TRAIN_ID
@@ -35,15 +35,15 @@ Losses = Callable[[Mapping[str, Tensor], Sequence[Any]], Mapping[str, Tensor]]
 
 
 class SemsegNetwork(Network):
-    """A graph for semantic segmentation.
+    """A graph for semantic segmentation as a gear network.
 
-    Pictures are resized by `input_scale` and to the nearest multiple of 8 on each side (bilinear, with anti-aliasing
-    when reducing); nothing is cropped or padded, and the logits are interpolated back to the picture's size. With
-    `input_scale` 1, pictures whose sides are multiples of 8 are not resized.
+    Pictures are resized by `input_scale` and then to the nearest multiple of 8 on each side (bilinear, with
+    anti-aliasing when reducing). Nothing is cropped or padded, and logits are interpolated back to the picture's size.
+    With `input_scale` 1, pictures whose sides are multiples of 8 are not resized.
 
     Attributes:
-        graph: returns a list of (B, classes, h, w) maps, the main head's first; its `align_corners` says how they are
-            interpolated, and its `taps()` returns its named feature maps.
+        graph: returns a list of maps (B, classes, h, w), the main head's first. Its `align_corners` says how they are
+            interpolated, and its `taps()` returns the named feature maps.
         input_scale: factor by which pictures are resized before the network.
     """
 
@@ -56,9 +56,9 @@ class SemsegNetwork(Network):
 
         Args:
             graph: torch module, as described for the class.
-            options: as the user gave them.
-            losses: of training.
-            input_scale: used where neither the options nor the weights state one.
+            options: options that the user gave.
+            losses: function that computes the training losses.
+            input_scale: default, used if neither the options nor the weights state one.
         """
         super().__init__(graph, options, views=(VIEW,))
         self.input_scale = input_scale if options.input_scale is None else options.input_scale
@@ -71,19 +71,22 @@ class SemsegNetwork(Network):
         return taps
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`logits`: (B, 19, H, W), by Cityscapes train id."""
+        """`logits` (B, 19, H, W), by Cityscapes train id."""
         picture = pictures[VIEW]
         return {LOGITS: self._resized(self._maps(picture, auxiliary=False)[0], picture.shape[2:])}
 
     def run_for_predictions(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """On a CPU `maps`: the graph's own smaller logits, from which predictions are faster; `logits` elsewhere."""
+        """The input of `predictions`: on a CPU `maps`, the graph's own smaller logits, which is faster; on a GPU
+        `logits`.
+        """
         if self.device.type != "cpu":
             return self.run(pictures)
         return {MAPS: self._maps(pictures[VIEW], auxiliary=False)[0]}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`logits`, and `auxiliary_0` and so on of the same shape; in training mode at the pixels of
-        `gear.networks.segmentation.losses.sampled_logits` alone.
+        """The input of `losses`: `logits`, and `auxiliary_0` and so on with the same shape.
+
+        In training mode they are computed only at the pixels of `gear.networks.segmentation.losses.sampled_logits`.
         """
         size_px, align = pictures[VIEW].shape[2:], bool(self.graph.align_corners)
         maps = self._maps(pictures[VIEW], auxiliary=True)
@@ -105,7 +108,7 @@ class SemsegNetwork(Network):
         return [LABEL_IDS[best_class_at(maps, size_px, align_corners=align)] for maps in outputs[MAPS]]
 
     def _maps(self, pictures: Tensor, *, auxiliary: bool) -> list[Tensor]:
-        """The logits of all heads, smaller than the picture, in channels-first memory whatever the graph returns."""
+        """The logits of all heads, smaller than the picture, in channels-first memory format."""
         size_px = pictures.shape[2:]
         inner_px = inner_size(size_px, self.input_scale)
         if inner_px != tuple(size_px):
@@ -120,5 +123,7 @@ class SemsegNetwork(Network):
 
 
 def inner_size(size_px: Sequence[int], scale: float) -> tuple[int, ...]:
-    """Height and width of the network's input: resized, rounded to a multiple of its stride, at least one stride."""
+    """Height and width of the network's input: the picture's sides times `scale`, rounded to multiples of the
+    stride, at least one stride.
+    """
     return tuple(max(1, round(side * scale / STRIDE_PX)) * STRIDE_PX for side in size_px)

@@ -1,4 +1,6 @@
-"""Xception39, BiSeNet's context path (Yu et al., arXiv 1808.00897), under the key names of the published weights."""
+"""Xception39, BiSeNet's context path (Yu et al., arXiv 1808.00897), with the parameter names of the published
+weights.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,7 @@ from torch.nn import functional
 
 STEM_PLANES = 8
 STAGES = ((16, 4), (32, 8), (64, 4))
-"""Middle width and number of blocks of the stages at 1/8, 1/16 and 1/32."""
+"""For the stages at 1/8, 1/16 and 1/32 of the picture's sides: number of planes and number of blocks."""
 
 EXPANSION = 4
 
@@ -63,7 +65,7 @@ class Block(nn.Module):
 
 
 class Xception39(nn.Module):
-    """A stem and three stages."""
+    """The context path of BiSeNet: a stem and three stages."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -75,7 +77,7 @@ class Xception39(nn.Module):
         self.layer3 = _stage(two * EXPANSION, three, last)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Features of (B, 3, H, W): 64 channels at 1/8, 128 at 1/16, 256 at 1/32."""
+        """Three feature maps of (B, 3, H, W) pictures: 64 channels at 1/8 of the sides, 128 at 1/16, 256 at 1/32."""
         eighth = self.layer1(self.maxpool(self.conv1(pictures)))
         sixteenth = self.layer2(eighth)
         return eighth, sixteenth, self.layer3(sixteenth)

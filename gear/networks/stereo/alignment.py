@@ -1,8 +1,9 @@
-"""Dense photometric alignment (Stereo R-CNN, section 4.2): the depth at which a car's pixels in both pictures match
-best.
+"""Dense photometric alignment (Stereo R-CNN, section 4.2): finds the depth at which the pixels of a car match best in
+both pictures.
 
-Each pixel in the lower half of the car's box gets the depth of the box's surface there, relative to that of the box's
-centre. The centre is moved along the depth axis, and the sum of absolute differences between the pictures is minimised.
+Each pixel in the lower half of the car's box gets the depth of the 3D box's surface, relative to the depth of the box's
+centre. The centre is then moved along the depth axis until the sum of absolute differences between the pictures is
+smallest.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from gear.values.geometry import Array
 
 UPSAMPLED = 2
 MOST_SAMPLES = 56
-"""Largest number of rows, and of columns, of a box that are compared; larger boxes are subsampled."""
+"""Largest number of rows, and of columns, that are compared; in larger boxes only some are taken."""
 
 COARSE_STEPS, COARSE_M = 50, 0.5
 FINE_STEPS, FINE_M = 20, 0.05
@@ -31,11 +32,11 @@ NEAREST_M = 1.5
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Pair:
-    """Both pictures at the size at which they are compared.
+    """Both pictures, at the size at which they are compared.
 
     Attributes:
         left, right: (1, 3, h, w) float.
-        scale: factor from the original pictures' size to h and w.
+        scale: factor from the size of the original pictures to h and w.
     """
 
     left: Tensor
@@ -44,8 +45,11 @@ class Pair:
 
     @staticmethod
     def of(left: Tensor, right: Tensor, scale: float) -> Pair:
-        """From (1, 3, H, W) pictures that are `scale` times as large as the original ones; they are enlarged by two
-        again.
+        """Enlarges two pictures by two for the comparison.
+
+        Args:
+            left, right: (1, 3, H, W) pictures.
+            scale: factor from the size of the original pictures to H and W.
         """
         up = [
             functional.interpolate(picture, scale_factor=UPSAMPLED, mode="bilinear", align_corners=False)
@@ -55,13 +59,13 @@ class Pair:
 
 
 def align(pair: Pair, box: Box3d, measured: Measured, calibration: Calibration) -> float | None:
-    """Depth of the box's centre in metres; None where none of its pixels is visible in both pictures.
+    """Depth of the centre of a car's 3D box in metres; None if no pixel of the car is visible in both pictures.
 
     Args:
         pair: the pictures.
         box: estimated 3D box of the car.
         measured: its 2D box and visible columns in the left picture.
-        calibration: of the original pictures.
+        calibration: calibration of the original pictures.
     """
     pixels, behind_m = _surface(pair, box, measured, calibration)
     if not len(pixels):
@@ -75,8 +79,11 @@ def align(pair: Pair, box: Box3d, measured: Measured, calibration: Calibration) 
 
 
 def _surface(pair: Pair, box: Box3d, measured: Measured, calibration: Calibration) -> tuple[Array, Array]:
-    """(P, 2) index pixels of the compared pictures, and (P,) metres from the box's centre to its surface along the
-    depth axis.
+    """Pixels of the car and their depths relative to the centre of its box.
+
+    Returns:
+        (P, 2) index pixels of the compared pictures, and (P,) distances in metres along the depth axis from the centre
+        to the surface.
     """
     top, bottom = measured.left_px[1] * pair.scale, measured.left_px[3] * pair.scale
     left, right = (side * pair.scale for side in measured.borders_px)
@@ -95,7 +102,7 @@ def _surface(pair: Pair, box: Box3d, measured: Measured, calibration: Calibratio
 
 
 def _differences(pair: Pair, pixels: Array, behind_m: Array, depths_m: Array, calibration: Calibration) -> Array:
-    """(D,) mean absolute difference of the pictures for each depth of the box's centre."""
+    """(D,) mean absolute difference between the pictures for each of D depths of the box's centre."""
     reach_px = calibration.intrinsics.focal_px * calibration.baseline_m * pair.scale
     disparities = reach_px / np.maximum(depths_m[:, None] + behind_m[None], NEAREST_M / 2)
     shifted = np.stack([pixels[None, :, 0] - disparities, np.broadcast_to(pixels[:, 1], disparities.shape)], axis=-1)
@@ -105,7 +112,7 @@ def _differences(pair: Pair, pixels: Array, behind_m: Array, depths_m: Array, ca
 
 
 def _sampled(picture: Tensor, pixels: Array) -> Tensor:
-    """(3, D, P) colours at (D, P, 2) index pixels, bilinear; the border's colour outside."""
+    """(3, D, P) colours at (D, P, 2) index pixels, by bilinear interpolation; outside, the border's colour."""
     height, width = picture.shape[-2:]
     grid = 2 * pixels / (width - 1, height - 1) - 1
     places = torch.from_numpy(grid).to(picture)[None]

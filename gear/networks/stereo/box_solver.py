@@ -1,9 +1,9 @@
-"""3D box of a car from its boxes in both pictures and one corner (Stereo R-CNN, section 4).
+"""Computes the 3D box of a car from its boxes in both pictures and one corner (Stereo R-CNN, section 4).
 
-Seven measurements (sides, top and bottom of the left box, sides of the right box, column of the ground corner that is
-visible between the sides) determine position and heading of a box of known size. Which corner of the box produces which
-side depends on the view; the authors choose among eight cases from a table. Here the corners are projected, the
-equations solved, and the corners projected again until the assignment is stable.
+Seven measurements determine position and heading of a box of known size: the four sides of the left box, the left and
+right side of the right box, and the column of the ground corner that is visible between the sides. Which corner of the
+3D box lies on which side depends on the view. The authors choose among eight cases from a table. Here the corners are
+projected, the equations are solved, and the corners are projected again, until the assignment no longer changes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from gear.values.geometry import Array, wrap_angle_rad
 from gear.values.ground_truth import BoxPx
 
 BORDER_PX = (20.0, 10.0)
-"""A side of a box within this distance, in x and y, of the picture's edge may be cut by the picture."""
+"""A side of a 2D box that is nearer than this to the picture's edge (in x and y) may be cut by the picture."""
 
 LEAST_BOX_PX, LEAST_SEEN_PX = 10.0, 3.0
 CORNER_WEIGHT = 2.0
@@ -29,21 +29,23 @@ NEAREST_M = 0.5
 ROUNDS = 5
 
 SIGNS = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)]) / 2
-"""Ground corners in widths to the right and lengths to the front, in the order of the keypoint's four types."""
+"""Positions of the ground corners, as shares of the car's width to the right and of its length to the front, in
+the order of the keypoint's four types.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
-    """A network's measurements of one car, in index pixels of the pictures.
+    """What a network measures of one car, in index pixels of the pictures.
 
     Attributes:
         left_px: box in the left picture: left, top, right, bottom.
         right_sides_px: left and right side of the box in the right picture.
         corner: which ground corner is visible between the sides, 0..3: rear left, front left, front right, rear right,
-            seen from the driver.
+            as seen by the driver.
         corner_px: column of that corner.
         borders_px: first and last column in which the car is not occluded.
-        width_m, height_m, length_m: size.
+        width_m, height_m, length_m: size of the car.
         alpha_rad: observation angle.
     """
 
@@ -59,7 +61,7 @@ class Measured:
 
     @property
     def alpha_of_corner_rad(self) -> float:
-        """Rough observation angle from the corner's position between the sides."""
+        """Rough observation angle, from the position of the corner between the sides."""
         share = (self.corner_px - self.left_px[0]) / max(self.left_px[2] - self.left_px[0], 1e-6)
         turned = math.asin(min(max(share, -1.0), 1.0))
         return wrap_angle_rad((-math.pi / 2, math.pi, math.pi / 2, 0.0)[self.corner] - turned)
@@ -69,12 +71,12 @@ def solve_box(measured: Measured, calibration: Calibration, depth_m: float | Non
     """The 3D box that fits the measurements best, in the least-squares sense.
 
     Args:
-        measured: of one car.
-        calibration: of the pair.
-        depth_m: of the box's centre, where it is known from alignment; the right picture is not used then.
+        measured: measurements of one car.
+        calibration: calibration of the stereo pair.
+        depth_m: depth of the box's centre if it is known from alignment; the right picture is then not used.
 
     Returns:
-        None where the 2D boxes are too small, the car is hardly visible, or no plausible box fits.
+        None if the 2D boxes are too small, the car is hardly visible, or no plausible box fits.
     """
     left, top, right, bottom = measured.left_px
     seen_px = measured.borders_px[1] - measured.borders_px[0]
@@ -113,8 +115,8 @@ def _descend(problem: _Problem, state: Array) -> tuple[float, Array]:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Problem:
-    """Least squares over x, y, z and rotation_y, without z where it is known; residuals in units of the focal
-    length.
+    """Least-squares problem with the unknowns x, y, z (if not known) and rotation_y; residuals are in units of
+    the focal length.
     """
 
     measured: Measured
@@ -154,7 +156,7 @@ class _Problem:
         )
 
     def start(self, alpha_rad: float) -> Array | None:
-        """First guess from the disparity of the 2D boxes' centres and an observation angle."""
+        """First guess of the unknowns, from the disparity of the 2D boxes' centres and an observation angle."""
         z = self.depth_m
         if z is None:
             disparity = float(self.sides.mean() - self.right_sides.mean())
@@ -167,12 +169,12 @@ class _Problem:
         return np.array([x, y, rotation_y] if self.depth_m is not None else [x, y, z, rotation_y])
 
     def whole(self, state: Array) -> tuple[float, float, float, float]:
-        """x, y, z and rotation_y, with the known z filled in."""
+        """x, y, z and rotation_y of a state; a known z is filled in."""
         x, y, *others = (float(value) for value in state)
         return (x, y, self.depth_m if self.depth_m is not None else others[0], others[-1])
 
     def scale(self) -> Array:
-        """Steps of the unknowns that change the picture by about the same amount."""
+        """Step of each unknown that changes the picture by about the same amount."""
         return np.array([1.0, 1.0, 0.3] if self.depth_m is not None else [1.0, 1.0, 10.0, 0.3])
 
     def corners(self, state: Array) -> tuple[Array, float]:
@@ -186,8 +188,8 @@ class _Problem:
         return places, y
 
     def silhouette(self, state: Array) -> tuple[int, ...]:
-        """Indices of the corners that produce the left side, right side, top, bottom, and both sides in the right
-        picture.
+        """Indices of the corners that lie on the left, right, top and bottom side, and on both sides in the
+        right picture.
         """
         places, y = self.corners(state)
         left = places[:, 0] / places[:, 1]

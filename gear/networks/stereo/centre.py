@@ -1,13 +1,14 @@
-"""Siamese networks with a correlation volume that find objects in a rectified pair by their centres.
+"""Stereo networks that find objects in a rectified pair of pictures by their centres.
 
 Both pictures pass the same first layers of a trunk. Their features are correlated over disparities at half the
-resolution (as in DispNetC, Mayer et al., CVPR 2016); the result passes, with the left features, the trunk's other
-layers and a feature pyramid. Each cell of the finest level then says whether an object's centre lies there and what the
-object is (CenterNet, Zhou et al., 2019; StereoCenterNet, Shi et al., 2021; RTS3D, Li et al., AAAI 2021). Heading is a
-distribution over directions (as in Mousavian et al., CVPR 2017), so that a car whose front and rear are confused is not
-placed between both headings. The disparity of an object's centre is the expectation of a distribution over bins with
-equal steps of its logarithm, plus a correction, with an uncertainty. There are no anchors and no matching of boxes;
-everything is differentiable with respect to the pixels.
+resolution (as in DispNetC, Mayer et al., CVPR 2016). The result passes, together with the left features, the trunk's
+other layers and a feature pyramid. Each cell of the finest level then predicts whether the centre of an object lies
+there, and the properties of that object (CenterNet, Zhou et al., 2019; StereoCenterNet, Shi et al., 2021; RTS3D, Li et
+al., AAAI 2021).
+Heading is predicted as a distribution over directions (as in Mousavian et al., CVPR 2017): if front and rear of a car
+are confused, the result is one of both headings and not their mean. Disparity of an object's centre is the expectation
+of a distribution over bins with equal steps of its logarithm, plus a correction, with an uncertainty.
+There are no anchors and no matching of boxes; all outputs are differentiable with respect to the pixels.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 KINDS = ("Car", "Van", "Truck", "Pedestrian", "Cyclist", "Misc")
-"""KITTI's types, in the order of the channels of `heat`."""
+"""KITTI's object types, in the order of the channels of `heat`."""
 
 STRIDE = 4
 MULTIPLE = 32
 MATCHING_STRIDE = 2
 PRIOR_SIZE_M = (1.6, 1.8, 3.9)
 HEADINGS = 24
-"""Number of directions, spaced evenly from 0, over which an observation angle is a distribution."""
+"""Number of directions, evenly spaced from 0, of the distribution of an observation angle."""
 
 PRIOR_HEAT = -4.6
 """Probability of a centre in every cell before training."""
@@ -38,12 +39,12 @@ PRIOR_HEAT = -4.6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoCentreShape:
-    """Size of the network.
+    """Numbers that determine the size of the network.
 
     Attributes:
-        width: channels of the matched features; those of the volume, the pyramid and the heads are multiples.
-        disparities: number of correlated shifts, each of two pixels of the network's input.
-        bins: of an object's disparity.
+        width: number of channels of the matched features; the volume, the pyramid and the heads have multiples of it.
+        disparities: number of correlated shifts; each is two pixels of the network's input.
+        bins: number of bins of an object's disparity.
         disparity_px: smallest and largest disparity of an object's centre, in pixels of the network's input.
     """
 
@@ -67,15 +68,15 @@ def conv_relu(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Seque
 
 
 def correlate(left: Tensor, right: Tensor, disparities: int) -> Tensor:
-    """Cosine similarity of the left features at x and the right features at x - d.
+    """Cosine similarity of the left features at column x and the right features at column x - d.
 
     Args:
         left, right: (B, C, H, W) features of a rectified pair.
-        disparities: d = 0 .. disparities - 1.
+        disparities: number of values of d, which are 0 .. disparities - 1.
 
     Returns:
-        (B, disparities, H, W); 0 where x - d lies outside. Computed in float32, under autocast too: sub-disparity
-            differences are below the precision of bfloat16.
+        (B, disparities, H, W), float32 also under autocast, because differences below one disparity step are smaller
+        than the precision of bfloat16; 0 where x - d lies outside.
     """
     with torch.autocast(left.device.type, enabled=False):
         return _band(left.float(), right.float(), disparities)
@@ -94,7 +95,7 @@ def _band(left: Tensor, right: Tensor, disparities: int) -> Tensor:
 
 
 class Head(nn.Module):
-    """One hidden layer, then the output channels for each cell."""
+    """A hidden layer and an output layer, applied to each cell."""
 
     def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
         super().__init__()
@@ -104,7 +105,7 @@ class Head(nn.Module):
         self.start_at(0.0)
 
     def start_at(self, value: float) -> None:
-        """Sets the bias, which is the output everywhere before training."""
+        """Sets the bias of the output layer, which is the output in every cell before training."""
         assert self.out.bias is not None
         nn.init.constant_(self.out.bias, value)
 
@@ -115,23 +116,26 @@ class Head(nn.Module):
 
 
 class CentreGraph(nn.Module, ABC):
-    """Matching, pyramid and heads, on a trunk that a subclass provides: two normalised pictures to a map by output
-    name.
+    """Base class of the graphs: matching, pyramid and heads. A subclass provides the trunk.
+
+    The input are two normalised pictures, the output is a dictionary of maps.
     """
 
     log_bins: Tensor
 
     corrects_surface: ClassVar[bool] = False
-    """Whether the disparity of an object's centre is predicted as a correction of the surface disparity of the volume.
+    """True if the network predicts the disparity of an object's centre as a correction of the disparity of the
+    visible surface, which follows from the volume alone.
     """
 
     def __init__(self, shape: StereoCentreShape, channels: Sequence[int], pyramid: int) -> None:
         """Builds everything after the trunk.
 
         Args:
-            shape: of the network.
-            channels: of the trunk's maps at 1/2 (both pictures), and at 1/4, 1/8, 1/16 and 1/32 (left picture).
-            pyramid: channels of the pyramid and the heads.
+            shape: size of the network.
+            channels: numbers of channels of the trunk's maps at 1/2 (both pictures) and at 1/4, 1/8, 1/16 and 1/32
+                (left picture).
+            pyramid: number of channels of the pyramid and the heads.
         """
         super().__init__()
         width, (fine, *stages) = shape.width, channels
@@ -159,41 +163,47 @@ class CentreGraph(nn.Module, ABC):
 
     @abstractmethod
     def shared_layers(self) -> Mapping[str, nn.Module]:
-        """The trunk's layers that both pictures pass, by key name.
+        """The layers of the trunk that both pictures pass, by key name.
 
-        They come first, and `left_layers` after those of the volume: hashes of weights depend on the order of the keys.
+        They come before the layers of the volume, and `left_layers` after them: hashes of weights depend on the order
+        of the keys.
         """
 
     @abstractmethod
     def left_layers(self) -> Mapping[str, nn.Module]:
-        """The trunk's layers that the left picture and the volume pass, by key name."""
+        """The layers of the trunk that only the left picture (with the volume) passes, by key name."""
 
     @abstractmethod
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Features of single pictures at strides 2 and 4."""
+        """Feature maps of single pictures at strides 2 and 4."""
 
     @abstractmethod
     def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
-        """Maps of the left pictures at strides 4, 8, 16 and 32, from their features and the volume's at stride 4."""
-
-    def forward(self, left: Tensor, right: Tensor) -> dict[str, Tensor]:
-        """Maps (B, ..., H / 4, W / 4) by name; lengths are in pixels of the pictures given.
+        """Feature maps of the left pictures at strides 4, 8, 16 and 32.
 
         Args:
-            left, right: (B, 3, H, W), H and W multiples of 32.
+            coarse: features of the left pictures at stride 4.
+            volume: features of the correlation volume at stride 4.
+        """
+
+    def forward(self, left: Tensor, right: Tensor) -> dict[str, Tensor]:
+        """Maps (B, ..., H / 4, W / 4) by name; lengths are in pixels of the given pictures.
+
+        Args:
+            left, right: (B, 3, H, W), normalised; H and W are multiples of 32.
 
         Returns:
-            `heat`: logits, one channel for each of `KINDS`.
-            `sides_px`: 4 channels above 0, distances from the cell to the left, top, right and bottom of the object's
-                box.
-            `centre_px`: 2 channels, from the cell to the projection of the object's 3D centre, x and y.
-            `size_m`: 3 channels above 0, height, width and length.
+            `heat`: logits of centres, one channel for each of `KINDS`.
+            `sides_px`: 4 channels above 0: distances from the cell to the left, top, right and bottom side of the
+                object's 2D box.
+            `centre_px`: 2 channels: x and y from the cell to the projection of the object's 3D centre.
+            `size_m`: 3 channels above 0: height, width and length.
             `heading_logits`: one channel for each of `HEADINGS` directions of the observation angle.
-            `hidden`: 1 channel, logit of the occluded share.
-            `disparity_logits`: one channel for each bin.
-            `disparity_px`: 1 channel above 0, of the object's 3D centre.
-            `surface_logits`: one channel for each bin, of the disparity of the visible surface, from the volume alone.
-            `disparity_spread`: 1 channel, logarithm of the expected absolute error of the disparity's logarithm.
+            `hidden`: 1 channel: logit of the occluded share of the object.
+            `disparity_logits`: one channel for each bin of the disparity.
+            `disparity_px`: 1 channel above 0: disparity of the object's 3D centre.
+            `surface_logits`: one channel for each bin: disparity of the visible surface, from the volume alone.
+            `disparity_spread`: 1 channel: logarithm of the expected absolute error of the disparity's logarithm.
         """
         fine, coarse = self.shared(torch.cat([left, right]))
         up = functional.interpolate(self.match_coarse(coarse), scale_factor=2, mode="bilinear", align_corners=False)
@@ -238,15 +248,15 @@ class CentreGraph(nn.Module, ABC):
 
 
 def _exp(raw: Tensor) -> Tensor:
-    """exp with bounds beyond all real objects, so that no weights give infinities."""
+    """exp with limits outside the range of real objects, so that no weights give infinite values."""
     return raw.clamp(-5, 5).exp()
 
 
 def fit_to_network(picture: Tensor, scale: float) -> tuple[Tensor, tuple[float, float]]:
-    """Reduces (B, 3, H, W) pictures and pads them on the right and at the bottom to multiples of 32.
+    """Reduces (B, 3, H, W) pictures and pads them at the right and the bottom to multiples of 32.
 
     Returns:
-        The network's input, and the number of the given picture's pixels for each of its pixels, in x and in y.
+        The network's input, and the number of the given picture's pixels for each pixel of the input, in x and in y.
     """
     height, width = picture.shape[-2:]
     size = (max(1, round(height * scale)), max(1, round(width * scale)))
@@ -257,7 +267,7 @@ def fit_to_network(picture: Tensor, scale: float) -> tuple[Tensor, tuple[float, 
 
 
 def in_picture_px(raw: Mapping[str, Tensor], ratio: tuple[float, float]) -> dict[str, Tensor]:
-    """The graph's outputs with lengths converted to pixels of a picture `ratio` times as large, in x and y."""
+    """Converts lengths in the graph's outputs to pixels of a picture that is `ratio` (in x and in y) times as large."""
     x, y = ratio
     factors = {"sides_px": (x, y, x, y), "centre_px": (x, y), "disparity_px": (x,)}
     return {

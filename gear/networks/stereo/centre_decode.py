@@ -1,4 +1,4 @@
-"""From the outputs of the centre-based stereo network to lines of KITTI's result files."""
+"""Converts outputs of the centre-based stereo network to KITTI labels with scores."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from gear.metrics.boxes import iou_2d
 from gear.values.geometry import Array, Intrinsics, wrap_angle_rad
 
 TRUSTED_M = 1.0
-"""A detection's score is the geometric mean of the probabilities that it is an object, that its depth is correct within
-this distance, and, where it matters, that its axis is correct.
+"""Tolerance of depth in metres. A detection's score is the geometric mean of the probabilities that it is an
+object, that its depth is right within this tolerance, and (for `LONG` kinds) that its axis is right.
 """
 
 LONG = ("Car", "Van", "Truck", "Cyclist")
-"""Kinds whose 3D boxes change much when they are turned."""
+"""Kinds of objects whose 3D boxes change much when they are turned."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Peaks:
-    """Which centres become detections.
+    """Rules by which centres become detections.
 
     Attributes:
-        most: largest number in a picture.
+        most: largest number of detections in a picture.
         least_score: smallest score that is reported.
-        same_overlap: two detections with a larger IoU in the picture are one object, if their depths agree too.
-        same_depth: largest relative difference of the depths of one object's detections.
+        same_overlap: two detections with a larger IoU of their 2D boxes are the same object, if their depths agree too.
+        same_depth: largest relative difference of the depths of two detections of the same object.
     """
 
     most: int = 50
@@ -49,14 +49,14 @@ def decode(
     cell_px: tuple[float, float],
     peaks: Peaks,
 ) -> list[tuple[KittiLabel, ...]]:
-    """The detections of each picture of a batch, by falling score.
+    """The detections of each picture of a batch, highest score first.
 
     Args:
-        outputs: as `gear.networks.stereo.centre.CentreGraph.forward` names them, lengths in pixels of the picture.
-        kinds: KITTI's types in the order of the channels of `heat`.
-        calibration: of the pair.
+        outputs: result of `gear.networks.stereo.centre.CentreGraph.forward`, lengths in pixels of the picture.
+        kinds: KITTI's object types in the order of the channels of `heat`.
+        calibration: calibration of the stereo pair.
         cell_px: width and height of a cell in pixels of the picture.
-        peaks: which centres become detections.
+        peaks: rules by which centres become detections.
     """
     intrinsics = calibration.intrinsics
     heat = outputs["heat"].sigmoid()
@@ -91,7 +91,7 @@ def _plain(tensor: Tensor) -> Array:
 def _label(
     said: Mapping[str, Array], kind: str, chance: float, cell_middle_px: Array, intrinsics: Intrinsics
 ) -> KittiLabel | None:
-    """One detection; None where its box lies outside the picture."""
+    """One detection; None if its box lies outside the picture."""
     middle_m, alpha_rad = said["middle_m"].tolist(), float(said["alpha_rad"])
     depth_m = middle_m[2]
     height_m, width_m, length_m = said["size_m"].tolist()
@@ -124,16 +124,17 @@ def _label(
 
 
 def heading_rad(logits: Array) -> tuple[Array, Array]:
-    """Angles of distributions over directions that are spaced evenly from 0, and the confidence of their axes.
+    """Angles of distributions over directions that are evenly spaced from 0.
 
-    The axis with the highest sum of the probabilities of both ends is chosen, so that confusion of front and rear does
-    not turn it; it is refined by the mean of the best direction and its neighbours. The likelier end is the front.
+    First the axis is chosen for which the probabilities of both of its ends have the largest sum, so that confusion of
+    front and rear does not turn the axis. It is refined by the mean of the best direction and its neighbours. The more
+    likely end is the front.
 
     Args:
         logits: (..., directions).
 
     Returns:
-        (...) angles in [-pi, pi), and (...) confidences in 0..1.
+        (...) angles in [-pi, pi), and (...) confidences 0..1 that the axis is right.
     """
     chances = np.exp(logits - logits.max(axis=-1, keepdims=True))
     chances /= chances.sum(axis=-1, keepdims=True)
@@ -149,7 +150,7 @@ def heading_rad(logits: Array) -> tuple[Array, Array]:
 
 
 def _apart(labels: Sequence[KittiLabel], peaks: Peaks) -> tuple[KittiLabel, ...]:
-    """The detection with the highest score of each object."""
+    """One detection for each object: the one with the highest score."""
     ordered = sorted(labels, key=lambda label: -(label.score or 0.0))
     boxes_px = np.array([label.box_px for label in ordered]).reshape(-1, 4)
     logs = np.log([label.location_m[2] for label in ordered])

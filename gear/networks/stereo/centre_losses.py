@@ -1,4 +1,4 @@
-"""Losses of stereo 3D detection by object centres, from a sample's objects."""
+"""Training targets and losses of the centre-based stereo networks."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ PEAK_SHARE = 0.54 / 6
 """Standard deviation of a centre's Gaussian as a share of the box's side (TTFNet, Liu et al., AAAI 2020)."""
 
 LEAST_SIGMA = 0.7
-"""Smallest standard deviation in cells, so that a small object's Gaussian reaches the neighbouring cells."""
+"""Smallest standard deviation in cells, so that the Gaussian of a small object reaches the neighbouring cells."""
 
 COUNTED_FROM = 0.1
-"""Value of the Gaussian from which on a cell is trained on the object."""
+"""Cells where the Gaussian has at least this value are trained on the object."""
 
 FOCAL_POWER, BUMP_POWER = 2.0, 4.0
 ALMOST_ZERO = 1e-6
 
 
 class LabelledObject(Protocol):
-    """What the losses read of an object; `gear.plugins.tasks.stereo3d.Object3d` provides it."""
+    """Protocol of an object that the losses accept; `gear.plugins.tasks.stereo3d.Object3d` implements it."""
 
     @property
     def kitti_type(self) -> str: ...  # noqa: D102
@@ -50,7 +50,7 @@ class LabelledObject(Protocol):
 
 
 class LabelledPair(Protocol):
-    """What the losses read of a sample."""
+    """Protocol of a sample that the losses accept."""
 
     @property
     def calibration(self) -> Calibration: ...  # noqa: D102
@@ -60,7 +60,7 @@ class LabelledPair(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """The cells of the outputs in the picture.
+    """The grid of the outputs' cells over the picture.
 
     Attributes:
         height, width: number of cells.
@@ -72,25 +72,28 @@ class Grid:
     cell_px: tuple[float, float]
 
     def cell_of(self, u_px: float, v_px: float) -> tuple[float, float]:
-        """Column and row of a point in index pixels; the middle of the first cell is (0, 0)."""
+        """Column and row of the cell at a point (index pixels), as fractions; the middle of the first cell is
+        (0, 0).
+        """
         return (u_px + 0.5) / self.cell_px[0] - 0.5, (v_px + 0.5) / self.cell_px[1] - 0.5
 
     def middles_px(self, rows: Whole, columns: Whole) -> Array:
-        """(N, 2) centres of cells, x and y, in index pixels."""
+        """(N, 2) centres x, y of cells in index pixels."""
         return np.stack([(columns + 0.5) * self.cell_px[0] - 0.5, (rows + 0.5) * self.cell_px[1] - 0.5], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CentreTargets:
-    """Targets of the cells of a batch.
+    """Training targets of the cells of a batch.
 
     Attributes:
-        heat: (B, K, h, w) 0..1, 1 at the cells of the centres.
+        heat: (B, K, h, w) 0..1, 1 at the cells of the centres; K kinds of objects.
         is_counted: (B, 1, h, w) bool; False inside ignored objects.
         where: (N, 3) batch index, row and column of the cells that are trained on an object.
-        weight: (N,) of these; the weights of an object sum to 1.
-        values: (N, 11): sides (4), centre (2), size (3) as the outputs are named, observation angle, occluded share.
-        disparity_px: (N,) of the object's 3D centre.
+        weight: (N,) weight of each of these cells; the weights of one object sum to 1.
+        values: (N, 11) sides (4), centre (2), size (3), observation angle and occluded share, as in the network's
+            outputs.
+        disparity_px: (N,) disparity of the object's 3D centre.
         surface_px: (B, h, w) disparity of visible vehicle surfaces; NaN elsewhere.
     """
 
@@ -104,16 +107,16 @@ class CentreTargets:
 
 
 def centre_targets(samples: Sequence[LabelledPair], kinds: Sequence[str], grid: Grid) -> CentreTargets:
-    """Positions of the labelled objects' centres, and the targets of their cells.
+    """Computes the training targets of a batch from its labelled objects.
 
-    An object's cell is that of the centre of its visible 2D box, which lies in the picture even where the object leaves
-    it. Where cells of two objects coincide, the nearer object has them. Objects of other kinds and ignored ones are no
-    targets, and nothing is learnt from empty cells inside their boxes.
+    The cell of an object is that of the centre of its visible 2D box, which lies in the picture even if the object
+    leaves it. If two objects have the same cell, it belongs to the nearer one. Objects of other kinds and ignored
+    objects are no targets, and empty cells inside their boxes do not count.
 
     Args:
-        samples: a batch.
-        kinds: KITTI's types in the order of the channels of `heat`.
-        grid: of the outputs.
+        samples: the batch.
+        kinds: KITTI's object types in the order of the channels of `heat`.
+        grid: grid of the outputs.
     """
     heat = np.zeros((len(samples), len(kinds), grid.height, grid.width), dtype=np.float32)
     is_counted = np.ones((len(samples), 1, grid.height, grid.width), dtype=np.bool_)
@@ -154,8 +157,8 @@ def centre_targets(samples: Sequence[LabelledPair], kinds: Sequence[str], grid: 
 
 
 def _surface_px(sample: LabelledPair, grid: Grid) -> Array:
-    """(h, w) disparity where the lower half of a sufficiently visible vehicle is; the nearer vehicle where two
-    overlap.
+    """(h, w) disparity of vehicle surfaces, for the lower halves of sufficiently visible vehicles; the nearer
+    one where two overlap.
     """
     lens, reach = sample.calibration.intrinsics, sample.calibration.intrinsics.focal_px * sample.calibration.baseline_m
     surface = np.full((grid.height, grid.width), np.nan)
@@ -200,7 +203,7 @@ def _bump(box_px: BoxPx, grid: Grid) -> Array:
 
 
 def _inside(box_px: BoxPx, grid: Grid) -> tuple[slice, slice]:
-    """Rows and columns of the cells whose centres lie in the box, and one more on each side."""
+    """Rows and columns of the cells whose centres lie in the box, and one more cell on each side."""
     (left, top), (right, bottom) = grid.cell_of(*box_px[:2]), grid.cell_of(*box_px[2:])
     return (
         slice(max(0, math.floor(top)), max(0, math.ceil(bottom) + 1)),
@@ -222,17 +225,19 @@ def _values(thing: LabelledObject, calibration: Calibration, middles_px: Array) 
 def centre_losses(
     outputs: Mapping[str, Tensor], targets: CentreTargets, *, bins_px: Tensor, cell_px: tuple[float, float]
 ) -> dict[str, Tensor]:
-    """The losses of the centre-based network, weighted so that their sum can be minimised.
+    """The losses of the centre-based networks, weighted so that training can minimise their sum.
 
-    `heat` is the focal loss of CenterNet. `disparity` is the negative log-likelihood of a Laplace density over the
-    disparity's logarithm (Kendall and Gal, NeurIPS 2017), so that one unit is one relative error of depth at any
-    distance, plus the cross-entropy of the bins with the target shared between the two nearest ones. `surface` is the
-    same cross-entropy for the disparities that the volume alone predicts for cells on vehicles, which trains the
-    matching features. `heading` is a cross-entropy as well.
+    - `heat`: the focal loss of CenterNet.
+    - `disparity`: negative log-likelihood of a Laplace density over the disparity's logarithm (Kendall and Gal, NeurIPS
+      2017), so that one unit is the same relative error of depth at all distances; plus the cross-entropy of the bins,
+      with the target shared between the two nearest bins.
+    - `surface`: the same cross-entropy for the disparities that the volume alone predicts in cells on vehicles. It
+      trains the matching features.
+    - `heading`: cross-entropy over the directions.
 
     Args:
-        outputs: as `gear.networks.stereo.centre.CentreGraph.forward` names them, lengths in pixels of the picture.
-        targets: of the batch.
+        outputs: result of `gear.networks.stereo.centre.CentreGraph.forward`, lengths in pixels of the picture.
+        targets: training targets of the batch.
         bins_px: (D,) disparities of the bins, in geometric progression.
         cell_px: width and height of a cell in pixels of the picture.
     """

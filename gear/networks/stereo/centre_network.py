@@ -18,8 +18,10 @@ from gear.networks.weights import build_graph
 
 
 class StereoCentreNetwork(Network):
-    """Outputs are those of `gear.networks.stereo.centre.CentreGraph.forward`, with lengths in pixels of the pictures
-    given.
+    """A centre-based stereo network as a gear network.
+
+    Its outputs are those of `gear.networks.stereo.centre.CentreGraph.forward`, with lengths in pixels of the given
+    pictures.
     """
 
     graph: CentreGraph
@@ -34,14 +36,14 @@ class StereoCentreNetwork(Network):
         normalise: Normalise,
         taps: Mapping[str, str],
     ) -> None:
-        """A network with the weights that its options ask for.
+        """Makes the network with the weights that its options name.
 
         Args:
-            options: of the network.
-            name: of the model plugin.
-            make: builds the graph.
-            normalise: applied to pictures in 0..1.
-            taps: layers of the graph by name of the feature map.
+            options: options that the user gave.
+            name: name of the model plugin, which determines the shipped weights.
+            make: function that builds the graph.
+            normalise: normalisation of pictures in 0..1.
+            taps: names of the graph's layers by name of the feature map.
         """
         graph = build_graph(lambda: make(StereoCentreShape(width=options.width)), options, name)
         super().__init__(graph, options, views=(LEFT, RIGHT))
@@ -67,17 +69,17 @@ class StereoCentreNetwork(Network):
         return centre_losses(outputs, centre_targets(targets, KINDS, grid), bins_px=bins_px, cell_px=grid.cell_px)
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
-        """Detections with scores as KITTI labels, for each picture."""
+        """Detections of each picture, as KITTI labels with scores."""
         ratio = self._ratio(size_px)
         cell_px = (STRIDE * ratio[0], STRIDE * ratio[1])
         peaks = Peaks(least_score=self.options.least_score)
         return decode(outputs, KINDS, self.options.calibration(size_px), cell_px, peaks)
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """`layer1` of both pictures, the left ones first; `volume`; `layer2` to `layer4`."""
+        """The feature maps `layer1` (of both pictures, left ones first), `volume`, and `layer2` to `layer4`."""
         return {name: self.graph.get_submodule(layer) for name, layer in self._taps.items()}
 
     def _ratio(self, size_px: tuple[int, ...]) -> tuple[float, float]:
-        """Pixels of a picture of (height, width) for each pixel of the network's input, in x and in y."""
+        """Number of pixels of a picture (height, width) for each pixel of the network's input, in x and in y."""
         height, width = (max(1, round(side * self.input_scale)) for side in size_px)
         return size_px[1] / width, size_px[0] / height

@@ -1,4 +1,4 @@
-"""The centre-based stereo network on a ResNet-18: see `gear.networks.stereo.centre`."""
+"""The centre-based stereo network (`gear.networks.stereo.centre`) on a ResNet-18."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def _channels(shape: StereoCentreShape) -> list[int]:
 
 
 class StereoCentre(CentreGraph):
-    """The graph. Both pictures pass the stem and one stage of the ResNet, the left picture and the volume the other
-    stages.
+    """The graph: both pictures pass the stem and one stage of the ResNet; the left picture and the volume pass
+    the other stages.
     """
 
     stem: nn.Module
@@ -72,12 +72,14 @@ class StereoCentre(CentreGraph):
         }
 
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Feature maps of the stem and the first stage."""
+        """Feature maps of the stem and the first stage, at strides 2 and 4."""
         fine = self.stem(pictures)
         return fine, self.layer1(fine)
 
     def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
-        """Input of the second stage, and the outputs of the other stages."""
+        """Feature maps at strides 4, 8, 16 and 32: the input of the second stage, and the outputs of the later
+        stages.
+        """
         maps = [self.fuse(torch.cat([coarse, volume], dim=1))]
         for layer in (self.layer2, self.layer3, self.layer4):
             maps.append(layer(maps[-1]))

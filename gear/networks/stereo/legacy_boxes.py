@@ -1,7 +1,7 @@
-"""Boxes by the convention of the first Faster R-CNN: right and bottom are the last pixels inside, a side is right -
-left + 1.
+"""Boxes in the convention of the first Faster R-CNN.
 
-All boxes are (…, 4): left, top, right, bottom.
+Right and bottom are the last pixels inside the box, so a side has the length right - left + 1. All boxes are (…, 4):
+left, top, right, bottom.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 MOST_GROWTH = 4.135
-"""Largest logarithm of the size ratio of box and anchor: of 1000 / 16, as in later networks."""
+"""Largest logarithm of the ratio between the sizes of a box and its anchor: log(1000 / 16), as in later networks."""
 
 
 def sides(boxes: Tensor) -> Tensor:
@@ -19,8 +19,10 @@ def sides(boxes: Tensor) -> Tensor:
 
 
 def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
-    """(…, 4) codes: shift of the centre in units of the anchor's sides (x, y), and logarithm of the size ratio (width,
-    height).
+    """(…, 4) codes of boxes relative to anchors.
+
+    A code holds the shift of the centre in units of the anchor's sides (x, y), and the logarithms of the size ratios
+    (width, height).
     """
     own, wanted = sides(anchors), sides(boxes)
     middle, target = anchors[..., :2] + own / 2, boxes[..., :2] + wanted / 2
@@ -28,8 +30,9 @@ def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
 
 
 def decode(codes: Tensor, anchors: Tensor) -> Tensor:
-    """The boxes of codes. As in the original code this is not the exact inverse of `encode`: right and bottom are one
-    pixel larger.
+    """The boxes that belong to codes.
+
+    As in the original code this is not the exact inverse of `encode`: right and bottom are larger by one pixel.
     """
     own = sides(anchors)
     middle = anchors[..., :2] + own / 2 + codes[..., :2] * own
@@ -52,8 +55,9 @@ def overlaps(a: Tensor, b: Tensor) -> Tensor:
 
 
 def left_and_right(six: Tensor) -> tuple[Tensor, Tensor]:
-    """Two (…, 4) codes from (…, 6): x, y, width, height of the left box, x and width of the right box.
+    """Splits (…, 6) codes of box pairs into (…, 4) codes of the left and of the right boxes.
 
-    The pair is rectified, so both boxes have the same rows.
+    The six numbers are x, y, width, height of the left box, and x and width of the right box. Both boxes have the same
+    rows, because the pictures are rectified.
     """
     return six[..., :4], six[..., [4, 1, 5, 3]]

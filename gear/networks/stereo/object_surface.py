@@ -1,4 +1,4 @@
-"""Disparity of visible vehicle surfaces, approximated by their 3D boxes."""
+"""Disparity of visible vehicle surfaces, computed from the vehicles' 3D boxes as an approximation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gear.groundtruth.boxes import Box3d
 from gear.values.geometry import Array
 
 SOLID = ("Car", "Van", "Truck")
-"""Kinds that fill the lower half of their box."""
+"""Kinds of objects that fill the lower half of their box."""
 
 FOOT_SHARE = 0.1
 """Share of a box's height, at the bottom, where the road is visible between the wheels."""
@@ -19,10 +19,10 @@ MOST_OCCLUDED = 0.3
 
 
 def depth_of_box(box: Box3d, rays: Array) -> Array:
-    """(…) depth z at which rays from the camera enter a box; NaN where they miss it.
+    """(…) depth z at which rays from the camera enter a box; NaN for rays that miss it.
 
     Args:
-        box: in the camera's frame, metres.
+        box: 3D box in the camera frame, metres.
         rays: (…, 3) directions with z = 1.
     """
     c, s = math.cos(box.rotation_y_rad), math.sin(box.rotation_y_rad)

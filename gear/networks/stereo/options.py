@@ -1,4 +1,4 @@
-"""Options of the stereo networks, and the calibration that they imply. torch is not imported."""
+"""Options of the stereo networks, and the calibration that follows from them. The module does not import torch."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from gear.values.geometry import Intrinsics
 LEFT, RIGHT = "left", "right"
 
 INPUT_SCALE = 0.5
-"""Of the centre-based network, where neither the user nor the weights state one."""
+"""Input scale of the centre-based network if neither the user nor the weights state one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoOptions(NetworkOptions):
-    """Camera parameters that pictures do not contain. The defaults are those of the task stereo3d.
+    """Camera parameters that the pictures do not contain. The defaults are those of the task stereo3d.
 
     Attributes:
-        hfov_deg: horizontal field of view of the pictures.
-        baseline_m: distance from the left to the right camera.
+        hfov_deg: horizontal field of view of the pictures, degrees.
+        baseline_m: distance from the left to the right camera, metres.
     """
 
     hfov_deg: float = 90.0
@@ -35,7 +35,7 @@ class StereoOptions(NetworkOptions):
             raise FieldError("baseline_m", f"must be 0.01 to 10 m, got {self.baseline_m:g}")
 
     def calibration(self, size_px: tuple[int, ...]) -> Calibration:
-        """The calibration of pictures of (height, width)."""
+        """The calibration of pictures of size (height, width)."""
         intrinsics = Intrinsics.from_hfov(size_px[1], size_px[0], math.radians(self.hfov_deg))
         return Calibration(intrinsics=intrinsics, baseline_m=self.baseline_m)
 
@@ -45,10 +45,10 @@ class StereoCentreOptions(StereoOptions):
     """Options of the centre-based stereo network.
 
     Attributes:
-        width: channels of the features that are matched, and of the ResNet's stem; those of the cost volume, pyramid
-            and heads are multiples.
-        input_scale: factor by which pictures are resized before the network. null takes the factor that the weights
-            were trained for, or 0.5 where they state none.
+        width: number of channels of the features that are matched, and of the ResNet's stem; the cost volume, the
+            pyramid and the heads have multiples of it.
+        input_scale: factor by which pictures are resized before the network. null takes the factor with which the
+            weights were trained, or 0.5 if they state none.
         least_score: smallest score, 0..1, of a detection that is reported.
     """
 
@@ -72,11 +72,12 @@ class StereoRcnnOptions(StereoOptions):
 
     Attributes:
         short_side_px: the pictures are enlarged until their shorter side has this many pixels.
-        considered: number of anchors with the highest scores from which proposals are made; twice as many in training.
+        considered: number of best-scored anchors from which proposals are made; twice as many in training.
         proposals: number of box pairs for the second stage.
         least_score: smallest score, 0..1, of a detection that is reported.
-        aligns: whether depth is refined by dense photometric alignment; otherwise it follows from boxes and keypoint.
-        aligned_bias_px: added to every aligned disparity. The authors add 0.5; the geometry needs none.
+        aligns: whether depth is refined by dense photometric alignment. If not, it follows from the boxes and the
+            keypoint.
+        aligned_bias_px: value added to every aligned disparity. The authors add 0.5; by geometry it should be 0.
     """
 
     short_side_px: int = 600

@@ -1,4 +1,4 @@
-"""From Stereo R-CNN's outputs for box pairs to lines of KITTI's result files."""
+"""Converts Stereo R-CNN's outputs for box pairs to KITTI labels with scores."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class FoundCar:
     """One detected car after non-maximum suppression.
 
     Attributes:
-        score: 0..1.
+        score: confidence, 0..1.
         measured: boxes, corner, size and heading, in index pixels of the original pictures.
     """
 
@@ -35,7 +35,7 @@ class FoundCar:
 def decode_cars(
     said: Mapping[str, Tensor], scale: float, size_px: tuple[int, int], least_score: float
 ) -> list[FoundCar]:
-    """The cars of one picture, by falling score.
+    """The cars of one picture, highest score first.
 
     Args:
         said: outputs of the network for one picture, without the batch dimension.
@@ -90,16 +90,16 @@ def decode_cars(
 def place_car(
     car: FoundCar, calibration: Calibration, pair: Pair | None, aligned_bias_px: float = 0.0
 ) -> KittiLabel | None:
-    """Solves for a car's 3D box, aligns its depth photometrically, and solves again with that depth.
+    """Computes the 3D box of a car: solves for it, aligns its depth photometrically, and solves again with that depth.
 
     Args:
-        car: as decoded.
-        calibration: of the original pictures.
-        pair: the pictures; None keeps the solved depth.
-        aligned_bias_px: added to the aligned disparity.
+        car: a detected car.
+        calibration: calibration of the original pictures.
+        pair: the pictures; None leaves out the alignment.
+        aligned_bias_px: value added to the aligned disparity.
 
     Returns:
-        None where no box fits.
+        None if no box fits.
     """
     box = solve_box(car.measured, calibration)
     if box is None:

@@ -1,9 +1,9 @@
-"""The graph of Stereo R-CNN (Li, Chen, Shen, CVPR 2019), with its authors' key names.
+"""The graph of Stereo R-CNN (Li, Chen, Shen, CVPR 2019), with its authors' parameter names.
 
-A ResNet-101 with a feature pyramid processes each picture. A region proposal network takes both pyramids together and
-proposes pairs of boxes. For each pair the second stage gives a class, a refined pair, size and heading; from the left
-box it also gives which ground corner of the car is visible between the box's sides, and the columns in which the car is
-not occluded.
+A ResNet-101 with a feature pyramid processes each picture. A region proposal network reads both pyramids and proposes
+pairs of boxes. The second stage predicts for each pair a class, a refined pair, size and heading. From the left box it
+also predicts which ground corner of the car is visible between the sides of the box, and the columns in which the car
+is not occluded.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ANCHOR_SIDES = (32, 64, 128, 256, 512)
 STRIDES = (4, 8, 16, 32, 64)
 POOLED = 7
 KEYPOINT_CELLS = 28
-"""Number of columns in a box over which a keypoint is classified."""
+"""Number of columns into which a box is divided to classify the position of a keypoint."""
 
 CORNERS = 4
 LEVEL_AT_SIDE = 224.0
@@ -35,13 +35,13 @@ VARIANCES = "loss_log_variances"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoRcnnShape:
-    """Size of the network; the defaults are the authors'.
+    """Numbers that determine the size of the network; the defaults are the authors'.
 
     Attributes:
-        blocks: in each of the four stages.
-        width: channels of the stem; the stages have 4, 8, 16 and 32 times as many.
-        pyramid, proposals, hidden: channels of the pyramid, the proposal network, the second stage.
-        classes: background included.
+        blocks: number of blocks in each of the four stages.
+        width: number of channels of the stem; the stages have 4, 8, 16 and 32 times as many.
+        pyramid, proposals, hidden: numbers of channels of the pyramid, the proposal network and the second stage.
+        classes: number of classes, background included.
     """
 
     blocks: tuple[int, int, int, int] = (3, 4, 23, 3)
@@ -53,7 +53,7 @@ class StereoRcnnShape:
 
 
 class Bottleneck(nn.Module):
-    """ResNet bottleneck as in Caffe: the stride is in the first convolution."""
+    """ResNet bottleneck as in Caffe: the first convolution has the stride."""
 
     def __init__(self, inputs: int, width: int, stride: int) -> None:
         super().__init__()
@@ -83,7 +83,7 @@ def _stage(inputs: int, width: int, blocks: int, stride: int) -> nn.Sequential:
 
 
 class StereoRpn(nn.Module):
-    """The region proposal network over both pyramids."""
+    """The region proposal network, which reads both pyramids."""
 
     def __init__(self, inputs: int, hidden: int) -> None:
         super().__init__()
@@ -92,10 +92,10 @@ class StereoRpn(nn.Module):
         self.RPN_bbox_pred_left_right = nn.Conv2d(2 * hidden, 6 * len(RATIOS), 1)
 
     def forward(self, left: Sequence[Tensor], right: Sequence[Tensor]) -> tuple[Tensor, Tensor, Tensor]:
-        """Logits (B, A, 2), objectness (B, A) in 0..1, and codes of the box pairs (B, A, 6).
+        """Logits (B, A, 2), objectness (B, A) in 0..1, and codes of box pairs (B, A, 6), for A anchors.
 
-        Proposals are ranked by the objectness of the authors' network, whose softmax pairs channel c with c + 3
-        although anchor a was trained with channels 2 a and 2 a + 1. The published weights rely on it.
+        The authors' softmax pairs channel c with channel c + 3, although anchor a was trained with channels 2 a and 2 a
+        + 1. The published weights rely on that, so proposals are ranked by the same objectness.
         """
         logits, chances, codes = [], [], []
         for one, two in zip(left, right, strict=True):
@@ -110,7 +110,7 @@ class StereoRpn(nn.Module):
 
 
 class StereoRcnn(nn.Module):
-    """The graph. As in the authors' training, batch normalisation and the first two stages are never trained."""
+    """The whole graph. As in the authors' training, batch normalisation and the first two stages are never trained."""
 
     def __init__(self, shape: StereoRcnnShape) -> None:
         super().__init__()
@@ -173,7 +173,7 @@ class StereoRcnn(nn.Module):
                 parameter.requires_grad_(False)
 
     def train(self, mode: bool = True) -> StereoRcnn:
-        """Training mode for all but batch normalisation."""
+        """Training mode for all layers except batch normalisation."""
         super().train(mode)
         for module in self.modules():
             if is_norm(module):
@@ -203,13 +203,13 @@ class StereoRcnn(nn.Module):
         """Outputs of the second stage for R pairs of boxes in one picture.
 
         Args:
-            left, right: levels P2 .. P5 of a batch of one.
-            pairs: (R, 4) left and right boxes in pixels of the network's input.
-            height_px: of that input.
+            left, right: levels P2 .. P5 of the pyramids, for a batch of one.
+            pairs: (R, 4) left and (R, 4) right boxes in pixels of the network's input.
+            height_px: height of that input.
 
         Returns:
-            `class_logits` (R, K); `box_codes` (R, K, 6); `size_and_direction` (R, K, 5): width, height, length, sine
-                and cosine, all encoded; `keypoint_logits` (R, 4, 28); `border_logits` (R, 2, 28): left and right.
+            `class_logits` (R, K); `box_codes` (R, K, 6); `size_and_direction` (R, K, 5): encoded width, height, length,
+            sine and cosine; `keypoint_logits` (R, 4, 28); `border_logits` (R, 2, 28): left and right.
         """
         both = [pooled(left, pairs[0], POOLED, height_px), pooled(right, pairs[1], POOLED, height_px)]
         flat = self.RCNN_top(torch.cat(both, dim=1)).mean(dim=(2, 3))
@@ -225,13 +225,13 @@ class StereoRcnn(nn.Module):
 
 
 def _complete(module: nn.Module, state: dict[str, Any], prefix: str, *_: Any) -> None:
-    """Adds variances of the losses to a published state: the authors store them outside of the network."""
+    """Adds the variances of the losses to a published state, because the authors store them outside the network."""
     assert isinstance(module, StereoRcnn)
     state.setdefault(f"{prefix}{VARIANCES}", module.loss_log_variances.detach())
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """A published state; variances of the losses are added with their initial values where they are missing."""
+    """The tensors of a published state; missing variances of the losses get their initial values."""
     return {VARIANCES: torch.full((len(LOSSES),), FIRST_LOG_VARIANCE), **state}
 
 
@@ -243,14 +243,14 @@ def is_norm(module: nn.Module) -> bool:
 def pooled(levels: Sequence[Tensor], boxes: Tensor, cells: int, height_px: int) -> Tensor:
     """(R, C, cells, cells) features of boxes, each from the pyramid level that suits its size.
 
-    The level is 4 + ln(side / 224), rounded: the authors use the natural logarithm where the paper of feature pyramids
-    has the logarithm to base 2.
+    The level is 4 + ln(side / 224), rounded: the authors use the natural logarithm, although the paper on feature
+    pyramids has the logarithm to base 2.
 
     Args:
-        levels: P2 .. P5 of a batch of one.
+        levels: levels P2 .. P5 of a pyramid, for a batch of one.
         boxes: (R, 4) in pixels of the network's input.
-        cells: cells per side of the grid.
-        height_px: of the network's input.
+        cells: number of cells on each side of the grid.
+        height_px: height of the network's input.
     """
     side = sides(boxes).prod(dim=1).sqrt()
     level = ((side / LEVEL_AT_SIDE).log() + 4).round().clamp(2, 5).long() - 2
@@ -268,7 +268,7 @@ def anchors(levels: Sequence[Tensor]) -> Tensor:
     """(A, 4) anchors in pixels of the network's input, in the order of the proposal network's outputs.
 
     Args:
-        levels: P2 .. P6.
+        levels: feature maps P2 .. P6.
     """
     found = []
     for features, stride, side in zip(levels, STRIDES, ANCHOR_SIDES, strict=True):

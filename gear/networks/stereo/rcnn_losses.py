@@ -19,14 +19,14 @@ from gear.values.geometry import Array
 
 CAR = "Car"
 BOX_DEVIATION = (0.1, 0.1, 0.2, 0.2, 0.1, 0.2)
-"""Divisors of box codes: x, y, width, height of the left box, x and width of the right box."""
+"""Divisors of the six numbers of box codes: x, y, width, height of the left box, x and width of the right box."""
 
 SIZE_MEAN = (1.6, 1.5, 4.0, 0.0, 0.0)
 SIZE_DEVIATION = 0.5
-"""Width, height, length in metres, sine and cosine of the observation angle are coded by this mean and scale."""
+"""Means and scales by which width, height, length (metres), sine and cosine of the observation angle are encoded."""
 
 SIDE_MARGIN_PX = 3.0
-"""A corner within this distance of a side of the box holds no more information than the side."""
+"""A corner that is nearer than this to a side of the box is not used, because it tells no more than the side itself."""
 
 LEAST_HEIGHT_PX, LEAST_SEEN_PX = 10.0, 3.0
 RPN_SAMPLES, RPN_HIGH, RPN_LOW = 256, 0.7, 0.3
@@ -41,7 +41,8 @@ class CarTargets:
     Attributes:
         left, right, union: (N, 4) boxes in the left picture, in the right picture, and around both.
         size_and_direction: (N, 5) width, height, length in metres, sine and cosine of the observation angle.
-        corner_px: (N, 4) columns of the four ground corners; NaN for all but the one that is visible between the sides.
+        corner_px: (N, 4) columns of the four ground corners; NaN except for the corner that is visible between the
+            sides.
         borders_px: (N, 2) first and last column in which no nearer object occludes the car.
         ignored: (M, 4) union boxes of objects that are neither targets nor background.
     """
@@ -60,10 +61,10 @@ class CarTargets:
 
 
 def car_targets(sample: LabelledPair, scale: float) -> CarTargets:
-    """The cars of a sample.
+    """The training targets of a sample.
 
     Args:
-        sample: with its objects.
+        sample: a sample with labelled objects.
         scale: factor from the sample's pictures to the network's input.
     """
     calibration = sample.calibration
@@ -108,7 +109,7 @@ def _is_nearer(one: Box3d, two: Box3d) -> bool:
 
 
 def _pair_of(box: Box3d, calibration: Calibration) -> tuple[Array, Array] | None:
-    """The box in both pictures, clipped; None where it lies outside one of them."""
+    """The projections of a 3D box into both pictures, clipped; None if it lies outside one of them."""
     found = []
     for right_m in (0.0, calibration.baseline_m):
         projected = project_box(box.corners_m - (right_m, 0.0, 0.0), calibration.intrinsics)
@@ -120,8 +121,8 @@ def _pair_of(box: Box3d, calibration: Calibration) -> tuple[Array, Array] | None
 
 
 def _uncovered(left: Array, nearer: Sequence[Array]) -> Array:
-    """(2,) first and last column of the box that no nearer object's box overlaps; twice its left side if all are
-    overlapped.
+    """(2,) first and last column of a box that no nearer object's box overlaps; twice the left side if all
+    columns are overlapped.
     """
     columns = np.arange(math.floor(left[0]), math.floor(left[2]) + 1)
     is_free = np.ones(len(columns), dtype=np.bool_)
@@ -135,7 +136,9 @@ def _uncovered(left: Array, nearer: Sequence[Array]) -> Array:
 
 
 def ground_corners(box: Box3d) -> Array:
-    """(4, 3) corners of the bottom face: rear left, front left, front right, rear right, seen from the driver."""
+    """(4, 3) corners of the bottom face in the camera frame: rear left, front left, front right, rear right, as
+    seen by the driver.
+    """
     c, s = math.cos(box.rotation_y_rad), math.sin(box.rotation_y_rad)
     front, right = np.array([c, 0.0, -s]), np.array([-s, 0.0, -c])
     signs = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)]) / 2
@@ -159,12 +162,12 @@ def rpn_losses(
     """The two losses of the proposal network for one picture: classification and box pairs.
 
     Args:
-        logits: (A, 2).
-        codes: (A, 6).
-        anchors: (A, 4).
-        cars: of the picture.
+        logits: (A, 2) of the anchors.
+        codes: (A, 6) codes of the box pairs.
+        anchors: (A, 4) anchors in pixels of the network's input.
+        cars: training targets of the picture.
         size_px: height and width of the network's input.
-        draws: generator that samples anchors.
+        draws: random generator that samples anchors.
     """
     is_inside = (anchors[:, :2] >= 0).all(dim=1) & (anchors[:, 2] < size_px[1]) & (anchors[:, 3] < size_px[0])
     shared = overlaps(anchors, cars.union)
@@ -194,7 +197,7 @@ def _touches(boxes: Tensor, ignored: Tensor) -> Tensor:
 
 
 def _some(mask: Tensor, most: int, draws: torch.Generator) -> Tensor:
-    """At most so many indices at which the mask is True, drawn without replacement."""
+    """Indices at which the mask is True: at most `most`, drawn without replacement."""
     places = mask.nonzero()[:, 0]
     if len(places) <= most:
         return places
@@ -207,17 +210,17 @@ def _six(left: Tensor, right: Tensor, left_from: Tensor, right_from: Tensor) -> 
 
 
 def smooth_l1(said: Tensor, wanted: Tensor, sigma: float = 1.0) -> Tensor:
-    """Smooth L1: quadratic below 1 / sigma^2, linear above."""
+    """Smooth L1 loss: quadratic for differences below 1 / sigma^2, linear above."""
     return functional.smooth_l1_loss(said, wanted, reduction="none", beta=1 / sigma**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SampledPairs:
-    """Box pairs on which the second stage is trained; those with cars come first.
+    """Box pairs on which the second stage is trained; pairs with cars come first.
 
     Attributes:
-        left, right: (R, 4).
-        owner: (F,) index of the car in each of the first F pairs; the other pairs have none.
+        left, right: (R, 4) boxes.
+        owner: (F,) index of the car for each of the first F pairs; the other pairs show background.
     """
 
     left: Tensor
@@ -226,12 +229,13 @@ class SampledPairs:
 
 
 def sample_pairs(left: Tensor, right: Tensor, cars: CarTargets, draws: torch.Generator) -> SampledPairs:
-    """Samples box pairs from proposals and ground truth: a quarter overlap a car in both pictures, the others partly.
+    """Samples box pairs from proposals and ground truth: a quarter overlap a car in both pictures, the others only
+    partly.
 
     Args:
         left, right: (P, 4) proposals.
-        cars: of the picture.
-        draws: generator that samples pairs.
+        cars: training targets of the picture.
+        draws: random generator that samples pairs.
     """
     left, right = torch.cat([left, cars.left]), torch.cat([right, cars.right])
     if not len(cars.left):
@@ -256,7 +260,7 @@ def region_losses(said: Mapping[str, Tensor], pairs: SampledPairs, cars: CarTarg
     Args:
         said: outputs of `gear.networks.stereo.rcnn_graph.StereoRcnn.regions` for the pairs.
         pairs: the sampled pairs.
-        cars: of the picture.
+        cars: training targets of the picture.
     """
     count, held = max(len(pairs.left), 1), len(pairs.owner)
     labels = torch.zeros(len(pairs.left), dtype=torch.long, device=pairs.left.device)
@@ -281,9 +285,9 @@ def region_losses(said: Mapping[str, Tensor], pairs: SampledPairs, cars: CarTarg
 
 
 def _columns(where_px: Tensor, boxes: Tensor, cells: int) -> Tensor:
-    """(N, K) grid cell of each column in its box; -1 where there is none or it lies outside.
+    """(N, K) grid cell of each column in its box; -1 for missing columns and columns outside the box.
 
-    The box's last column belongs to the last cell; the authors' rounding excludes it, and with it most right borders.
+    The box's last column belongs to the last cell. The authors' rounding excludes it, and with it most right borders.
     """
     start, width = boxes[:, :1], boxes[:, 2:3] - boxes[:, :1] + 1
     cell = ((where_px - start) * cells / width).round()
@@ -291,7 +295,7 @@ def _columns(where_px: Tensor, boxes: Tensor, cells: int) -> Tensor:
 
 
 def _corner_entropy(logits: Tensor, columns: Tensor) -> Tensor:
-    """One cross-entropy over all cells of all four corners: which corner is visible, and where."""
+    """One cross-entropy over all cells of all four corners: it trains which corner is visible, and where."""
     best, corner = columns.max(dim=1)
     return _column_entropy(logits.flatten(1), torch.where(best >= 0, corner * logits.shape[-1] + best, -1))
 

@@ -28,11 +28,11 @@ PROPOSED_IN_TRAINING = 2000
 
 
 class StereoRcnnNetwork(Network):
-    """Stereo R-CNN. Outputs for R box pairs in each picture, in pixels of the network's input:
+    """Stereo R-CNN. Outputs are in pixels of the network's input, with R box pairs for each picture.
 
-    `rpn_logits` (B, A, 2) and `rpn_codes` (B, A, 6) of the anchors; `rois_left` and `rois_right` (B, R, 4), padded with
-    zeros, without gradients; and for each pair what `StereoRcnn.regions` returns. `predict` solves for 3D boxes,
-    without gradients.
+    `rpn_logits` (B, A, 2) and `rpn_codes` (B, A, 6) belong to the anchors. `rois_left` and `rois_right` (B, R, 4) are
+    the proposals, padded with zeros, without gradients. The other outputs are those of `StereoRcnn.regions` for each
+    pair. `predict` solves for 3D boxes, without gradients.
     """
 
     graph: StereoRcnn
@@ -45,10 +45,11 @@ class StereoRcnnNetwork(Network):
     def forward(
         self, views: Mapping[str, Tensor], targets: Sequence[LabelledPair] | None = None
     ) -> Mapping[str, Tensor]:
-        """Outputs, or the six losses, each weighted by its learned variance s: L exp(-s) + s.
+        """Outputs of a batch, or the six losses if `targets` are given.
 
-        Anchors and box pairs for the losses are sampled with `options.seed`, so the same ones each time. In training
-        mode the generator of torch samples them, anew for every picture.
+        Each loss L is weighted by its learned variance s: L exp(-s) + s. Anchors and box pairs for the losses are
+        sampled with `options.seed`, so each call samples the same ones. In training mode torch's own generator samples
+        them anew for every picture.
         """
         if targets is None:
             return super().forward(views)
@@ -61,20 +62,20 @@ class StereoRcnnNetwork(Network):
         return {name: means[name] * (-variances[i]).exp() + variances[i] for i, name in enumerate(LOSSES)}
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """All outputs. Pictures are processed one by one, as in training, so that none depends on the others."""
+        """All outputs. Pictures are processed one by one, as in training, so that no picture depends on the others."""
         each = [self._outputs_of(*self._pyramids(pictures, i)) for i in range(len(pictures[LEFT]))]
         return {name: torch.stack([outputs[name] for outputs in each]) for name in each[0]}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[LabelledPair]) -> Mapping[str, Tensor]:
-        """Not available: the second stage is trained on pairs that are sampled with the targets.
+        """Not available, because the second stage is trained on pairs that are sampled with the targets.
 
         Raises:
-            TypeError: always; `forward` computes the losses.
+            TypeError: always; call `forward` with targets instead.
         """
         raise TypeError("Stereo R-CNN has its losses from pictures: call forward(views, targets)")
 
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[tuple[KittiLabel, ...]]:
-        """The cars of each sample, with depth aligned photometrically."""
+        """The cars of each sample, with depth refined by photometric alignment."""
         found = []
         for sample in samples:
             views = {name: view.to(self.device) for name, view in as_batch([sample], self._views).items()}
@@ -85,13 +86,13 @@ class StereoRcnnNetwork(Network):
         return found
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
-        """The cars as boxes and corners alone determine them; `predict` also has the pictures, on which depth is
-        aligned.
+        """The cars, computed from boxes and corners alone; `predict` also has the pictures and aligns depth with
+        them.
         """
         return self._placed(outputs, size_px, None)
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The stages of the residual network, of the left picture and then of the right one."""
+        """The stages of the residual network. They run on the left picture first, then on the right one."""
         return {f"layer{number}": getattr(self.graph, f"RCNN_layer{number}") for number in (1, 2, 3, 4)}
 
     def _placed(
@@ -119,7 +120,7 @@ class StereoRcnnNetwork(Network):
         return round(size_px[0] * scale), round(size_px[1] * scale)
 
     def _input(self, picture: Tensor) -> Tensor:
-        """(B, 3, H, W) RGB in 0..1, enlarged, as BGR in 0..255 minus the mean."""
+        """Converts (B, 3, H, W) RGB in 0..1 to the network's input: enlarged, BGR in 0..255 minus the mean."""
         size = self._input_size(tuple(picture.shape[-2:]))
         large = functional.interpolate(picture, size=size, mode="bilinear", align_corners=False)
         return large.flip(1) * 255 - large.new_tensor(MEAN_BGR)[:, None, None]
@@ -146,7 +147,7 @@ class StereoRcnnNetwork(Network):
         return propose(chances[0].float(), codes[0].float(), places, size, considered=considered, most=most)
 
     def _draws(self, count: int) -> list[torch.Generator]:
-        """A generator for each picture of a batch."""
+        """A random generator for each picture of a batch."""
         # `gear train` seeds torch's generator at every step, so that a resumed training draws the same.
         if self.training:
             step = int(torch.randint(2**62, ()))

@@ -1,4 +1,4 @@
-"""From the outputs of the proposal network to pairs of boxes."""
+"""Converts outputs of the proposal network to pairs of boxes."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ SAME_OVERLAP = 0.7
 def propose(
     chances: Tensor, codes: Tensor, anchors: Tensor, size_px: tuple[int, int], *, considered: int, most: int
 ) -> tuple[Tensor, Tensor]:
-    """The best pairs of one picture: those that survive suppression among the left boxes and among the right ones.
+    """The best pairs of one picture: those that non-maximum suppression keeps both among the left and among the right
+    boxes.
 
     Gradients end here, as in the authors' network.
 
     Args:
-        chances: (A,) that an anchor holds an object.
-        codes: (A, 6) of its pair.
-        anchors: (A, 4).
+        chances: (A,) probability that an anchor holds an object.
+        codes: (A, 6) codes of the anchors' box pairs.
+        anchors: (A, 4) anchors in pixels of the network's input.
         size_px: height and width of the network's input.
-        considered: how many of the best anchors.
-        most: how many pairs.
+        considered: number of the best anchors that are considered.
+        most: largest number of pairs.
 
     Returns:
-        (R, 4) left and (R, 4) right boxes, R <= most, the best first.
+        (R, 4) left and (R, 4) right boxes, R <= most, best first.
     """
     with torch.no_grad():
         order = chances.argsort(descending=True, stable=True)[:considered]
@@ -43,5 +44,5 @@ def propose(
 
 
 def legacy_nms(boxes: Tensor, scores: Tensor, most_overlap: float) -> Tensor:
-    """Suppression with sides of right - left + 1: (K,) which boxes are kept, surest first."""
+    """(K,) indices of the boxes that non-maximum suppression keeps, best first. Box sides are right - left + 1."""
     return nms(boxes + boxes.new_tensor([0, 0, 1, 1]), scores, most_overlap)

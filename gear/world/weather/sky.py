@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from gear.camera.noise import TILE_PX, periodic_noise, sampled
+from gear.camera.fractal import TILE_PX, periodic_noise, sampled
 from gear.values.rng import derive_rng
 from gear.values.scene import Weather
 

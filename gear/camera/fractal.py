@@ -1,4 +1,7 @@
-"""Periodic fractal noise, reads of textures, and a smooth step."""
+"""Fractal textures (sums of periodic noise at several scales), bilinear reads of textures, and a smooth step.
+
+`gear.camera.effects.noise` is another thing: the noise of the camera's sensor.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,16 @@ _FOLD = 4096
 
 
 def periodic_noise(rng: np.random.Generator, octaves: Sequence[int], slope: float) -> npt.NDArray[np.float32]:
-    """(`TILE_PX`, `TILE_PX`) float32 periodic noise whose values are uniformly distributed over 0..1.
+    """A fractal texture: the sum of smooth periodic noise at several scales, with values uniformly distributed over
+    0..1.
 
     Args:
         rng: generator of the random values.
-        octaves: grid cells per side of each octave, divisors of `TILE_PX`.
-        slope: an octave of n cells has the weight n ** -slope.
+        octaves: number of grid cells per side at each scale, divisors of `TILE_PX`.
+        slope: the scale with n cells has the weight n ** -slope.
+
+    Returns:
+        (`TILE_PX`, `TILE_PX`) float32.
     """
     total = np.zeros((TILE_PX, TILE_PX), np.float32)
     for octave in octaves:
@@ -37,12 +44,12 @@ def periodic_noise(rng: np.random.Generator, octaves: Sequence[int], slope: floa
 def sampled(
     picture: npt.NDArray[np.float32], x: npt.NDArray[Any], y: npt.NDArray[Any], *, is_periodic: bool = True
 ) -> npt.NDArray[np.float32]:
-    """Bilinear reads of a picture.
+    """Bilinear interpolation of a picture at given positions.
 
     Args:
         picture: (H, W) or (H, W, C) float32.
         x, y: (N,) columns and rows, index pixels.
-        is_periodic: whether the picture repeats; otherwise the border is read beyond it.
+        is_periodic: whether the picture repeats. If not, positions outside it read the nearest border pixel.
 
     Returns:
         (N,) or (N, C) float32.
