@@ -1,49 +1,107 @@
-"""The loop of one worker: a scene is rendered while the previous one is measured, encoded and written."""
+"""The loop of one worker: the next scene is rendered while the last one is measured, encoded and written."""
 
 from __future__ import annotations
 
+import traceback
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from gear.collecting.session import Session, Shot
+from gear.contracts.executors import MOST_FAILURES, Outcome, Report
 from gear.dataset.store import Store
+from gear.plugins.text import one_line
+from gear.values.errors import DatasetError, GearError, PlacementError
 
 IN_FLIGHT = 2
-"""Number of frames that may wait for the writer; more would need memory and save no time."""
+"""Frames that may wait for the writer; more would cost memory and save no time."""
+
+NOT_OF_A_SAMPLE = (DatasetError, OSError, MemoryError)
+"""Errors of the disk and of the machine's limits, which are not about one sample."""
 
 
-def collect_samples(session: Session, store: Store, indices: Iterable[int], done: Callable[[int], None]) -> None:
-    """Makes and writes samples; `done` is called when all files of a sample are written.
+def collect_samples(session: Session, store: Store, indices: Iterable[int], report: Report) -> None:
+    """Makes and writes samples, and reports an outcome of each one that is taken from `indices`.
+
+    After `MOST_FAILURES` failures in a row no further sample is taken: something other than the samples is broken.
+
+    Args:
+        session: world and renderer.
+        store: writes the files.
+        indices: of the samples.
+        report: called when the last file of a sample is in place, or when the sample has failed.
 
     Raises:
-        GearError: a sample cannot be made or written; finished samples are kept. If two samples fail at once, the error
-            of the earlier one.
+        DatasetError, OSError, MemoryError: the disk refuses, or a limit of the machine is reached; finished samples
+            stay. Of two such errors at once, that of the earlier sample.
     """
-    waiting: deque[tuple[int, Future[None]]] = deque()
+    waiting: deque[Future[Outcome]] = deque()
+    in_row = 0
 
     def settle(most: int) -> None:
         while len(waiting) > most:
-            index, future = waiting[0]
-            future.result()
+            outcome = waiting[0].result()
             waiting.popleft()
-            done(index)
+            tell(outcome)
+
+    def tell(outcome: Outcome) -> None:
+        nonlocal in_row
+        in_row = in_row + 1 if outcome.kind == "failed" else 0
+        report(outcome)
 
     with ThreadPoolExecutor(max_workers=1, thread_name_prefix="gear-writer") as writer:
         try:
             for index in indices:
-                shot = session.shoot(session.record(index))
-                settle(IN_FLIGHT - 1)
-                waiting.append((index, writer.submit(_write, session, store, shot)))
+                shot = _shoot(session, index)
+                if isinstance(shot, Outcome):
+                    settle(0)
+                    tell(shot)
+                else:
+                    settle(IN_FLIGHT - 1)
+                    waiting.append(writer.submit(_write, session, store, index, shot))
+                if in_row >= MOST_FAILURES:
+                    break
             settle(0)
         except BaseException as error:
             writer.shutdown(wait=True, cancel_futures=True)
             if isinstance(error, Exception):  # an interrupt stays one
-                for _, future in waiting:
+                for future in waiting:
                     if not future.cancelled():
                         future.result()
             raise
 
 
-def _write(session: Session, store: Store, shot: Shot) -> None:
-    store.write(*session.finish(shot))
+def _shoot(session: Session, index: int) -> Shot | Outcome:
+    """The renders of a sample, or its failure."""
+    try:
+        return session.shoot(session.record(index))
+    except Exception as error:
+        return _failure(index, error)
+
+
+def _write(session: Session, store: Store, index: int, shot: Shot) -> Outcome:
+    """Measures, encodes and writes a sample.
+
+    Raises:
+        DatasetError, OSError, MemoryError: as `collect_samples`.
+    """
+    try:
+        files = session.finish(shot)
+    except Exception as error:
+        return _failure(index, error)
+    store.write(*files)
+    return Outcome(index=index)
+
+
+def _failure(index: int, error: Exception) -> Outcome:
+    """The outcome of a sample that failed.
+
+    Raises:
+        DatasetError, OSError, MemoryError: it is such an error.
+    """
+    if isinstance(error, NOT_OF_A_SAMPLE):
+        raise error
+    text = str(error) if isinstance(error, GearError) else one_line(error)
+    trace = "".join(traceback.format_exception(error))
+    # A scene is a pure function of its seed: where one has no place for its actors, a second try finds none either.
+    return Outcome(index=index, kind="failed", error=text, trace=trace, is_final=isinstance(error, PlacementError))

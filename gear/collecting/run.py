@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
-from gear.collecting.forecast import Forecast
 from gear.collecting.job import Job
-from gear.collecting.pipeline import collect_samples
-from gear.collecting.session import open_session
+from gear.collecting.missing import collect_missing
+from gear.contracts.executors import Executor
 from gear.dataset.executors.engines import DEFAULT, open_engine
-from gear.dataset.executors.executor import Done, Executor, InThisProcess
+from gear.dataset.executors.in_process import InThisProcess
 from gear.dataset.plan import manifest_facts
 from gear.dataset.shards import WHOLE, Shard
 from gear.dataset.store import Store
@@ -81,14 +78,15 @@ def run_job(
         callbacks: callbacks that receive the progress.
 
     Raises:
-        GearError: a sample cannot be made or written.
+        SamplesFailedError: some samples could not be made, all others are there.
+        GearError: no sample can be made, or the disk refuses.
     """
     store = Store(job.root, job.plan)
     plugin = find("task", job.config.task)
     part = shard or WHOLE
     with store.begun(job.patch.files, force=force):
         store.refuse_damaged(part)
-        made = _collect_missing(job, store, part, executor or InThisProcess(), callbacks or Callbacks())
+        made = collect_missing(job, store, part, executor or InThisProcess(), callbacks or Callbacks())
         if shard is None:
             task = build(plugin, job.config.options)
             with blamed(plugin, "finalise"):
@@ -100,28 +98,3 @@ def run_job(
         made=made,
         shard=None if shard is None else str(shard),
     )
-
-
-def _collect_missing(job: Job, store: Store, shard: Shard, executor: Executor, callbacks: Callbacks) -> int:
-    """Makes the missing samples of a shard; returns their number."""
-    missing = store.missing(shard)
-    total = len(store.indices(shard))
-    finished = total - len(missing)
-
-    forecast = Forecast(store, len(missing), callbacks.on_warning)
-
-    def done(index: int) -> None:
-        nonlocal finished
-        finished += 1
-        callbacks.on_progress(finished, total)
-        forecast.sample_done(index)
-
-    callbacks.on_progress(finished, total)
-    executor.run(partial(_make_samples, job), missing, done)
-    return len(missing)
-
-
-def _make_samples(job: Job, indices: Iterator[int], done: Done) -> None:
-    """The work of one worker: a world and a renderer, opened once for all of its samples."""
-    with open_session(job) as session:
-        collect_samples(session, Store(job.root, job.plan), indices, done)

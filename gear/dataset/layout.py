@@ -32,6 +32,16 @@ def begun_path(split: str, what: str) -> str:
     return f"{split_folder(split)}/begun/{what}.json"
 
 
+def claim_path(split: str, index: int) -> str:
+    """The claim on a sample by the run that is making it; removed when the sample is there."""
+    return f"{split_folder(split)}/claims/{index:06d}.claim"
+
+
+def failed_path(split: str, index: int) -> str:
+    """A note on a sample that could not be made; removed when the sample is there."""
+    return f"{split_folder(split)}/failed/{index:06d}.json"
+
+
 def manifest_path(split: str) -> str:
     """Path of the manifest, which lists all files of a finished split; written last."""
     return f"{split_folder(split)}/manifest.json"

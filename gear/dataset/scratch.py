@@ -44,11 +44,11 @@ def half_written(folder: int, data: bytes) -> Iterator[str]:
     Raises:
         OSError: a file cannot be written.
     """
-    name = f"{_host()}-{os.getpid()}-{secrets.token_hex(8)}{SUFFIX}"
+    name = unique_name() + SUFFIX
     descriptor = os.open(name, NEW, 0o666, dir_fd=folder)
     try:
         with os.fdopen(descriptor, "wb") as stream:
-            _lock(descriptor)
+            lock_of(descriptor)
             stream.write(data)
             stream.flush()
             os.fsync(descriptor)
@@ -88,18 +88,18 @@ def _is_abandoned(folder: int, name: str) -> bool:
         return False
     descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, dir_fd=folder)
     try:
-        is_free = _lock(descriptor)
+        is_free = lock_of(descriptor)
     finally:
         os.close(descriptor)
     if is_free is False:
         return False
     if is_free and name.endswith(SUFFIX):
         return True
-    is_alive = _is_alive(name)
-    return time.time() - status.st_mtime > OLD_S if is_alive is None else not is_alive
+    alive = is_alive(name)
+    return time.time() - status.st_mtime > OLD_S if alive is None else not alive
 
 
-def _lock(descriptor: int) -> bool | None:
+def lock_of(descriptor: int) -> bool | None:
     """Tries to lock an open file: False if another process or thread holds the lock, None if the file system has no
     locks.
     """
@@ -114,7 +114,7 @@ def _lock(descriptor: int) -> bool | None:
     return True
 
 
-def _is_alive(name: str) -> bool | None:
+def is_alive(name: str) -> bool | None:
     """Whether the process that a file is named after is running and not the current one; None if this machine cannot
     know.
     """
@@ -132,6 +132,11 @@ def _is_alive(name: str) -> bool | None:
     except (OSError, OverflowError):
         return True
     return True
+
+
+def unique_name() -> str:
+    """A name that nobody else uses, from which `is_alive` knows the machine and the process."""
+    return f"{_host()}-{os.getpid()}-{secrets.token_hex(8)}"
 
 
 def _host() -> str:

@@ -9,17 +9,29 @@ from pathlib import Path
 from typing import Any
 
 from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
+from gear.dataset.claims import clear_claims
+from gear.dataset.failures import clear_failures
 from gear.dataset.files import clear_scratch, inside, read_bytes, sha256, sync_folder, write_whole
 from gear.dataset.guarded_paths import owned, refuse_links, remove_empty_folders, remove_file, remove_files
 from gear.dataset.hashing import file_hash, in_threads
 from gear.dataset.json_text import dump_json, load_json
-from gear.dataset.layout import GEAR, begun_path, manifest_path, patch_path, plan_path, sidecar_path, split_folder
+from gear.dataset.layout import (
+    GEAR,
+    begun_path,
+    claim_path,
+    failed_path,
+    manifest_path,
+    patch_path,
+    plan_path,
+    sidecar_path,
+    split_folder,
+)
 from gear.dataset.locks import at_work, is_at_work, turn
 from gear.dataset.plan import Plan, begin, read_plan, refuse_copy, refuse_other_tasks
 from gear.dataset.sealed_json import REPAIR, DamagedError, load_sealed, sealed_json
 from gear.dataset.shards import WHOLE, Shard
 from gear.dataset.sidecar import no_sidecar, read_sidecar, sidecar_bytes
-from gear.values.errors import DatasetError, FieldError, ReplaceableError
+from gear.values.errors import DatasetError, FieldError, ReplaceableError, SamplesFailedError
 from gear.values.serial import Json
 
 
@@ -112,7 +124,7 @@ class Store:
     @contextlib.contextmanager
     def begun(self, patch_files: Mapping[str, bytes], *, force: bool = False) -> Iterator[None]:
         """`open`, for as long as a run writes samples. When a new split fails before its first sample, it is removed
-        again, so that it does not block the next run with another configuration.
+        again, so that it does not block the next run with another configuration; the notes on failed samples are kept.
 
         Args:
             patch_files: as of `open`.
@@ -133,9 +145,9 @@ class Store:
                     self.open(patch_files)
                     work.enter_context(at_work(inside(self.root, split_folder(self.split))))
                 yield
-            except BaseException:
+            except BaseException as error:
                 work.close()
-                if is_new and len(self.missing()) == self.plan.samples:
+                if not isinstance(error, SamplesFailedError) and is_new and len(self.missing()) == self.plan.samples:
                     self._take_back(was_there)
                 raise
 
@@ -298,6 +310,8 @@ class Store:
         notes = owned(self.root, begun).parent
         remove_files(self.root, [_relative(self.root, left) for left in notes.glob("*.json")])
         remove_empty_folders(self.root, _relative(self.root, notes))
+        clear_claims(self.root, self.split)
+        clear_failures(self.root, self.split)
         clear_scratch(self.root)
         sync_folder(target.parent)
 
@@ -374,6 +388,8 @@ def remove_split(root: Path, split: str) -> None:
     refuse_copy(root, split)
     samples = sorted(owned(root, f"{split_folder(split)}/samples").glob("*.json"))
     notes = sorted(owned(root, begun_path(split, "x")).parent.glob("*.json"))
+    notes += sorted(owned(root, failed_path(split, 0)).parent.glob("*.json"))
+    claims = sorted(owned(root, claim_path(split, 0)).parent.glob("*.claim"))
     manifest = folder / "manifest.json"
     listed = _load_if_json(manifest)
     doomed = [_relative(root, manifest), *_files_named(listed)]
@@ -384,6 +400,7 @@ def remove_split(root: Path, split: str) -> None:
         doomed += [*_files_named(_load_if_json(path)), _relative(root, path)]
     label = _patch_label(root, split)
     copies = owned(root, patch_path(label or "none", "patch_0.png")).parent
+    doomed += [_relative(root, path) for path in claims]
     remove_files(root, [*doomed, plan_path(split)])
     remove_empty_folders(root, split_folder(split))
     others = {_patch_label(root, path.parent.name) for path in (root / GEAR).glob("*/plan.json")}

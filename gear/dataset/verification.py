@@ -127,7 +127,12 @@ def unexpected_files(root: Path, checks: Iterable[SplitCheck]) -> list[Finding]:
             relative = _relative(root, path)
             if relative not in known and not path.name.startswith(".") and not path.is_dir():
                 found.append(Finding(path=relative, problem="unexpected"))
-    leftovers = [path for check in checks for path in inside(root, f"{split_folder(check.split)}/begun").glob("*.json")]
+    leftovers = [
+        path
+        for check in checks
+        for kind in ("begun/*.json", "claims/*.claim")
+        for path in inside(root, split_folder(check.split)).glob(kind)
+    ]
     leftovers += inside(root, SCRATCH).glob("*")
     found += [
         Finding(path=_relative(root, path), problem="unexpected", detail="left by a run that was stopped")

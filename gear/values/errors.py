@@ -115,6 +115,10 @@ class DatasetError(GearError):
         return f"{self.path}: {self.problem}"
 
 
+class SamplesFailedError(DatasetError):
+    """A split whose other samples are made, while some could not be; notes in the dataset say why."""
+
+
 class ReplaceableError(DatasetError):
     """Existing output that was made with other settings, or is damaged; `--force` replaces it."""
 

@@ -53,7 +53,7 @@ def test_files_of_another_host_are_cleared_when_they_are_old_and_nobody_holds_th
 
 
 def test_without_locks_age_and_process_decide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_lock", lambda _: None)
+    monkeypatch.setattr(module, "lock_of", lambda _: None)
     kept = [left(tmp_path, f"other-77-a{SUFFIX}"), left(tmp_path, f"{HERE}-{os.getppid()}-a{SUFFIX}")]
     left(tmp_path, f"other-77-b{SUFFIX}", age_s=OLD_S + 1)
     left(tmp_path, f"{HERE}-{finished_process()}-b{SUFFIX}")

@@ -31,8 +31,7 @@ from gear.values.errors import (
     ConfigError,
     DatasetError,
     PatchError,
-    PlacementError,
-    PluginError,
+    SamplesFailedError,
     TownError,
     UnknownNameError,
 )
@@ -396,7 +395,7 @@ def test_limits_that_are_too_tight_say_which(tmp_path: Path, collect_small: Coll
         "town: tiny\nscenes:\n  far:\n    boards: [{position_m: [55, -8.5, 0], facing_deg: 175}]\n"
         "    ego: {ahead_m: [900, 901], lateral_m: [900, 901]}\n"
     )
-    with pytest.raises(PlacementError, match="scene far: "):
+    with pytest.raises(SamplesFailedError, match=r"2 of 2 samples .*scene far: "):
         collect_small("depth", tmp_path / "out", scene="far", settings=[f"scenes={library}"])
 
 
@@ -485,7 +484,7 @@ def test_camera_effects_bend_picture_and_truth_alike_and_are_written_down(
     assert not (tmp_path / "folded").exists(), "nothing was begun"
 
 
-def test_a_third_partys_task_that_fails_is_named_and_ours_keeps_its_traceback(
+def test_a_task_that_fails_is_named_and_the_note_has_the_traceback(
     tmp_path: Path, collect_small: Collect, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from gear.plugins import manager
@@ -495,11 +494,15 @@ def test_a_third_partys_task_that_fails_is_named_and_ours_keeps_its_traceback(
     def fails(*_: Any) -> Any:
         raise KeyError("boom")
 
+    monkeypatch.setattr("gear.collecting.missing.FRESH_TRIES", 0)
     monkeypatch.setattr(DepthTask, "ground_truth", fails)
-    with pytest.raises(KeyError, match="boom"):
+    with pytest.raises(SamplesFailedError, match=r"2 of 2 samples .* \(sample 0: KeyError: 'boom'\).*debug/failed"):
         collect_small("depth", tmp_path / "a")
+    note = json.loads((tmp_path / "a/gear/debug/failed/000001.json").read_text())
+    assert note["error"] == "KeyError: 'boom'" and any("in fails" in line for line in note["traceback"])
     owner = Owner(plugin="their-depth", package="their-package", version="1.2")
     found = tuple(dataclasses.replace(f, owner=owner) for f in manager.catalogue().of_kind("task"))
     monkeypatch.setattr("gear.plugins.build.catalogue", lambda: Catalogue(found))
-    with pytest.raises(PluginError, match=r"plugin depth \(their-package 1\.2\) failed at sample 0: KeyError: 'boom'"):
+    named = r"plugin depth \(their-package 1\.2\) failed at sample 0: KeyError: 'boom'"
+    with pytest.raises(SamplesFailedError, match=named):
         collect_small("depth", tmp_path / "b")

@@ -1,4 +1,8 @@
-"""The engine `processes`: spawned processes on this machine, which take the next index from a shared counter."""
+"""The engine `processes`: spawned processes on this machine, each of which asks for one item after another.
+
+Every worker has a pipe of its own. A queue or counter that all workers share would be left locked when one of them is
+killed at the wrong moment, and the others would wait for ever.
+"""
 
 from __future__ import annotations
 
@@ -6,26 +10,47 @@ import contextlib
 import multiprocessing
 import os
 import pickle
-import queue
 import signal
 import sys
 import threading
+import time
+from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from multiprocessing.queues import Queue
 from typing import Any
 
-from gear.dataset.executors.executor import Done, Executor, Work
+from gear.contracts.executors import MOST_FAILURES, Executor, Outcome, Report, Work
 from gear.values.errors import BackendError, GearError
 
 SILENCE_S = 600.0
-"""Seconds without a finished item after which the workers are considered hung. Graphics drivers can hang, and the
-slowest machines need less than a minute per item.
-"""
+"""Seconds without a finished item after which a worker is considered hung: graphics drivers do hang, and the slowest
+machines need less than a minute per item."""
 
 INTERRUPTED = 130
-"""Exit code of a worker that was interrupted while it was making an item."""
+"""Exit code of a worker that was interrupted before it had finished its item."""
+
+AGAIN = "run the same command again: finished samples are kept"
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Worker:
+    """One worker process, as its parent knows it.
+
+    Attributes:
+        process: the process.
+        pipe: the parent's end of its pipe.
+        held: indices of the items that it has taken and not reported.
+        has_taken: whether it has asked for an item.
+        heard_s: time of its last message, on the monotonic clock.
+    """
+
+    process: SpawnProcess
+    pipe: Connection
+    held: list[int] = field(default_factory=list)
+    has_taken: bool = False
+    heard_s: float = field(default_factory=time.monotonic)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,48 +58,144 @@ class Processes:
     """Several worker processes on this machine.
 
     Attributes:
-        workers: number of processes.
-        backend: name of the renderer, which may make a worker die or hang, for error messages.
+        workers: their number.
+        backend: name of what may make a worker die or hang, such as a renderer; errors name it.
     """
 
     workers: int
     backend: str
 
-    def run(self, work: Work, indices: Sequence[int], done: Done) -> None:
-        """Runs all items; see `Executor.run`.
+    def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
+        """As `Executor.run`. A worker that dies or hangs is replaced; the items that it held are reported as failed.
 
         Raises:
-            GearError: a worker reported an error.
-            BackendError: a worker died or hung.
+            GearError: the first one that a worker reports.
+            BackendError: a worker died or hung before its first item, or was interrupted.
         """
-        context = multiprocessing.get_context("spawn")
-        reports: Queue[tuple[str, Any]] = context.Queue()
-        position = context.Value("q", 0)
-        processes = [
-            context.Process(target=_work, args=(work, list(indices), position, reports), daemon=True, name=f"gear-{i}")
-            for i in range(min(self.workers, len(indices)))
-        ]
+        pool = _Pool(backend=self.backend, work=work, pending=deque(indices), report=report)
         try:
-            with _no_interrupts():  # workers inherit the mask, so that Ctrl-C does not stop them amid their imports
-                for process in processes:
-                    process.start()
-            _listen(self.backend, processes, reports, len(indices), done)
+            for _ in range(min(self.workers, len(indices))):
+                pool.start()
+            pool.listen()
         finally:
-            started = [process for process in processes if process.pid is not None]
-            for process in started:
-                process.terminate()
-            for process in started:
-                process.join(timeout=10)
+            pool.stop()
 
 
-def executor(*, workers: int, backend: str) -> Executor:
-    """Makes the engine; called by `open_engine`."""
+def executor(*, workers: int, backend: str, address: str | None = None) -> Executor:
+    """The engine, as `open_engine` asks for it.
+
+    Raises:
+        GearError: an address is given.
+    """
+    if address is not None:
+        raise GearError("--address is for engines of several machines; name one with --engine ray or --engine slurm")
     return Processes(workers=workers, backend=backend)
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Pool:
+    """The worker processes of one run.
+
+    Attributes:
+        backend, work, report: as in `Processes` and `Executor.run`.
+        pending: indices that no worker has taken.
+        workers: those that run.
+        deaths: workers that died since the last item was made.
+    """
+
+    backend: str
+    work: Work
+    pending: deque[int]
+    report: Report
+    workers: list[_Worker] = field(default_factory=list)
+    deaths: int = 0
+
+    def start(self) -> None:
+        """Starts a worker."""
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        name = f"gear-{len(self.workers)}"
+        process = context.Process(target=_work, args=(self.work, theirs), daemon=True, name=name)
+        with _no_interrupts():  # the worker inherits the mask, so that Ctrl-C does not stop it amid its imports
+            process.start()
+            theirs.close()  # so that the pipe ends with the worker
+            self.workers.append(_Worker(process=process, pipe=ours))
+
+    def listen(self) -> None:
+        """Serves the workers until all have ended.
+
+        Raises:
+            GearError: as `Processes.run`.
+        """
+        while self.workers:
+            by_pipe: dict[Any, _Worker] = {worker.pipe: worker for worker in self.workers}
+            for pipe in wait(list(by_pipe), timeout=1.0):
+                worker = by_pipe[pipe]
+                try:
+                    message = worker.pipe.recv()
+                except (EOFError, OSError):
+                    self._ended(worker)
+                else:
+                    worker.heard_s = time.monotonic()
+                    self._answer(worker, message)
+            for worker in [one for one in self.workers if time.monotonic() - one.heard_s > SILENCE_S]:
+                self._lost(worker, f"no sample for {SILENCE_S:g} s, the driver seems to hang")
+
+    def _answer(self, worker: _Worker, message: Any) -> None:
+        if isinstance(message, GearError):
+            raise message
+        if message is None:  # it asks for an item
+            worker.has_taken = True
+            index = self.pending.popleft() if self.pending else None
+            if index is not None:
+                worker.held.append(index)
+            with contextlib.suppress(OSError):  # it died meanwhile, which ends its pipe
+                worker.pipe.send(index)
+            return
+        assert isinstance(message, Outcome)
+        worker.held.remove(message.index)
+        self.deaths = self.deaths if message.kind == "failed" else 0
+        self.report(message)
+
+    def _ended(self, worker: _Worker) -> None:
+        """Handles a worker that has closed its pipe: it has no more to do, gave up, or died."""
+        worker.process.join(timeout=10)
+        code = worker.process.exitcode
+        if code == INTERRUPTED:
+            raise BackendError(self.backend, f"a worker died (exit code {code})", AGAIN)
+        if code == 0 and not worker.held and worker.has_taken:
+            self.workers.remove(worker)
+            return
+        self._lost(worker, f"a worker died (exit code {code})")
+
+    def _lost(self, worker: _Worker, problem: str) -> None:
+        """Reports the items of a worker that died or hung, and starts another one for those that are left.
+
+        Raises:
+            BackendError: it had taken no item.
+        """
+        if not worker.has_taken:
+            raise BackendError(self.backend, problem, f"{AGAIN}; fewer --workers need less memory")
+        worker.process.kill()
+        self.workers.remove(worker)
+        self.deaths += 1
+        for index in worker.held:
+            self.report(Outcome(index=index, kind="failed", error=problem))
+        if self.pending and self.deaths < MOST_FAILURES:
+            self.start()
+
+    def stop(self) -> None:
+        """Ends the workers that still run."""
+        for worker in self.workers:
+            worker.process.terminate()
+        for worker in self.workers:
+            worker.process.join(timeout=10)
+            worker.pipe.close()
 
 
 @contextlib.contextmanager
 def _no_interrupts() -> Iterator[None]:
-    """A context in which Ctrl-C is deferred, if the system supports it."""
+    """Keeps Ctrl-C waiting, where the system can."""
     if sys.platform != "win32":
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -88,62 +209,31 @@ def _interrupts_again() -> None:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
-def _listen(
-    backend: str, processes: list[SpawnProcess], reports: Queue[tuple[str, Any]], total: int, done: Done
-) -> None:
-    finished, silent_s = 0, 0.0
-    while finished < total:
-        # Read before the queue: what ended workers reported is in it by now.
-        have_ended = all(p.exitcode is not None for p in processes)
-        try:
-            kind, content = reports.get(timeout=1.0)
-        except queue.Empty:
-            silent_s += 1.0
-            dead = [p for p in processes if have_ended or p.exitcode not in (None, 0)]
-            if dead:
-                raise BackendError(
-                    backend,
-                    f"a worker died (exit code {dead[0].exitcode})",
-                    "run the same command again: finished samples are kept; fewer --workers need less memory",
-                ) from None
-            if silent_s >= SILENCE_S:
-                raise BackendError(
-                    backend,
-                    f"no sample for {SILENCE_S:g} s, the driver seems to hang",
-                    "run the same command again with --workers 1",
-                ) from None
-            continue
-        silent_s = 0.0
-        if kind == "error":
-            raise content
-        finished += 1
-        done(content)
-
-
-def _work(work: Work, indices: list[int], position: Any, reports: Queue[tuple[str, Any]]) -> None:
+def _work(work: Work, pipe: Connection) -> None:
     """Runs in the worker process."""
 
     def remaining() -> Iterator[int]:
         while True:
-            with position.get_lock():
-                taken = position.value
-                position.value = taken + 1
-            if taken >= len(indices):
+            pipe.send(None)
+            index = pipe.recv()
+            if index is None:
                 return
-            yield indices[taken]
+            yield index
 
     threading.Thread(target=_follow_parent, daemon=True).start()
     try:
         _interrupts_again()
-        work(remaining(), lambda index: reports.put(("done", index)))
+        work(remaining(), pipe.send)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)  # the parent may be interrupted too, and read no report
+    except (EOFError, BrokenPipeError, ConnectionResetError):  # the parent has ended, or gave this worker up
+        sys.exit(1)
     except GearError as error:
-        reports.put(("error", _portable(error)))
+        pipe.send(_portable(error))
 
 
 def _follow_parent() -> None:
-    """Ends this process when its parent has ended, so that no worker writes during a second run of the same command."""
+    """Ends this process when its parent has ended: no worker may write beside a second run of the same command."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()

@@ -8,14 +8,14 @@ import pytest
 
 from gear.dataset import executors
 from gear.dataset.executors.engines import engine_names, open_engine
-from gear.dataset.executors.executor import InThisProcess
+from gear.dataset.executors.in_process import InThisProcess
 from gear.dataset.executors.processes import Processes
-from gear.values.errors import UnknownNameError
+from gear.values.errors import GearError, UnknownNameError
 
 ENGINE = """
-from gear.dataset.executors.executor import InThisProcess
+from gear.dataset.executors.in_process import InThisProcess
 
-def executor(*, workers, backend):
+def executor(*, workers, backend, address):
     made = InThisProcess()
     made.asked = (workers, backend)
     return made
@@ -36,13 +36,6 @@ def test_a_new_engine_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert isinstance(opened, InThisProcess) and vars(opened)["asked"] == (8, "film")
 
 
-def test_this_process_makes_each_item_once() -> None:
-    made: list[int] = []
-
-    def work(indices: object, done: object) -> None:
-        for index in indices:  # type: ignore[attr-defined]
-            done(index)  # type: ignore[operator]
-
-    InThisProcess().run(work, [4, 2], made.append)
-    assert made == [4, 2]
-    InThisProcess().run(lambda indices, done: pytest.fail("nothing is missing"), [], made.append)
+def test_the_processes_of_one_machine_take_no_address() -> None:
+    with pytest.raises(GearError, match="--address is for engines of several machines"):
+        open_engine("processes", workers=1, backend="raster", address="auto")

@@ -1,33 +1,85 @@
-"""Worker processes that end before their work is done."""
+"""Worker processes: what an engine promises, and workers that end before their work is done."""
 
 from __future__ import annotations
 
-import queue
-from types import SimpleNamespace
-from typing import Any
+import os
+import signal
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
 
 import pytest
 
+from gear.contracts.executors import MOST_FAILURES, Executor, Outcome, Report
 from gear.dataset.executors import processes as workers
+from gear.dataset.executors.processes import Processes
+from gear.testing.executor_contract import ExecutorContract, write_items
 from gear.values.errors import BackendError
 
 
-def listen(codes: list[int | None], *reports: tuple[str, Any]) -> list[int]:
-    """What is heard of two samples from workers that have ended so."""
-    heard: list[int] = []
-    said: Any = queue.Queue()
-    for report in reports:
-        said.put(report)
-    ended: list[Any] = [SimpleNamespace(exitcode=code) for code in codes]
-    workers._listen("classic", ended, said, 2, heard.append)
-    return heard
+class TestProcesses(ExecutorContract):
+    @pytest.fixture
+    def executor(self) -> Executor:
+        return Processes(workers=2, backend="classic")
 
 
-def test_a_pool_that_ended_before_its_last_sample_is_told_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A library that calls `exit(0)`, for one."""
-    monkeypatch.setattr(workers, "SILENCE_S", 3.0)
-    with pytest.raises(BackendError, match=r"a worker died \(exit code 0\)"):
-        listen([0, 0], ("done", 1))
-    assert listen([0, 0], ("done", 1), ("done", 0)) == [1, 0]
-    with pytest.raises(BackendError, match="no sample for 3 s"):
-        listen([0, None], ("done", 1))  # one that found nothing left to do is no failure
+def die_at(deadly: tuple[int, ...], number: int, indices: Iterator[int], report: Report) -> None:
+    """Is killed at some items, as by a lack of memory, or ends with an exit code."""
+    for index in indices:
+        if index in deadly:
+            if number < 0:
+                os.kill(os.getpid(), -number)
+            os._exit(number)
+        report(Outcome(index=index))
+
+
+def hang_at(where: int, indices: Iterator[int], report: Report) -> None:
+    for index in indices:
+        if index == where:
+            time.sleep(600)
+        report(Outcome(index=index))
+
+
+def die_at_once(code: int, indices: Iterator[int], report: Report) -> None:
+    os._exit(code)
+
+
+def ran(work: workers.Work, items: int, count: int = 1) -> dict[int, Outcome]:
+    reported: dict[int, Outcome] = {}
+    run = Processes(workers=count, backend="classic").run
+    run(work, range(items), lambda outcome: reported.update({outcome.index: outcome}))
+    return reported
+
+
+@pytest.mark.parametrize(("number", "code"), [(-signal.SIGKILL, -9), (0, 0), (3, 3)])
+def test_a_worker_that_dies_costs_its_item_alone(number: int, code: int) -> None:
+    reported = ran(partial(die_at, (1,), number), 4)
+    assert {index: outcome.kind for index, outcome in reported.items()} == {
+        0: "made", 1: "failed", 2: "made", 3: "made",
+    }  # fmt: skip
+    assert reported[1].error == f"a worker died (exit code {code})"
+
+
+def test_workers_that_die_at_every_item_are_replaced_a_few_times_only() -> None:
+    reported = ran(partial(die_at, tuple(range(30)), -signal.SIGKILL), 30)
+    assert sorted(reported) == list(range(MOST_FAILURES))
+
+
+def test_a_worker_that_fails_at_every_item_gives_up(tmp_path: Path) -> None:
+    reported = ran(partial(write_items, str(tmp_path), tuple(range(30))), 30)
+    assert sorted(reported) == list(range(MOST_FAILURES))
+
+
+@pytest.mark.slow
+def test_a_worker_that_hangs_is_ended_and_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "SILENCE_S", 15.0)
+    reported = ran(partial(hang_at, 1), 3)
+    assert {index: outcome.kind for index, outcome in reported.items()} == {0: "made", 1: "failed", 2: "made"}
+    assert "no sample for 15 s, the driver seems to hang" in reported[1].error
+
+
+@pytest.mark.parametrize("code", [0, 1])
+def test_a_worker_that_dies_before_its_first_item_ends_the_run(code: int) -> None:
+    with pytest.raises(BackendError, match=rf"classic: a worker died \(exit code {code}\).*run the same command again"):
+        ran(partial(die_at_once, code), 2)

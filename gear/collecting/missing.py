@@ -1,0 +1,202 @@
+"""Makes the missing samples of a split: shares them with other runs, and tries those that fail again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+from gear.collecting.forecast import Forecast
+from gear.collecting.job import Job
+from gear.collecting.pipeline import collect_samples
+from gear.collecting.session import open_session
+from gear.contracts.executors import MOST_FAILURES, Executor, Outcome, Report
+from gear.dataset.claims import Claims
+from gear.dataset.executors.processes import Processes
+from gear.dataset.failures import clear_failures, failures_folder, note_failure, noted_failures
+from gear.dataset.shards import Shard
+from gear.dataset.store import Store
+from gear.values.counted import counted
+from gear.values.errors import GearError, SamplesFailedError
+from gear.values.progress import Callbacks
+
+FRESH_TRIES = 2
+"""How often a sample that failed is tried again, each time in a fresh process."""
+
+POLL_S = 0.5
+"""Seconds between two looks at the samples that other runs are making."""
+
+
+def collect_missing(job: Job, store: Store, part: Shard, executor: Executor, callbacks: Callbacks) -> int:
+    """Makes the missing samples of a shard, or waits for other runs that are making them.
+
+    Args:
+        job: the job.
+        store: of its split.
+        part: the shard.
+        executor: executor that makes the samples.
+        callbacks: callbacks that receive the progress.
+
+    Returns:
+        Number of samples that this run has made.
+
+    Raises:
+        SamplesFailedError: some samples could not be made. They are noted in the dataset.
+        GearError: no sample can be made, or the disk refuses.
+    """
+    making = _Making(job=job, store=store, part=part, executor=executor, callbacks=callbacks)
+    try:
+        making.run()
+    finally:
+        for outcome in making.failed.values():
+            note_failure(store.root, store.split, outcome, making.tries[outcome.index])
+    making.raise_failures()
+    return making.made
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Making:
+    """One run over the missing samples of a shard.
+
+    Attributes:
+        job, store, part, executor, callbacks: as in `collect_missing`.
+        made: number of samples that this run has made.
+        failed: the last outcome of each sample that could not be made, by index.
+        tries: how often this run has tried each sample that failed, by index.
+        gave_up: whether the workers have ended after failures, so that samples are left that nobody has tried.
+    """
+
+    job: Job
+    store: Store
+    part: Shard
+    executor: Executor
+    callbacks: Callbacks
+    made: int = 0
+    failed: dict[int, Outcome] = field(default_factory=dict)
+    tries: dict[int, int] = field(default_factory=dict)
+    gave_up: bool = False
+
+    def run(self) -> None:
+        """Makes the samples.
+
+        Raises:
+            GearError: as `collect_missing`.
+        """
+        pending = self.store.missing(self.part)
+        total = len(self.store.indices(self.part))
+        noted = noted_failures(self.store.root, self.store.split)
+        forecast = Forecast(self.store, len(pending), self.callbacks.on_warning)
+        finished = total - len(pending)
+        self.callbacks.on_progress(finished, total)
+
+        def report(outcome: Outcome) -> None:
+            nonlocal finished
+            index = outcome.index
+            if outcome.kind == "failed":
+                self.tries[index] = self.tries.get(index, 0) + 1
+                self.failed[index] = outcome
+                return
+            self.failed.pop(index, None)
+            if outcome.kind == "made":
+                self.made += 1
+                finished += 1
+                if index in noted:
+                    clear_failures(self.store.root, self.store.split, [index])
+                self.callbacks.on_progress(finished, total)
+                forecast.sample_done(index)
+
+        while pending:
+            self._try_all(pending, report)
+            self._try_again(report)
+            if self.gave_up:
+                return
+            pending = self._wait_for_others()
+            there = total - len(self.store.missing(self.part))
+            if there > finished:
+                finished = there
+                self.callbacks.on_progress(finished, total)
+
+    def _try_all(self, pending: Sequence[int], report: Report) -> None:
+        """Tries each sample once; those that other runs have claimed are left out."""
+        answered: set[int] = set()
+
+        def report_and_count(outcome: Outcome) -> None:
+            answered.add(outcome.index)
+            report(outcome)
+            if outcome.kind == "failed":
+                again = "" if outcome.is_final else "; it is tried again at the end"
+                self.callbacks.on_warning(f"sample {outcome.index} failed ({outcome.error}){again}")
+
+        self.executor.run(partial(make_samples, self.job), pending, report_and_count)
+        self.gave_up = len(answered) < len(set(pending))
+
+    def _try_again(self, report: Report) -> None:
+        """Tries the samples that failed again, each in a process of its own, until too many fail in a row."""
+        fresh = Processes(workers=1, backend=self.job.config.renderer)
+        in_row = 0
+        for index in [index for index, outcome in self.failed.items() if not outcome.is_final]:
+            for _ in range(FRESH_TRIES - self.tries[index] + 1):
+                if in_row >= MOST_FAILURES:
+                    self.gave_up = True
+                    return
+                try:
+                    fresh.run(partial(make_samples, self.job), [index], report)
+                except GearError as error:
+                    report(replace(self.failed[index], error=f"{self.failed[index].error}; then: {error}"))
+                in_row = in_row + 1 if index in self.failed else 0
+                if index not in self.failed:
+                    break
+
+    def _wait_for_others(self) -> list[int]:
+        """Waits while other runs are making all samples that are missing.
+
+        Returns:
+            Indices of the samples that a stopped run has left; empty when none is missing but those that failed.
+        """
+        with Claims(self.store.root, self.store.split) as claims:
+            while missing := [index for index in self.store.missing(self.part) if index not in self.failed]:
+                free = [index for index in missing if not claims.is_taken(index)]
+                free = [index for index in free if index in set(self.store.missing(self.part))]
+                if free:
+                    return free
+                time.sleep(POLL_S)
+        return []
+
+    def raise_failures(self) -> None:
+        """Raises:
+        SamplesFailedError: a sample could not be made; says which, why, and what to do.
+        """
+        if not (self.failed or self.gave_up):
+            return
+        first, total = min(self.failed, default=None), len(self.store.indices(self.part))
+        left = len(self.store.missing(self.part)) - len(self.failed)
+        parts = [f"{len(self.failed)} of {counted(total, 'sample')} of split {self.store.split!r} could not be made"]
+        if first is not None:
+            parts[0] += f" (sample {first}: {self.failed[first].error})"
+        if self.gave_up and left > 0:
+            parts.append(f"{left} more were not made after {MOST_FAILURES} failures in a row")
+        parts.append(f"the errors are noted in {failures_folder(self.store.split)}")
+        parts.append("put the cause right and run the same command again, which makes only what is missing")
+        raise SamplesFailedError(self.store.root, "; ".join(parts))
+
+
+def make_samples(job: Job, indices: Iterator[int], report: Report) -> None:
+    """The work of one worker: a world and a renderer, opened once for all of its samples.
+
+    Args:
+        job: the job.
+        indices: of the samples to make, unless another run has made or claimed them.
+        report: called with the outcome of each.
+
+    Raises:
+        GearError: the world or the renderer cannot be opened, or the disk refuses.
+    """
+    store = Store(job.root, job.plan)
+    with open_session(job) as session, Claims(store.root, store.split) as claims:
+
+        def report_and_release(outcome: Outcome) -> None:
+            claims.release(outcome.index)
+            report(outcome)
+
+        collect_samples(session, store, claims.unclaimed(indices, report), report_and_release)

@@ -1,0 +1,150 @@
+"""Claims on samples, by which several runs that make one split share its work.
+
+Before a run makes a sample, it creates the sample's claim, a file in `gear/<split>/claims`, and locks it. When the run
+is killed, the system releases the lock, and another run takes the claim over. On a file system without locks a claim is
+taken over when its process is gone from this machine, or when the claim is old.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from gear.contracts.executors import Outcome, Report
+from gear.dataset.files import explained, inside
+from gear.dataset.guarded_paths import opened_parent, owned, remove_empty_folders, remove_file
+from gear.dataset.layout import claim_path, sidecar_path, split_folder
+from gear.dataset.scratch import is_alive, lock_of, unique_name
+
+OLD_S = 900.0
+"""Where neither a lock nor a process number tells, a claim of this age is abandoned: no sample takes as long."""
+
+TRIES = 100
+"""Another run may remove a claim, or the folder of the claims, between two steps."""
+
+OPENING = os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC
+
+
+class Claims:
+    """The claims that one worker holds on samples of a split.
+
+    A context manager that releases all of them at its end.
+    """
+
+    def __init__(self, root: Path, split: str) -> None:
+        """Args:
+        root: of the dataset.
+        split: its name.
+        """
+        self._root, self._split = root, split
+        self._held: dict[int, int] = {}
+
+    def __enter__(self) -> Claims:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for index in list(self._held):
+            self.release(index)
+
+    def take(self, index: int) -> bool:
+        """Claims a sample. False where another run has claimed it.
+
+        Raises:
+            DatasetError: the disk refuses, or there is a link in the claim's path.
+        """
+        relative = claim_path(self._split, index)
+        with explained(self._root / relative):
+            for _ in range(TRIES):
+                with contextlib.suppress(FileNotFoundError):
+                    descriptor = self._opened(relative)
+                    if descriptor is None:
+                        return False
+                    if self._is_current(relative, descriptor):
+                        self._held[index] = descriptor
+                        return True
+                    os.close(descriptor)
+        return False
+
+    def _opened(self, relative: str) -> int | None:
+        """A descriptor of the claim with its lock; None where another run has it."""
+        with opened_parent(self._root, relative, make=True) as (folder, name):
+            try:
+                descriptor = os.open(name, OPENING | os.O_CREAT | os.O_EXCL, 0o666, dir_fd=folder)
+                is_new = True
+            except FileExistsError:
+                descriptor = os.open(name, OPENING, dir_fd=folder)
+                is_new = False
+        is_free = lock_of(descriptor)
+        if is_free is None:
+            is_free = is_new or _is_abandoned(descriptor)
+        if not is_free:
+            os.close(descriptor)
+            return None
+        os.ftruncate(descriptor, 0)
+        os.pwrite(descriptor, unique_name().encode(), 0)
+        return descriptor
+
+    def _is_current(self, relative: str, descriptor: int) -> bool:
+        """Whether the locked file is still the claim: the run that had it may have removed it at its end."""
+        with opened_parent(self._root, relative) as (folder, name):
+            try:
+                there = os.stat(name, dir_fd=folder, follow_symlinks=False)
+            except FileNotFoundError:
+                return False
+        return os.path.samestat(there, os.fstat(descriptor))
+
+    def release(self, index: int) -> None:
+        """Gives a claim up; one that is not held is no error."""
+        descriptor = self._held.pop(index, None)
+        if descriptor is not None:
+            try:
+                remove_file(self._root, claim_path(self._split, index))
+            finally:
+                os.close(descriptor)
+
+    def unclaimed(self, indices: Iterable[int], report: Report) -> Iterator[int]:
+        """Claims one sample after another, and yields those that nobody has made or claimed.
+
+        Args:
+            indices: of samples.
+            report: called with an outcome for each sample that another run has made or claimed.
+        """
+        for index in indices:
+            if self.take(index):
+                if not inside(self._root, sidecar_path(self._split, index)).exists():
+                    yield index
+                    continue
+                self.release(index)
+            report(Outcome(index=index, kind="elsewhere"))
+
+    def is_taken(self, index: int) -> bool:
+        """Whether a run holds the claim on a sample."""
+        if not self.take(index):
+            return True
+        self.release(index)
+        return False
+
+
+def clear_claims(root: Path, split: str) -> None:
+    """Removes the claims that killed runs have left, and their folder when it is empty.
+
+    Raises:
+        DatasetError: there is a link in the path of a claim.
+    """
+    folder = owned(root, claim_path(split, 0)).parent
+    with Claims(root, split) as claims:
+        for path in sorted(folder.glob("*.claim")) if folder.is_dir() else ():
+            if path.stem.isdecimal():
+                claims.is_taken(int(path.stem))
+    remove_empty_folders(root, f"{split_folder(split)}/claims")
+
+
+def _is_abandoned(descriptor: int) -> bool:
+    """Whether the run that made a claim is gone, where there are no locks."""
+    alive = is_alive(os.pread(descriptor, 1000, 0).decode(errors="replace"))
+    if alive is None:
+        return time.time() - os.fstat(descriptor).st_mtime > OLD_S
+    return not alive

@@ -1,0 +1,60 @@
+"""Notes on samples that could not be made, in `gear/<split>/failed`: the error, its traceback, the number of tries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from gear.contracts.executors import Outcome
+from gear.dataset.files import write_whole
+from gear.dataset.guarded_paths import owned, remove_empty_folders, remove_files
+from gear.dataset.json_text import dump_json
+from gear.dataset.layout import failed_path, split_folder
+
+
+def failures_folder(split: str) -> str:
+    """The folder of a split's notes on failed samples, relative to the dataset's root."""
+    return f"{split_folder(split)}/failed"
+
+
+def note_failure(root: Path, split: str, outcome: Outcome, tries: int) -> None:
+    """Writes the note on a sample that could not be made.
+
+    Args:
+        root: of the dataset.
+        split: its name.
+        outcome: of the sample.
+        tries: how often a run has tried to make it.
+
+    Raises:
+        DatasetError: the disk refuses.
+    """
+    trace = outcome.trace.encode(errors="backslashreplace").decode()
+    note = {"index": outcome.index, "tries": tries, "error": outcome.error, "traceback": trace.splitlines()}
+    write_whole(root, failed_path(split, outcome.index), dump_json(note))
+
+
+def noted_failures(root: Path, split: str) -> set[int]:
+    """Indices of the samples that an earlier run could not make.
+
+    Raises:
+        DatasetError: the folder of the notes is a link.
+    """
+    folder = owned(root, failures_folder(split))
+    return {int(path.stem) for path in folder.glob("*.json") if path.stem.isdecimal()} if folder.is_dir() else set()
+
+
+def clear_failures(root: Path, split: str, indices: Iterable[int] | None = None) -> None:
+    """Removes the notes on samples that are there by now, and their folder when it is empty.
+
+    Args:
+        root: of the dataset.
+        split: its name.
+        indices: of the samples; all that are noted by default.
+
+    Raises:
+        DatasetError: a note is a link, or the disk refuses.
+    """
+    chosen = noted_failures(root, split) if indices is None else indices
+    remove_files(root, [failed_path(split, index) for index in chosen])
+    remove_empty_folders(root, failures_folder(split))
