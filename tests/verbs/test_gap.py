@@ -22,7 +22,7 @@ from gear.measuring.gap.run import sample_gaps, shown_patches
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
-from tests.verbs.conftest import Copy
+from tests.verbs.conftest import Collected, Copy, Install
 
 
 @pytest.fixture
@@ -94,6 +94,21 @@ def test_a_models_metrics_are_taken_digitally_and_rendered(
         assert alone.clean[metric] == pytest.approx(report.effect["clean"][metric])
         assert change[metric] == pytest.approx(report.effect[way][metric] - report.effect["clean"][metric])
     assert f"{change[metric]:+.4f}" in report.table()
+
+
+def test_what_a_defense_learnt_is_reported(pair: tuple[Path, Path], collected: Collected, install: Install) -> None:
+    install(tiny_segmenter)
+    clean, twin = pair
+    report = gear.gap(
+        clean, twin=twin, model="tiny_segmenter", compositors=("transport",), samples=1, defense="fpda",
+        defense_settings=["false_alarms=0.2"],
+        calibration=collected("semseg", "calibration", scene="board", split="val", samples=8),
+    )  # fmt: skip
+    assert report.fit is not None and report.fit.values["clean_pictures"] == 8
+    assert report.as_json()["fit"]["values"] == report.fit.values
+    assert "fpda learnt, on its own calibration data: clean_pictures 8, level" in report.table()
+    doubtful = replace(report, fit=replace(report.fit, problems=("learnt nothing",)))
+    assert doubtful.table().endswith("WARNING: learnt nothing")
 
 
 def test_a_model_sees_what_is_pasted_over_a_hidden_board(pair: tuple[Path, Path]) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from gear.contracts.defenses import FitReport
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Evaluator
 from gear.dataset.plan import Plan
@@ -101,6 +102,10 @@ class Effect:
             for name, metrics in alone.items()
         }
         self.samples.append(SampleEffect(index=index, clean=before, change=change))
+
+    def fit_report(self) -> FitReport | None:
+        """What the defense learnt, if there is one that says so; known after the first sample."""
+        return self.guarded.fit_report()
 
     def result(self) -> dict[str, Metrics]:
         """The metrics by `clean`, name of the compositor, and `rendered`."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gear.contracts.defenses import FitReport
 from gear.measuring.gap.effect import CLEAN, RENDERED, Metrics, SampleEffect
 from gear.measuring.gap.picture_gap import PictureGap
 from gear.values.serial import Json, to_json
@@ -50,6 +51,7 @@ class GapReport:
         model: name of the model.
         defense: name of the defense that guards it.
         seed: seed of the defense's random draws.
+        fit: what the defense learnt, on its own calibration data; None for a defense that reports nothing.
     """
 
     dataset: str
@@ -65,6 +67,7 @@ class GapReport:
     model: str | None
     defense: str | None = None
     seed: int = 0
+    fit: FitReport | None = None
 
     def median_db(self, compositor: str) -> float:
         """Median PSNR over all pictures in dB; NaN where none shows a patch."""
@@ -146,6 +149,10 @@ class GapReport:
             values = "".join(f"{self.effect[name].get(metric, math.nan):14.4f}" for name in columns)
             share = "".join(f"  {name} {share[metric]:.2f}" for name, share in shares.items() if metric in share)
             lines.append(f"{metric:28}{values}{share}")
+        if self.fit is not None:
+            values = ", ".join(f"{name} {value:.4g}" for name, value in self.fit.values.items())
+            lines.append(f"{self.defense} learnt, on its own calibration data: {values}")
+            lines += [f"WARNING: {problem}" for problem in self.fit.problems]
         return lines
 
     def summary(self) -> str:

@@ -106,6 +106,9 @@ def _measured(request: GapRequest, compared: _Comparison, callbacks: Callbacks) 
     for index in range(count):
         found += sample_gaps(pairs, compared.engines, compared.images, index, effect)
         callbacks.on_progress(index + 1, count)
+    fit = None if effect is None else effect.fit_report()
+    for problem in () if fit is None else fit.problems:
+        callbacks.on_warning(f"WARNING: {problem}")
     clean, twin = pairs.first, pairs.second
     return GapReport(
         dataset=str(clean.root),
@@ -121,6 +124,7 @@ def _measured(request: GapRequest, compared: _Comparison, callbacks: Callbacks) 
         model=request.model,
         defense=None if request.guard is None else request.guard.defense,
         seed=request.seed,
+        fit=fit,
     )
 
 

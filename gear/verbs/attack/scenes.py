@@ -27,6 +27,9 @@ from gear.verbs.attack.data import JoinedCompositor
 RANDOM_PX = (32, 64)
 """Height and width of the random patches with which gradients are checked."""
 
+PICTURES = "defense_pictures"
+"""Name of the gradient that reaches the model through a defense's pictures."""
+
 KEPT_BYTES = 2 << 30
 SHOWN = 3
 """Number of samples in the figure and in the check for masked gradients."""
@@ -75,10 +78,10 @@ class Scenes:
             return promised_and_kept(lambda changed: self.value(model, objective, changed, indexes), tensors)
 
     def check_adaptive(self, model: Model, surfaces: int, rng: np.random.Generator) -> None:
-        """Checks that the scores or masks of the defenses have a gradient with respect to random patches.
+        """Checks that the pictures, scores and masks of the defenses have a gradient with respect to random patches.
 
         Raises:
-            GearError: a term of a defense has a gradient of 0, so an attack would not be adaptive to it.
+            GearError: one of them has a gradient of 0, so an attack would not be adaptive to it.
         """
         patches = [
             torch.from_numpy(rng.uniform(0.05, 0.95, (3, *RANDOM_PX)).astype(np.float32)) for _ in range(surfaces)
@@ -94,21 +97,35 @@ class Scenes:
                         sizes[term] = max(sizes.get(term, 0.0), size)
             for term in (term for term, size in sizes.items() if not size > 0):
                 kind, of_model = term.removeprefix("defense_"), f" of {name[:-1]}" if name else ""
+                if term == PICTURES:
+                    raise GearError(
+                        f"the pictures that the defense{of_model} returns have no gradient at random patches, so that "
+                        "the attack would change nothing that the model sees; attacks that count queries need none "
+                        "(--attack square --queries N)"
+                    )
                 raise GearError(
                     f"the {kind} of the defense{of_model} has no gradient at random patches, so that the attack would "
                     f"not lower it; leave it out with --{kind}-weight 0"
                 )
 
     def _gradients(self, member: Defended, patches: Sequence[Tensor], index: int) -> dict[str, float]:
-        """Largest entry of the gradient of each term of a defense with respect to the patches, in one sample."""
+        """Largest entry of the gradient with respect to the patches in one sample, for each term of a defense and for a
+        random projection of its pictures.
+        """
         asked = [patch.clone().requires_grad_(True) for patch in patches]
         sample = self.samples[index]
         views = {view: self.compositor.compose(asked, [index], view) for view in sample.images}
+        values = {name: term.value for name, term in defense_terms(member, views, [sample]).items()}
+        # A plain sum or square would have no gradient behind a defense that normalises pictures.
+        draws = torch.Generator().manual_seed(index)
+        cleaned = member.defended(views).views.values()
+        projections = [(one * torch.rand(one.shape, generator=draws).to(one)).sum() for one in cleaned]
+        values[PICTURES] = torch.stack(projections).sum()
         sizes = {}
-        for name, term in defense_terms(member, views, [sample]).items():
+        for name, value in values.items():
             found: Sequence[Tensor | None] = ()
-            if term.value.requires_grad:
-                found = torch.autograd.grad(term.value, asked, retain_graph=True, allow_unused=True)
+            if value.requires_grad:
+                found = torch.autograd.grad(value, asked, retain_graph=True, allow_unused=True)
             sizes[name] = max((float(one.abs().max()) for one in found if one is not None), default=0.0)
         return sizes
 

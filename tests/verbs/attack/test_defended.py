@@ -96,6 +96,41 @@ def test_a_defense_that_offers_attacks_nothing_is_refused(small: Small, install:
         attack(small(), model="tiny_segmenter", out=tmp_path / "out", steps=2, settings=SMALL, defense="only_scores")
 
 
+class Posterised(PerPicture):
+    """A defense of others that claims a gradient and rounds it away."""
+
+    def __init__(self, config: Nothing) -> None:
+        pass
+
+    def clean(self, picture: Any) -> Any:
+        return (picture // 64 * 64).astype(np.uint8), None
+
+    def clean_tensor(self, pictures: torch.Tensor) -> torch.Tensor:
+        return (pictures * 4).floor() / 4
+
+
+posterised = DefenseSpec(
+    name="posterised", summary="Few levels.", config=Nothing, build=Posterised, outputs=frozenset({"images"}),
+    gradient="differentiable",
+)  # fmt: skip
+
+
+def test_pictures_without_a_gradient_are_no_adaptive_attack(small: Small, install: Install, tmp_path: Path) -> None:
+    install(tiny_segmenter, posterised)
+    with pytest.raises(GearError, match=r"pictures that the defense returns have no gradient.*--attack square"):
+        attack(small(), model="tiny_segmenter", out=tmp_path / "out", steps=2, settings=SMALL, defense="posterised")
+
+
+@pytest.mark.parametrize("defense", ["lgs", "jpeg", "median", "bit_depth"])
+def test_a_gradient_passes_every_defense_of_pictures(
+    defense: str, small: Small, install: Install, tmp_path: Path
+) -> None:
+    install(tiny_segmenter)
+    facts: dict[str, Any] = {"model": "tiny_segmenter", "steps": 1, "settings": SMALL}
+    aware = attack(small(), out=tmp_path / defense, defense=defense, **facts)
+    assert all(size > 0 for size in aware.facts["curves"]["gradient"])
+
+
 def test_weights_of_a_defense_are_plausible(small: Small, tmp_path: Path) -> None:
     with pytest.raises(GearError, match="score_weight and mask_weight must be at least 0"):
         attack(small(), model="tiny_segmenter", out=tmp_path / "out", score_weight=-1)
