@@ -176,6 +176,12 @@ def box_area(box_px: BoxPx) -> float:
     return max(0.0, right - left) * max(0.0, bottom - top)
 
 
+def share_in_frame(box_px: BoxPx, frame_px: BoxPx) -> float:
+    """Share, 0..1, of a box that lies inside a frame."""
+    whole = box_area(box_px)
+    return box_area(clipped(box_px, frame_px)) / whole if whole > 0 else 0.0
+
+
 def _part(array: npt.NDArray[Any], window: Window, fill: float) -> npt.NDArray[Any]:
     left, top = window.left_px, window.top_px
     right, bottom = left + window.width_px, top + window.height_px

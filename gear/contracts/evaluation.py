@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.contracts.tasks import Encoded, Evaluator, SplitInfo
+from gear.values.picture_objects import PictureObjects
 from gear.values.serial import Json
 
 Masks = Mapping[str, npt.NDArray[np.bool_]]
@@ -60,6 +61,19 @@ class Maskable(Protocol):
         Args:
             sample: of the task; not changed.
             masks: (H, W) bool by camera name.
+        """
+        ...
+
+
+@runtime_checkable
+class WithObjects(Protocol):
+    """A task of objects that are found or missed, whose twins can be compared object by object."""
+
+    def picture_objects(self, sample: Any, prediction: Any) -> PictureObjects:
+        """The objects of a sample that should be found, and the detections.
+
+        Raises:
+            ValueError: a detection cannot be measured.
         """
         ...
 

@@ -10,6 +10,7 @@ import numpy as np
 from gear.groundtruth.silhouettes import NEAR_M
 from gear.values.frames import SceneObject
 from gear.values.geometry import Array, Intrinsics, frozen, wrap_angle_rad
+from gear.values.ground_truth import BoxPx
 from gear.values.scene import CameraRecord, Vec3
 
 EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
@@ -42,10 +43,16 @@ class Box3d:
         return wrap_angle_rad(self.rotation_y_rad - math.atan2(self.bottom_m[0], self.bottom_m[2]))
 
     @property
+    def middle_m(self) -> Vec3:
+        """Middle of the box."""
+        x, y, z = self.bottom_m
+        return (x, y - self.height_m / 2, z)
+
+    @property
     def distance_m(self) -> float:
         """Distance from the camera to the middle of the box."""
-        x, y, z = self.bottom_m
-        return math.sqrt(x * x + (y - self.height_m / 2) ** 2 + z * z)
+        x, y, z = self.middle_m
+        return math.sqrt(x * x + y * y + z * z)
 
     @property
     def corners_m(self) -> Array:
@@ -60,6 +67,20 @@ class Box3d:
             + _CORNERS[:, 1:2] * self.width_m * left
             + _CORNERS[:, 2:3] * up
         )
+
+
+def middle_in_camera(box_px: BoxPx, distance_m: float, pinhole: Intrinsics) -> Vec3:
+    """The middle of an object in a camera's frame: at its distance, on the ray through the middle of its box.
+
+    Args:
+        box_px: of the whole silhouette, which may exceed the picture; edge pixels.
+        distance_m: from the camera to the middle of the object.
+        pinhole: of the camera.
+    """
+    left, top, right, bottom = box_px
+    ray = pinhole.unproject([[(left + right - 1) / 2, (top + bottom - 1) / 2]], [1.0])[0]
+    x, y, z = (float(v) for v in ray / np.linalg.norm(ray) * distance_m)
+    return (x, y, z)
 
 
 def box_in_camera(thing: SceneObject, camera: CameraRecord) -> Box3d:

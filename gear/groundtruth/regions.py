@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from gear.formats import rle
 from gear.values.ground_truth import BoxPx
 
 
@@ -20,6 +21,23 @@ def part_boxes(mask: npt.NDArray[np.bool_]) -> tuple[BoxPx, ...]:
 
 MOSTLY = 0.5
 """Share of an object's visible pixels inside a mask, above which the object is ignored together with the mask."""
+
+
+def share_inside(box_px: BoxPx, counts: str, mask: npt.NDArray[np.bool_]) -> float:
+    """Share of an object's visible pixels that lies in a mask, 0..1.
+
+    Args:
+        box_px: tight box of the visible pixels; edge pixels.
+        counts: compressed run lengths of the visible pixels in the whole picture.
+        mask: (H, W) of the picture.
+    """
+    left, top, right, bottom = (round(side) for side in box_px)
+    crop = mask[top:bottom, left:right]
+    if not crop.any():
+        return 0.0
+    height, width = mask.shape
+    visible = rle.decode_crop(counts, height, width, (left, top, right, bottom))
+    return float((visible & crop).sum() / max(1, int(visible.sum())))
 
 
 def least_share_inside(box_px: BoxPx, visible_px: int, mask: npt.NDArray[np.bool_]) -> float:

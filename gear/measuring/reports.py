@@ -1,8 +1,8 @@
 """The reports of an evaluation: the task's own metric, further reports of the task, and metrics of plugins.
 
-A report is requested by name. `outside_patch` is the task's own metric without the ground truth on and next to the
-patch. A task may have further reports, such as `reference`. Any other name is that of a metric plugin (`gear_metrics`),
-with options after a colon: `boundary_iou:width_share=0.01`.
+Tasks of objects always have the report `objects`. Other reports are requested by name. `outside_patch` is the task's
+own metric without the ground truth on and next to the patch. A task may have further reports, such as `reference`. Any
+other name is that of a metric plugin (`gear_metrics`), with options after a colon: `boundary_iou:width_share=0.01`.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from typing import Any
 
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
-from gear.contracts.evaluation import Maskable, Reports
+from gear.contracts.evaluation import Maskable, Reports, WithObjects
 from gear.contracts.specs import MetricSpec
 from gear.contracts.tasks import Evaluator
 from gear.dataset.output_checks import check_metrics
 from gear.dataset.plan import Plan
 from gear.dataset.reading import Dataset
 from gear.measuring.guarded_model import plugin_error
+from gear.measuring.object_report import OBJECTS, ObjectEvaluator
 from gear.measuring.plugin_selection import Chosen
 from gear.plugins.build import NO_OPTIONS, broken_hint, find, name_of_task, plugins_of_kind
 from gear.plugins.manager import DISTRIBUTION
@@ -98,15 +99,19 @@ def task_report(dataset: Dataset[Any]) -> Report:
 
 
 def reports_of(names: Iterable[str], dataset: Dataset[Any]) -> dict[str, Report]:
-    """The task's own metric and the requested reports, by name.
+    """The task's own metric, `objects` for tasks of objects, and the requested reports, by name.
 
     Raises:
         UnknownNameError: neither the task nor a plugin has a report of this name.
         GearError: a metric is for other tasks, or an option of it does not fit.
     """
     found = {TASK: task_report(dataset)}
+    task = dataset.task
+    if isinstance(task, WithObjects):
+        found[OBJECTS] = Report(name=OBJECTS, make=lambda: ObjectEvaluator(task), plan=dataset.plan)
     for name in names:
-        found[name] = _report(name, dataset)
+        if name != OBJECTS or OBJECTS not in found:
+            found[name] = _report(name, dataset)
     return found
 
 

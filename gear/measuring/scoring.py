@@ -16,6 +16,7 @@ from gear.dataset.output_checks import check_encoded
 from gear.dataset.reading import Dataset
 from gear.measuring.guarded_model import Answer, plugin_error
 from gear.measuring.metric_json import known_json
+from gear.measuring.object_report import OBJECTS, ObjectEvaluator
 from gear.measuring.patch_area import MASK_METRICS, mask_metrics, patch_masks, widened
 from gear.measuring.reports import OUTSIDE_PATCH, Report, reports_of
 from gear.measuring.statistics import AnyEvaluator
@@ -23,7 +24,8 @@ from gear.plugins.catalogue import PluginEntry
 from gear.plugins.manager import DISTRIBUTION
 from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, FieldError, GearError
-from gear.values.serial import Json, from_json
+from gear.values.picture_objects import PictureOutcomes
+from gear.values.serial import Json, from_json, to_json
 
 PREDICTIONS = "predictions"
 
@@ -68,7 +70,14 @@ class Note:
             "mask": None if self.mask is None else known_json(self.mask),
             "facts": self.facts,
             "sha256": dict(self.sha256),
+            **({} if self.outcomes is None else {"objects": to_json(self.outcomes)}),
         }
+
+    @property
+    def outcomes(self) -> PictureOutcomes | None:
+        """What became of the sample's objects; None for tasks without objects."""
+        part = self.parts.get(OBJECTS)
+        return part.pictures[0] if isinstance(part, ObjectEvaluator) else None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

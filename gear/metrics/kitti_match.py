@@ -9,10 +9,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from gear.formats.kitti_object import KittiLabel
+from gear.formats.kitti_object import KittiLabel, to_edge_pixels
 from gear.metrics.boxes import iou_2d, iou_ground_and_space, share_of_first
 from gear.values.geometry import Array
 from gear.values.ground_truth import BoxPx
+from gear.values.picture_objects import PictureDetection
 
 Bools = npt.NDArray[np.bool_]
 Overlap = Literal["2d", "bev", "3d"]
@@ -22,6 +23,9 @@ NEIGHBOURS = {"Car": "Van", "Pedestrian": "Person_sitting", "Cyclist": ""}
 """For each class the similar type whose objects are ignored: detecting one is neither a hit nor a false alarm."""
 
 MIN_OVERLAP = {"Car": 0.7, "Pedestrian": 0.5, "Cyclist": 0.5}
+
+LOOSE_OVERLAP = {"Car": 0.5, "Pedestrian": 0.25, "Cyclist": 0.25}
+"""Overlaps from above in the looser set of thresholds of kitti-object-eval-python, which papers report, too."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,6 +85,21 @@ def picture_boxes(
         in_dont_care=_largest_share(_boxes_px(found), regions),
         in_ignored=_largest_share(_boxes_px(found), np.array(ignored_px, dtype=np.float64).reshape(-1, 4)),
     )
+
+
+def picture_detections(detections: Sequence[KittiLabel]) -> tuple[PictureDetection, ...]:
+    """Detections in the picture alone."""
+    return tuple(
+        PictureDetection(label=one.type, box_px=to_edge_pixels(one.box_px), score=one.score or 0.0)
+        for one in detections
+    )
+
+
+def is_in_place(labels: Sequence[KittiLabel], detections: Sequence[KittiLabel]) -> Bools:
+    """(N, M): whether a detection overlaps a label from above by at least `LOOSE_OVERLAP` of the label's class."""
+    ground, _ = iou_ground_and_space(_boxes_m(labels), _boxes_m(detections))
+    least = np.array([LOOSE_OVERLAP[label.type] for label in labels])
+    return np.asarray(ground >= least[:, None])
 
 
 def _largest_share(boxes_px: Array, regions_px: Array) -> Array:

@@ -23,9 +23,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gear.contracts.evaluation import KeepsPredictions, Maskable, Reports
+from gear.contracts.evaluation import KeepsPredictions, Maskable, Reports, WithObjects
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Sample, Sidecar, SplitInfo, Task
+from gear.metrics.object_matching import outcomes
+from gear.metrics.patch_distance import PatchArea
 from gear.testing.compare import difference, freeze
 from gear.testing.spec_checks import check_spec
 from gear.testing.synthetic import synthetic_frame
@@ -230,6 +232,19 @@ class TaskContract:
                 evaluator.update(task.without(sample, masks), prediction)
             metric = evaluator.result()[self.headline]
             assert math.isnan(metric) if value else math.isclose(metric, self.perfect, abs_tol=1e-9)
+
+    def test_ground_truth_finds_every_object(self) -> None:
+        """Where twins are compared object by object, a perfect prediction finds each object and invents none."""
+        task, sample = self.task(), freeze(self.sample())
+        if not isinstance(task, WithObjects):
+            return
+        shown = task.picture_objects(sample, task.as_prediction(sample))
+        assert shown.objects and shown.camera in sample.images
+        keys = [(thing.object_id, thing.label) for thing in shown.objects]
+        assert len(set(keys)) == len(keys)
+        seen = outcomes(shown, PatchArea(np.zeros(sample.images[shown.camera].shape[:2], np.bool_)))
+        assert {thing.state for thing in seen.objects} == {"found"}
+        assert {one.role for one in seen.detections} == {"found"}
 
     def test_reports_are_evaluators(self) -> None:
         """Each further report accepts the same samples, and is NaN without samples."""

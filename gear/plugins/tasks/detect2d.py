@@ -9,7 +9,6 @@ from typing import Literal
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from gear.augment.geometry import (
     Geometry,
@@ -33,9 +32,9 @@ from gear.formats.billboard_info import billboard_info
 from gear.formats.jsontext import dump
 from gear.formats.mask_polygons import mask_polygons
 from gear.formats.png import encode_rgb
-from gear.groundtruth.boxes import box_in_camera
+from gear.groundtruth.boxes import box_in_camera, middle_in_camera
 from gear.groundtruth.objects import observe_objects
-from gear.groundtruth.regions import MOSTLY, part_boxes
+from gear.groundtruth.regions import MOSTLY, part_boxes, share_inside
 from gear.groundtruth.stray_pixels import without_strays
 from gear.groundtruth.visibility import Visibility
 from gear.metrics.coco_ap import CocoEvaluator
@@ -55,6 +54,7 @@ from gear.values.errors import FieldError
 from gear.values.frames import Frame, UInt8Image
 from gear.values.ground_truth import BoxPx
 from gear.values.labels import LABELS
+from gear.values.picture_objects import PictureDetection, PictureObject, PictureObjects
 from gear.values.rig import Rig
 from gear.values.scene import CameraRecord, SceneRecord
 from gear.values.serial import Json, from_json, to_json
@@ -222,10 +222,34 @@ class Detect2dTask:
         """
         mask = masks[VIEW]
         objects = tuple(
-            replace(thing, is_ignored=thing.is_ignored or _share_inside(thing, mask) > MOSTLY)
+            replace(thing, is_ignored=thing.is_ignored or share_inside(thing.box_px, thing.rle, mask) > MOSTLY)
             for thing in sample.objects
         )
         return replace(sample, objects=objects, ignored_px=(*sample.ignored_px, *part_boxes(mask)))
+
+    def picture_objects(self, sample: Detect2dSample, prediction: Sequence[coco.Detection]) -> PictureObjects:
+        """The labelled objects; ignored ones are boxes in which nothing is a false alarm."""
+        pinhole = sample.record.camera(VIEW).intrinsics
+        return PictureObjects(
+            camera=VIEW,
+            objects=tuple(
+                PictureObject(
+                    object_id=thing.object_id,
+                    label=coco.CATEGORY_NAMES[thing.category_id],
+                    box_px=thing.box_px,
+                    position_m=middle_in_camera(thing.amodal_box_px, thing.distance_m, pinhole),
+                )
+                for thing in sample.objects
+                if not thing.is_ignored
+            ),
+            detections=tuple(
+                PictureDetection(
+                    label=coco.CATEGORY_NAMES[int(one.category_id)], box_px=one.box_px, score=float(one.score)
+                )
+                for one in prediction
+            ),
+            ignored_px=(*(thing.box_px for thing in sample.objects if thing.is_ignored), *sample.ignored_px),
+        )
 
     def encode_prediction(
         self, sample: Detect2dSample, prediction: Sequence[coco.Detection], info: SplitInfo
@@ -313,17 +337,6 @@ def _with_polygons(item: coco.Annotation, picture: coco.Picture) -> coco.Annotat
     left, top, width, height = (round(side) for side in item.box_xywh)
     mask = rle.decode_crop(item.rle, picture.height_px, picture.width_px, (left, top, left + width, top + height))
     return replace(item, polygons=mask_polygons(mask, left, top))
-
-
-def _share_inside(thing: Object2d, mask: npt.NDArray[np.bool_]) -> float:
-    """Share of an object's visible pixels that lie in an (H, W) mask, 0..1."""
-    left, top, right, bottom = (round(side) for side in thing.box_px)
-    crop = mask[top:bottom, left:right]
-    if not crop.any():
-        return 0.0
-    height, width = mask.shape
-    visible = rle.decode_crop(thing.rle, height, width, (left, top, right, bottom))
-    return float((visible & crop).sum() / max(1, visible.sum()))
 
 
 def _name(index: int) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gear.augment.geometry import Geometry, Window, box_area, clipped, cut_picture, flip_array
+from gear.augment.geometry import Geometry, Window, box_area, clipped, cut_picture, flip_array, share_in_frame
 from gear.augment.pinhole import cut_index_box, index_frame, mirrored_pinhole, windowed_pinhole
 from gear.augment.registry import register
 from gear.contracts.evaluation import Masks
@@ -41,6 +41,7 @@ from gear.groundtruth.regions import MOSTLY, least_share_inside, part_boxes
 from gear.groundtruth.silhouettes import NEAR_M
 from gear.groundtruth.visibility import Visibility, VisibilityLimits
 from gear.metrics.kitti_ap import KittiEvaluator
+from gear.metrics.kitti_match import NEIGHBOURS, is_in_place, picture_detections
 from gear.metrics.kitti_reference import NearCars
 from gear.plugins.tasks.common import (
     IGNORED_COLOUR,
@@ -59,6 +60,7 @@ from gear.values.frames import Frame, SceneObject, UInt8Image, View
 from gear.values.geometry import Array, Intrinsics, wrap_angle_rad
 from gear.values.ground_truth import BoxPx, ObjectTruth
 from gear.values.labels import KittiType
+from gear.values.picture_objects import PictureObject, PictureObjects
 from gear.values.rig import Rig
 from gear.values.scene import SceneRecord
 from gear.values.serial import Json, from_json, to_json
@@ -252,6 +254,28 @@ class Stereo3dTask:
             regions += [to_edge_pixels(thing.box_px)] if is_inside else []
         boxes = tuple(from_edge_pixels(box, sample.calibration.intrinsics) for box in regions)
         return replace(sample, objects=tuple(objects), ignored_px=(*sample.ignored_px, *boxes))
+
+    def picture_objects(self, sample: Stereo3dSample, prediction: Sequence[KittiLabel]) -> PictureObjects:
+        """Cars, pedestrians and cyclists in the left picture; what is of another type is ignored."""
+        pairs = list(zip(sample.objects, _lines(sample), strict=True))
+        wanted = [(thing, line) for thing, line in pairs if line.type in NEIGHBOURS]
+        found = [one for one in prediction if one.type in NEIGHBOURS]
+        ignored = [*(line.box_px for _, line in pairs if line.type not in NEIGHBOURS), *sample.ignored_px]
+        return PictureObjects(
+            camera=LEFT,
+            objects=tuple(
+                PictureObject(
+                    object_id=thing.object_id,
+                    label=line.type,
+                    box_px=to_edge_pixels(line.box_px),
+                    position_m=thing.box.middle_m,
+                )
+                for thing, line in wanted
+            ),
+            detections=picture_detections(found),
+            ignored_px=tuple(to_edge_pixels(box) for box in ignored),
+            is_in_place=is_in_place([line for _, line in wanted], found),
+        )
 
     def encode_prediction(self, sample: Stereo3dSample, prediction: Sequence[KittiLabel], info: SplitInfo) -> Encoded:
         """Encodes a result file."""
@@ -448,15 +472,9 @@ def _placed(
     inside_px = clipped(box_px, (left + 0.5, top + 0.5, right - 0.5, bottom - 0.5))
     if inside_px[2] <= inside_px[0] or inside_px[3] <= inside_px[1]:
         return None
-    before, after = _share(thing.amodal_box_px, frame_px), _share(amodal_box_px, shown_px)
+    before, after = share_in_frame(thing.amodal_box_px, frame_px), share_in_frame(amodal_box_px, shown_px)
     inside = min(1.0, (1.0 - thing.truncated) * after / before) if before > 0 else 1.0 - thing.truncated
     return replace(thing, box=box, box_px=inside_px, amodal_box_px=amodal_box_px, truncated=1.0 - inside)
-
-
-def _share(box_px: BoxPx, frame_px: BoxPx) -> float:
-    """Share, 0..1, of a box that lies inside a frame."""
-    whole = box_area(box_px)
-    return box_area(clipped(box_px, frame_px)) / whole if whole > 0 else 0.0
 
 
 register(Stereo3dSample, Geometry(flip=flip, cut=cut, is_centred=True))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gear.contracts.tasks import NO_PATCH
+from gear.measuring.object_report import OBJECTS
 from gear.measuring.reports import OUTSIDE_PATCH, TASK
 from gear.values.serial import Json
 from gear.verbs.bench.plan import RANDOM
@@ -30,8 +31,9 @@ COLUMNS = (
     "low",
     "high",
     "ceiling",
+    "against",
 )
-"""Columns of bench.csv."""
+"""Columns of bench.csv. `against` is the pool with which objects are compared (`gear.metrics.object_changes`)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,16 +175,22 @@ class BenchReport:
         }
 
     def records(self) -> Iterator[Mapping[str, Json]]:
-        """The task's metric of every pool and every scene, one flat record each: the lines of bench.csv."""
+        """The task's metric of every pool and every scene, and what happens to objects in every pool, one flat record
+        each: the lines of bench.csv.
+        """
         for task in self.tasks:
             for one in task.results:
                 who = {"task": task.name, "model": one.model, "defense": one.defense or ""}
                 metric = "" if task.metric is None else task.metric.title
                 for pool in one.evaluation.pools:
-                    value, samples = task.value(pool), pool.samples
+                    where = {"scene": "all", "weather": "all", "patch": pool.name, "samples": pool.samples}
+                    value, against = task.value(pool), one.against(pool)
                     if value is not None:
-                        where = {"scene": "all", "weather": "all", "patch": pool.name, "samples": samples}
                         yield {**who, **where, "metric": metric, **value.as_json()}
+                    if against is not None and against.objects is not None:
+                        for name, count in against.objects.counts.items():
+                            title = metric_title(OBJECTS, name)
+                            yield {**who, **where, "metric": title, **count.rate.as_json(), "against": against.against}
                 for at in one.scenes:
                     where = {"scene": at.scene, "weather": at.weather, "patch": at.patch, "samples": at.samples}
                     yield {**who, **where, "metric": metric, **at.value.as_json()}
@@ -210,6 +218,7 @@ def _result_json(task: TaskResult, one: Result, out: Path) -> Json:
             "auroc": None if against is None or against.auroc is None else against.auroc.as_json(),
             "defense": dict(pool.as_json()["defense"]),
             "cost": dict(pool.cost),
+            **({} if against is None or against.objects is None else {"objects": against.objects.as_json()}),
         }
     return {
         "model": one.model,

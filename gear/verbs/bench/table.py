@@ -6,8 +6,19 @@ from collections.abc import Iterator
 
 from gear.measuring.text_table import number_table
 from gear.verbs.bench.report import BenchReport, Result, TaskResult
-from gear.verbs.evaluate.report import Pool
+from gear.verbs.evaluate.report import Difference, Pool
 from gear.verbs.evaluate.table import number, shown
+
+OBJECT_COLUMNS = {
+    "hidden": "hidden",
+    "misclassified": "misclassified",
+    "moved": "moved",
+    "invented on patch": "invented_on_patch",
+    "invented elsewhere": "invented_elsewhere",
+}
+"""Titles of the columns of detectors, and which counts of objects they show."""
+
+REST = ("AUROC", "mask IoU", "s/picture")
 
 ALONE = "-"
 """Cell of a row without a defense."""
@@ -31,7 +42,8 @@ def legend() -> str:
     return (
         "in brackets: 95 % intervals; change and AUROC: of a patch against a random one, and of a random one against "
         "none; outside patch: mean change of a picture, without the pixels of the patch where the task can leave them "
-        "out; p: how often chance alone changes as much"
+        "out; p: how often chance alone changes as much; hidden, misclassified, moved: shares of the objects found in "
+        "the twin; invented: detections per picture that neither an object nor the twin explains"
     )
 
 
@@ -45,7 +57,7 @@ def columns(task: TaskResult) -> list[list[str]]:
 def head(task: TaskResult) -> list[str]:
     """The titles of the columns."""
     metric = "" if task.metric is None else task.metric.title
-    return ["network", "defense", "patch", metric, "change", "outside patch", "p", "AUROC", "mask IoU", "s/picture"]
+    return ["network", "defense", "patch", metric, "change", "outside patch", "p", *OBJECT_COLUMNS, *REST]
 
 
 def lines(task: TaskResult) -> Iterator[list[str]]:
@@ -68,7 +80,13 @@ def line(task: TaskResult, one: Result, pool: Pool) -> list[str]:
         shown(task.change(against), is_signed=True),
         "" if test is None else number(test.mean, is_signed=True),
         "" if test is None else f"{test.p:.2g}",
+        *(_rate(against, name) for name in OBJECT_COLUMNS.values()),
         shown(None if against is None else against.auroc),
         number(pool.defense["mask_iou"]) if "mask_iou" in pool.defense else "",
         f"{pool.cost['model_s'] + pool.cost['defense_s']:.3f}",
     ]
+
+
+def _rate(one: Difference | None, name: str) -> str:
+    """How often a change happens to objects; empty for tasks without objects."""
+    return "" if one is None or one.objects is None else shown(one.objects.counts[name].rate)

@@ -23,7 +23,8 @@ from gear.measuring.statistics import (
     paired_p,
 )
 from gear.values.errors import DatasetError
-from gear.verbs.evaluate.report import ALARMS, Difference, Estimate, PairedTest, RowReport, Together
+from gear.verbs.evaluate.report import ALARMS, Difference, Estimate, ObjectChanges, PairedTest, RowReport, Together
+from gear.verbs.evaluate.twin_objects import object_changes
 
 ALARM = 0.5
 """Scores of a defense above this value are alarms."""
@@ -104,7 +105,7 @@ def row_report(row: Measured) -> RowReport:
         metrics=metrics_of(row),
         cost=mean_cost(notes),
         defense=mask_means(notes, has_patch=plan.info.patch_label != NO_PATCH),
-        per_sample=[{k: v for k, v in note.as_json().items() if k != "facts"} for note in notes],
+        per_sample=[{k: v for k, v in note.as_json().items() if k not in {"facts", "objects"}} for note in notes],
     )
 
 
@@ -194,7 +195,14 @@ def difference(row: Measured, other: Measured, seed: int) -> Difference:
         },
         auroc=_auroc(here, there, streets),
         paired={report: _tested(here, there, streets, report, seed) for report in row.scorer.reports},
+        objects=_objects(here, there, streets, seed),
     )
+
+
+def _objects(here: list[Note], there: list[Note], streets: list[Street], seed: int) -> ObjectChanges | None:
+    """What happens to the objects of each sample; None for tasks without objects."""
+    now, twin = ([note.outcomes for note in notes if note.outcomes is not None] for notes in (here, there))
+    return object_changes([note.index for note in here], now, twin, streets, seed) if now else None
 
 
 def _paired(one: Metrics, other: Metrics) -> dict[str, Estimate]:

@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.values.errors import GearError
 from gear.verbs.evaluate.compare import Measured, as_one, difference, mask_means, mean_cost, metrics_of
-from gear.verbs.evaluate.report import Pool
+from gear.verbs.evaluate.report import Difference, Pool
 
 Pools = Mapping[str, Sequence[str | Path]]
 """Roots of datasets by the name of the pool."""
@@ -53,9 +54,16 @@ def pooled(rows: Sequence[Measured], pools: Pools, seed: int) -> Iterable[Pool]:
             cost=mean_cost(one.notes),
             defense=mask_means(one.notes, has_patch=name != NO_PATCH),
             differences=tuple(
-                difference(one, wholes[other], seed) for other in others if _keys(found[other]) == _keys(members)
+                _counted(difference(one, wholes[other], seed))
+                for other in others
+                if _keys(found[other]) == _keys(members)
             ),
         )
+
+
+def _counted(one: Difference) -> Difference:
+    """The difference without the single changes of objects, whose samples are those of several datasets."""
+    return one if one.objects is None else replace(one, objects=replace(one.objects, changes=()))
 
 
 def _keys(members: Sequence[Measured]) -> list[tuple[str, int]]:

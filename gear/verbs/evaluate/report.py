@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gear.measuring.metric_json import known_json
-from gear.values.serial import Json
+from gear.metrics.object_changes import ObjectChange
+from gear.values.serial import Json, to_json
 
 ALARMS = "alarms"
 """Metric: share of a dataset's pictures whose score is an alarm; for clean pictures the rate of false alarms."""
@@ -131,6 +132,55 @@ class PairedTest:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ChangeCount:
+    """How often one kind of change happens between twins.
+
+    Attributes:
+        count: number of such changes from `against` to `row`.
+        reverse: number of such changes from `row` to `against`, which chance alone makes as likely.
+        rate: `count` as a share of the objects found in `against`; of invented detections, per picture.
+        paired: test of `count` minus `reverse` per picture.
+    """
+
+    count: int
+    reverse: int
+    rate: Estimate
+    paired: PairedTest
+
+    def as_json(self) -> Json:
+        """The entry of the change in results.json."""
+        return {
+            "count": self.count,
+            "reverse": self.reverse,
+            "rate": self.rate.as_json(),
+            "paired": self.paired.as_json(),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectChanges:
+    """What became of the objects that are found in the twin, and which detections are invented.
+
+    Attributes:
+        found: number of objects found in `against`.
+        counts: by kind (`gear.metrics.object_changes`) and place: `hidden`, `hidden_on_patch`, `hidden_elsewhere`, ….
+        changes: every change, with the index of its sample; empty for a pool.
+    """
+
+    found: int
+    counts: Mapping[str, ChangeCount]
+    changes: tuple[tuple[int, ObjectChange], ...]
+
+    def as_json(self) -> Json:
+        """The entry of the objects in results.json."""
+        return {
+            "found": self.found,
+            "counts": {name: one.as_json() for name, one in self.counts.items()},
+            "changes": [{"sample": index, **to_json(one)} for index, one in self.changes],
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
     """The difference between a dataset and its twin, sample by sample.
 
@@ -140,6 +190,7 @@ class Difference:
         auroc: area under the ROC curve of the defense's score as a detector of `row` among both, or None without
             scores.
         paired: tests of the metrics that are defined for single samples, by report and metric.
+        objects: what happens to objects between the twins; None for tasks without objects.
     """
 
     row: str
@@ -147,6 +198,7 @@ class Difference:
     metrics: Metrics
     auroc: Estimate | None
     paired: Mapping[str, Mapping[str, PairedTest]]
+    objects: ObjectChanges | None = None
 
     def as_json(self) -> Json:
         """The entry of the difference in results.json."""
@@ -158,6 +210,7 @@ class Difference:
             "paired": {
                 report: {name: one.as_json() for name, one in tests.items()} for report, tests in self.paired.items()
             },
+            **({} if self.objects is None else {"objects": self.objects.as_json()}),
         }
 
 

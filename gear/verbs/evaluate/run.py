@@ -74,8 +74,8 @@ def evaluate(
 
     The folder `out` gets results.json, table.txt, and for each dataset a folder with the predictions in the result
     layout of its format and a note per sample. Samples with a note are not predicted again, unless their files are
-    damaged (`RowReport.damaged`). Datasets that differ only in their patch are compared sample by sample. Intervals are
-    95 % intervals by the jackknife over streets (`gear.measuring.intervals`).
+    damaged (`RowReport.damaged`). Datasets that differ only in their patch are compared sample by sample, detectors
+    object by object. Intervals are 95 % intervals by the jackknife over streets (`gear.measuring.intervals`).
 
     Args:
         data: roots of datasets, or folders of such roots, all of one task; `DIR:SPLIT` selects a split.

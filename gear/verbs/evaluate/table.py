@@ -50,6 +50,7 @@ def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
     title += f" guarded by {guarded['name']}" if guarded else ""
     notes = [
         *_paired(report, labels),
+        *_objects(report, labels, width),
         *_limited(report, columns, labels),
         *_absent(report, labels),
         *_times(report),
@@ -134,6 +135,30 @@ def _paired(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
         ]
         lines += [f"  {labels[one.row]} minus {against.patch}: {', '.join(tests)}"] if tests else []
     return ["mean change of a sample (p: how often chance alone changes as much)", *lines] if lines else []
+
+
+SHOWN_CHANGES = ("hidden", "misclassified", "moved", "invented_on_patch", "invented_elsewhere")
+"""Counts of objects in the table; results.json has the others by place, and each single change."""
+
+
+def _objects(report: EvaluateReport, labels: Mapping[str, str], width: int) -> list[str]:
+    """A table of what happens to objects between twins."""
+    lines = []
+    for one in report.differences:
+        if one.objects is not None:
+            against = next(row for row in report.rows if row.name == one.against)
+            cells = [[f"    of {one.objects.found} found", "count", "reverse", "rate", "p"]]
+            for name in SHOWN_CHANGES:
+                change = one.objects.counts[name]
+                counts = [str(change.count), str(change.reverse), shown(change.rate), f"{change.paired.p:.2g}"]
+                cells.append([f"    {name.replace('_', ' ')}", *counts])
+            lines += [f"  {labels[one.row]} minus {against.patch}", *number_table(cells, width=width)]
+    head = (
+        "objects found in the twin that are not found here, and detections that the twin has not (reverse:",
+        "the same from here to the twin; rate: a share of the objects found, invented: per picture; p: how",
+        "often chance alone makes counts as unequal)",
+    )
+    return [*head, *lines] if lines else []
 
 
 def shown(one: Estimate | None, *, is_signed: bool = False) -> str:

@@ -1,0 +1,97 @@
+"""The report `objects`: what became of the objects, and false alarms on the patch and elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.contracts.evaluation import Spread, WithObjects
+from gear.contracts.tasks import Sample
+from gear.measuring.patch_area import patch_masks
+from gear.metrics.object_matching import outcomes
+from gear.metrics.patch_distance import PatchArea
+from gear.values.geometry import Array
+from gear.values.picture_objects import ObjectState, PictureOutcomes
+from gear.values.scene import Vec3
+
+OBJECTS = "objects"
+"""Name of the report."""
+
+ALARM_METRICS = ("false_alarms_on_patch", "false_alarms_elsewhere")
+"""Numbers of false alarms per picture."""
+
+STATES: tuple[ObjectState, ...] = ("found", "missed", "misclassified", "moved")
+
+STATE_METRICS = {f"{state}_share": state for state in STATES}
+"""Shares of the objects in each state."""
+
+
+class ObjectEvaluator:
+    """Gathers what became of the objects of each picture."""
+
+    def __init__(self, task: WithObjects) -> None:
+        """Args: task: of the samples."""
+        self._task = task
+        self.pictures: list[PictureOutcomes] = []
+
+    def update(self, sample: Sample, prediction: Any) -> Mapping[str, float]:
+        """Takes one sample in; returns the metrics of `result` for it."""
+        given = self._task.picture_objects(sample, prediction)
+        middles_m = [
+            _middle_m(surface.camera_from_surface)
+            for surface in sample.surfaces
+            if surface.camera == given.camera and surface.visible_px
+        ]
+        area = PatchArea(patch_masks(sample)[given.camera], middles_m)
+        self.pictures.append(outcomes(given, area))
+        return _values(_counts(self.pictures[-1]))
+
+    def merge(self, other: Any) -> None:
+        """Takes in the pictures of another one."""
+        self.pictures += other.pictures
+
+    def result(self) -> Mapping[str, float]:
+        """False alarms per picture on the patch and elsewhere, and the share of the objects in each state; NaN where
+        there is nothing to count.
+        """
+        return _values(self.totals()["counts"])
+
+    def totals(self) -> Mapping[str, npt.NDArray[Any]]:
+        """(7,) sums: pictures, false alarms on the patch and elsewhere, and objects by state."""
+        return {"counts": np.sum([_counts(one) for one in self.pictures], axis=0) if self.pictures else np.zeros(7)}
+
+    def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> Spread:
+        """The metrics of R sets of sums."""
+        rows = [_values(row) for row in totals["counts"]]
+        return {name: np.array([row[name] for row in rows]) for name in (*ALARM_METRICS, *STATE_METRICS)}
+
+    def range_of(self, metric: str) -> tuple[float, float]:
+        """Shares are at most 1."""
+        return 0.0, 1.0 if metric in STATE_METRICS else math.inf
+
+
+def _middle_m(camera_from_surface: tuple[float, ...]) -> Vec3:
+    """Middle of a surface in the camera's frame, from its pose as 16 numbers."""
+    return (camera_from_surface[3], camera_from_surface[7], camera_from_surface[11])
+
+
+def _counts(picture: PictureOutcomes) -> Array:
+    """(7,) as in `ObjectEvaluator.totals`."""
+    alarms = [one.patch.is_on_patch for one in picture.detections if one.is_false_alarm]
+    states = [thing.state for thing in picture.objects]
+    every = (1, sum(alarms), len(alarms) - sum(alarms), *(states.count(state) for state in STATE_METRICS.values()))
+    return np.array(every, dtype=np.float64)
+
+
+def _values(counts: Array) -> dict[str, float]:
+    """The metrics by name, from (7,) sums."""
+    pictures, on_patch, elsewhere, *states = (float(value) for value in counts)
+    objects = sum(states)
+    alarms = dict(zip(ALARM_METRICS, (on_patch, elsewhere), strict=True))
+    found = {name: value / pictures if pictures else math.nan for name, value in alarms.items()}
+    shares = zip(STATE_METRICS, states, strict=True)
+    return found | {name: value / objects if objects else math.nan for name, value in shares}

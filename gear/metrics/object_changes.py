@@ -1,0 +1,93 @@
+"""What a patch does to the objects of a picture: the picture is compared with its twin, object by object.
+
+Twins show the same objects, so that an object is known by its id and class. Of the objects that are found in the twin,
+those that are missed in the picture are `hidden`, and the others that are not found are `misclassified` or `moved`
+(`gear.metrics.object_matching`). A detection is `invented` if it is background and the twin has no confident detection
+of its class that overlaps it by an IoU of at least 0.5.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from gear.metrics.boxes import iou_2d
+from gear.metrics.single_picture import MIN_OVERLAP
+from gear.values.ground_truth import BoxPx
+from gear.values.picture_objects import ObjectOutcome, ObjectState, PatchDistance, PictureOutcomes
+
+Change = Literal["hidden", "misclassified", "moved", "invented"]
+
+CHANGES: tuple[Change, ...] = get_args(Change)
+
+OF_OBJECTS: dict[ObjectState, Change] = {"missed": "hidden", "misclassified": "misclassified", "moved": "moved"}
+"""What happened to an object that is found in the twin, by its state in the picture."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectChange:
+    """One object, or one detection, that differs from the twin; JSON-ready.
+
+    Attributes:
+        change: what happened.
+        object_id: of the object; None for an invented detection.
+        label: class of the object, or of the invented detection.
+        box_px: of the object, or of the invented detection; edge pixels.
+        detected_as: class of the detection that is about the object; None for a hidden object.
+        score: of that detection, or of the invented one.
+        patch: distance from the patch.
+    """
+
+    change: Change
+    object_id: int | None
+    label: str
+    box_px: BoxPx
+    detected_as: str | None
+    score: float | None
+    patch: PatchDistance
+
+
+def found_in_twin(now: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectOutcome, ...]:
+    """The objects of a picture that are found in its twin."""
+    found = {(thing.object_id, thing.label) for thing in twin.objects if thing.state == "found"}
+    return tuple(thing for thing in now.objects if (thing.object_id, thing.label) in found)
+
+
+def changes(now: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectChange, ...]:
+    """What differs from the twin: objects first, in the order of the ground truth, then detections, surest first."""
+    lost = [
+        ObjectChange(
+            change=OF_OBJECTS[thing.state],
+            object_id=thing.object_id,
+            label=thing.label,
+            box_px=thing.box_px,
+            detected_as=thing.detected_as,
+            score=thing.score,
+            patch=thing.patch,
+        )
+        for thing in found_in_twin(now, twin)
+        if thing.state != "found"
+    ]
+    invented = [
+        ObjectChange(
+            change="invented",
+            object_id=None,
+            label=one.label,
+            box_px=one.box_px,
+            detected_as=one.label,
+            score=one.score,
+            patch=one.patch,
+        )
+        for one in now.detections
+        if one.role == "background" and not _is_there(one.label, one.box_px, twin)
+    ]
+    return (*lost, *invented)
+
+
+def _is_there(label: str, box_px: BoxPx, twin: PictureOutcomes) -> bool:
+    """Whether a picture has a detection of a class at a place."""
+    others = [one.box_px for one in twin.detections if one.label == label]
+    overlaps = iou_2d(np.array([box_px]), np.array(others, dtype=np.float64).reshape(-1, 4))
+    return bool(overlaps.max(initial=0.0) >= MIN_OVERLAP)

@@ -1,0 +1,66 @@
+"""Where boxes lie relative to the visible pixels of the patches in a picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.ground_truth import BoxPx
+from gear.values.picture_objects import PatchDistance
+from gear.values.scene import Vec3
+
+MOSTLY = 0.5
+"""A box with a larger share of its pixels on a patch lies on the patch."""
+
+
+class PatchArea:
+    """The visible patches of one picture."""
+
+    def __init__(self, mask: npt.NDArray[np.bool_], middles_m: Sequence[Vec3] = ()) -> None:
+        """Args:
+        mask: (H, W) visible pixels of all patches.
+        middles_m: middle of each visible patch in the camera's frame.
+        """
+        self._mask, self._middles_m = mask, middles_m
+        self._distance_px: npt.NDArray[np.float32] | None = None
+        if mask.any():
+            away = (~mask).astype(np.uint8)
+            self._distance_px = np.asarray(cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE))
+
+    def distance(self, box_px: BoxPx, position_m: Vec3 | None = None) -> PatchDistance:
+        """Where a box lies.
+
+        Args:
+            box_px: in edge pixels; may leave the picture. Its pixels are those of the picture with a centre inside the
+                box, or the nearest pixel where there is none.
+            position_m: middle of the object in the camera's frame, if it is known.
+        """
+        if self._distance_px is None:
+            return PatchDistance(is_on_patch=False, pixels=None)
+        height, width = self._mask.shape
+        left, top, right, bottom = box_px
+        columns, rows = _pixels(left, right, width), _pixels(top, bottom, height)
+        share = float(self._mask[rows, columns].mean())
+        row, column = math.floor((top + bottom) / 2), math.floor((left + right) / 2)
+        is_centre_on = 0 <= row < height and 0 <= column < width and bool(self._mask[row, column])
+        metres = None
+        if position_m is not None and self._middles_m:
+            metres = round(min(math.dist(position_m, middle_m) for middle_m in self._middles_m), 3)
+        return PatchDistance(
+            is_on_patch=is_centre_on or share > MOSTLY,
+            pixels=round(float(self._distance_px[rows, columns].min()), 2),
+            metres=metres,
+        )
+
+
+def _pixels(low: float, high: float, size: int) -> slice:
+    """The pixels of a side of a picture with a centre between two edges; the nearest pixel where there is none."""
+    first, end = max(0, math.ceil(low - 0.5)), min(size, math.ceil(high - 0.5))
+    if first < end:
+        return slice(first, end)
+    nearest = min(max(0, math.floor((low + high) / 2)), size - 1)
+    return slice(nearest, nearest + 1)

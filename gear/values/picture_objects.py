@@ -1,0 +1,137 @@
+"""Objects of one picture with the detections of a network, and what became of each of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from gear.values.ground_truth import BoxPx
+from gear.values.scene import Vec3
+
+ObjectState = Literal["found", "misclassified", "moved", "missed"]
+
+DetectionRole = Literal["found", "misclassified", "moved", "duplicate", "ignored", "background"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PictureObject:
+    """An object that a detector should find.
+
+    Attributes:
+        object_id: the same in every sample of a sequence and in twins.
+        label: name of its class.
+        box_px: in edge pixels.
+        position_m: middle of the object in the camera's frame (x right, y down, z forward).
+    """
+
+    object_id: int
+    label: str
+    box_px: BoxPx
+    position_m: Vec3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PictureDetection:
+    """A detection of a network.
+
+    Attributes:
+        label: name of its class.
+        box_px: in edge pixels.
+        score: confidence; higher is surer.
+    """
+
+    label: str
+    box_px: BoxPx
+    score: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PictureObjects:
+    """What a detector should find in a picture, and what it said.
+
+    Attributes:
+        camera: name of the view that boxes and positions belong to.
+        objects: N objects.
+        detections: M detections of any score.
+        ignored_px: boxes, in edge pixels, in which a detection that finds no object is no false alarm.
+        is_in_place: (N, M) bool: whether a detection that fits an object in the picture also fits it in space; None for
+            tasks without a third dimension.
+    """
+
+    camera: str
+    objects: tuple[PictureObject, ...]
+    detections: tuple[PictureDetection, ...]
+    ignored_px: tuple[BoxPx, ...] = ()
+    is_in_place: npt.NDArray[np.bool_] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PatchDistance:
+    """How far something is from the patch.
+
+    Attributes:
+        is_on_patch: whether the centre of its box, or more than half of the box, lies on visible pixels of a patch.
+        pixels: from its box to the nearest visible pixel of a patch; None where no patch is visible.
+        metres: from its middle to the middle of the nearest visible patch; None where no patch is visible, and for
+            detections.
+    """
+
+    is_on_patch: bool
+    pixels: float | None
+    metres: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObjectOutcome:
+    """What became of one object.
+
+    Attributes:
+        object_id, label, box_px: as in `PictureObject`.
+        state: see `gear.metrics.object_matching`.
+        detected_as: class of the detection that explains the state; None for a missed object.
+        score: of that detection.
+        patch: distance from the patch.
+    """
+
+    object_id: int
+    label: str
+    box_px: BoxPx
+    state: ObjectState
+    detected_as: str | None
+    score: float | None
+    patch: PatchDistance
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetectionOutcome:
+    """What one confident detection is.
+
+    Attributes:
+        label, box_px, score: as in `PictureDetection`.
+        role: see `gear.metrics.object_matching`.
+        is_false_alarm: whether it fits no object of its class, and less than half of it lies in an ignored box.
+        patch: distance from the patch.
+    """
+
+    label: str
+    box_px: BoxPx
+    score: float
+    role: DetectionRole
+    is_false_alarm: bool
+    patch: PatchDistance
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PictureOutcomes:
+    """What became of the objects of one picture, and what its confident detections are; JSON-ready.
+
+    Attributes:
+        objects: in the order of the ground truth.
+        detections: surest first.
+    """
+
+    objects: tuple[ObjectOutcome, ...]
+    detections: tuple[DetectionOutcome, ...]
