@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -88,3 +89,22 @@ def test_alpha_stays_within_half_a_turn() -> None:
     """-3 rad seen along a ray 0.79 rad to the right is a turn further round, 2.5 rad."""
     box = Box3d(height_m=1, width_m=1, length_m=1, bottom_m=(10.0, 1.0, 10.0), rotation_y_rad=-3.0)
     assert box.alpha_rad == pytest.approx(2 * math.pi - 3.0 - math.pi / 4)
+
+
+def test_a_box_lies_about_its_own_centre_and_not_the_objects_origin() -> None:
+    rig = Rig(cameras=(CameraMount(name="left", width_px=612, height_px=185),))
+    thing = Thing(parts=CAR, position_m=(12.0, 2.0, 0.0), yaw_rad=0.8, object_id=2, role="npc")
+    frame, record = synthetic_frame(rig, [thing])
+    shape = replace(
+        frame.objects[2].shape, box_centre_m=np.array([0.7, -0.3, 1.1]), box_size_m=np.array([3.0, 1.2, 1.6])
+    )
+    camera = record.camera("left")
+    box = box_in_camera(replace(frame.objects[2], shape=shape), camera)
+    assert (box.length_m, box.width_m, box.height_m) == (3.0, 1.2, 1.6)
+    world_from_object = frame.objects[2].world_from_object
+    own = np.array([[0.7 + dx, -0.3 + dy, z] for dx in (-1.5, 1.5) for dy in (-0.6, 0.6) for z in (0.3, 1.9)])
+    expected, found = world_from_object.apply(own), camera.world_from_camera_transform.apply(box.corners_m)
+    assert {tuple(corner) for corner in found.round(6) + 0.0} == {tuple(corner) for corner in expected.round(6) + 0.0}
+    front = camera.world_from_camera_transform.inverse().rotation @ world_from_object.rotation[:, 0]
+    c, s = math.cos(box.rotation_y_rad), math.sin(box.rotation_y_rad)
+    np.testing.assert_allclose(front, [c, 0.0, -s], atol=1e-9)

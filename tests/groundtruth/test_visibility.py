@@ -128,6 +128,8 @@ def test_limits_may_let_everything_through() -> None:
 def test_three_pixels_are_not_mentioned() -> None:
     assert not VisibilityLimits().mentions(truth(visible_px=3))
     assert VisibilityLimits().mentions(truth(visible_px=4))
+    assert not VisibilityLimits().labels(truth(visible_px=3), BOX, 50.0), "what is not mentioned is no label either"
+    assert VisibilityLimits().labels(truth(visible_px=4), BOX, 50.0)
 
 
 @pytest.mark.parametrize(
