@@ -1,1 +1,3 @@
-"""The command line: one small file per command, which parses arguments, calls the library and prints."""
+"""The command line `gear`: one small file for each command, which parses arguments, calls the library and prints
+results.
+"""

@@ -1,4 +1,4 @@
-"""Output that cannot be written: a closed pipe, or a full disk."""
+"""Handles standard output that cannot be written: a closed pipe, or a full disk."""
 
 from __future__ import annotations
 

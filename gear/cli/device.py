@@ -1,4 +1,4 @@
-"""`--device`, for the commands that run networks."""
+"""The flag `--device` of the commands that run networks."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 
 
 def add_device(parser: argparse.ArgumentParser, settings: str) -> None:
-    """Adds the flag; its value becomes a setting of the model, in the argument named `settings`."""
+    """Adds the flag `--device`; its value is stored as a model setting in the argument that `settings` names."""
     parser.add_argument(
         "--device",
         choices=("auto", "cpu", "cuda"),
         action=_AsSetting,
         dest=settings,
         default=argparse.SUPPRESS,
-        help="where the model runs: auto takes a GPU where there is one (auto)",
+        help="device of the model: auto takes a GPU if there is one (auto)",
     )
 
 

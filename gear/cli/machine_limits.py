@@ -21,7 +21,7 @@ SAID = {
     "out of memory": MEMORY,
     "can't start new thread": THREADS,
 }
-"""Explanations by the texts that C and C++ libraries use in their errors."""
+"""What gear prints for a limit of the machine, by the text that a C or C++ library uses in its error."""
 
 
 def limit_reached(error: BaseException) -> str | None:

@@ -41,7 +41,7 @@ COMMANDS: dict[str, str] = {
     "show-config": "print the collection config that flags and files result in",
     "completion": "print a script with which a shell completes gear's commands and flags",
 }
-"""Command names with one line each; `gear.cli.commands.<name>` holds the command."""
+"""One-line description of each command; the module `gear.cli.commands.<name>` implements it."""
 
 EXAMPLES = """examples:
   gear collect --task stereo3d                      a KITTI stereo dataset around billboard01
@@ -56,20 +56,22 @@ CIRCUMSTANCES = {
     errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO,
     errno.ESTALE,
 }  # fmt: skip
-"""Errors of disks and permissions, which are printed as one line wherever they are raised."""
+"""Types of errors of disks and permissions. They are printed as one line without traceback, wherever they are
+raised.
+"""
 
 FULL = {errno.ENOSPC, errno.EDQUOT}
 
 NO_TEMPORARY = "No usable temporary directory"
-"""Beginning of Python's message when no folder for temporary files is usable; the message names no file."""
+"""Start of Python's message if no folder for temporary files can be used; the message names no file."""
 
 
 class Terminated(KeyboardInterrupt):
-    """A request to end the process (SIGTERM), for example by a batch system; handled like Ctrl-C."""
+    """Raised when the process shall end (SIGTERM), for example by a batch system; handled like Ctrl-C."""
 
 
 def entry() -> None:
-    """The console's entry point: runs the command of `sys.argv` and exits with its code."""
+    """Entry point of the console script: runs the command in `sys.argv` and exits with its exit code."""
     signal.signal(signal.SIGTERM, _terminate)
     sys.exit(main(sys.argv[1:]))
 
@@ -77,9 +79,12 @@ def entry() -> None:
 def main(argv: Sequence[str]) -> int:
     """Runs one command.
 
+    Args:
+        argv: words of the command line, without the program's name.
+
     Returns:
-        The exit code: 0; 2 for errors that the user can correct (one line on stderr); 130 when interrupted; 143 when
-        terminated. Bugs keep their traceback.
+        The exit code: 0 on success; 2 for an error that the user can put right (one line on stderr); 130 after Ctrl-C;
+        143 after SIGTERM. `verify` and `view` return 1 if files or samples are faulty. Bugs keep their traceback.
     """
     prepare_streams()
     try:

@@ -1,4 +1,4 @@
-"""Error messages as one line."""
+"""Formats error messages as one line."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ _QUOTED = re.compile(f"'[^']{{{LONGEST + 1},}}'|\"[^\"]{{{LONGEST + 1},}}\"")
 
 
 def one_line(error: object) -> str:
-    """An error's text without line breaks and control characters, its long quoted values cut at 200 characters."""
+    """The text of an error without line breaks and control characters; quoted values longer than 200 characters
+    are cut.
+    """
     text = " ".join(str(error).split("\n"))
     text = _QUOTED.sub(lambda found: f"{found[0][: LONGEST + 1]}…{found[0][0]}", text)
     return _CONTROL.sub(lambda found: repr(found[0])[1:-1], text)

@@ -1,4 +1,4 @@
-"""The parser of the command line: a mistyped flag gives one line with the closest known flag."""
+"""The parser of the command line: a mistyped flag gives one line that suggests the closest known flag."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from gear.cli.messages import one_line
 
 
 class Parser(argparse.ArgumentParser):
-    """An argparse parser whose errors are one line."""
+    """An argparse parser that prints errors as one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Prints one line and exits with code 2."""
+        """Prints the message as one line and exits with code 2."""
         self.exit(2, f"{self.prog}: {one_line(message)}; {self.prog} --help says more\n")
 
     def command(self, name: str) -> Parser:
@@ -25,7 +25,7 @@ class Parser(argparse.ArgumentParser):
         return parser
 
     def refuse(self, unknown: Sequence[str]) -> NoReturn:
-        """Prints one line about words that no argument takes, and exits with code 2."""
+        """Prints one line about words that no argument accepts, and exits with code 2."""
         flag = next((word.partition("=")[0] for word in unknown if word.startswith("-")), None)
         if flag is None:
             self.error(f"does not know what to do with {' '.join(unknown)!r}")

@@ -34,7 +34,7 @@ def request_of(kind: type[RequestT], args: argparse.Namespace, **given: Any) -> 
 
 
 def guard_of(args: argparse.Namespace) -> Guard | None:
-    """The defense that `--defense`, `--defense-set` and the calibration flags name; None without one.
+    """The defense that `--defense`, `--defense-set` and the calibration flags describe; None without `--defense`.
 
     Raises:
         GearError: options or calibration data are given without a defense.

@@ -1,4 +1,4 @@
-"""The terminal's streams: their encoding, and the width of their lines."""
+"""The encoding of the terminal's streams, and the width of their lines."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from gear.measuring.text_table import WIDTH
 
 
 def prepare_streams() -> None:
-    """Lets stdout and stderr take every character: those that their encoding lacks are written as `\\xe4`, `\\u2026`.
+    r"""Makes stdout and stderr accept every character; those that the encoding lacks are written as `\xe4` or `\u2026`.
 
-    A terminal in ASCII or Latin-1 would otherwise end a command with a UnicodeEncodeError after its work was done.
+    Otherwise a terminal in ASCII or Latin-1 would end a command with a UnicodeEncodeError after its work is finished.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

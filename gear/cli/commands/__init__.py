@@ -1,1 +1,5 @@
-"""Commands of `gear`, one file each: `add_arguments` adds the flags, `run` calls the library and prints."""
+"""The commands of `gear`, one file for each.
+
+`add_arguments` adds the command's flags to a parser. `run` calls the library, prints the result and returns the exit
+code.
+"""

@@ -1,4 +1,4 @@
-"""`gear attack`."""
+"""`gear attack`: optimises adversarial patches for a scene's surfaces against one or more models."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--attack", default="scene_specific", metavar="NAME", help="attack plugin (scene_specific)")
     parser.add_argument("--steps", type=int, metavar="N", help="most optimisation steps (300; with --queries no limit)")
     parser.add_argument(
-        "--queries", type=int, metavar="N", help="most forward passes of the model, for attacks without gradients"
+        "--queries",
+        type=int,
+        metavar="N",
+        help="most forward passes of the model, for attacks without gradients",
     )
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="an option of the attack"
@@ -73,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=1.0,
         metavar="W",
-        help="weight of uncovering the patch in the defense's mask; 0 for none (1)",
+        help="weight of removing the defense's mask from the patch; 0 for none (1)",
     )
     parser.add_argument(
         "--val",
@@ -97,14 +100,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--compositor", default="transport", metavar="NAME", help="transport, or homography")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random draws (0)")
     parser.add_argument("--allow-test-data", action="store_true", help="optimise on test splits too")
-    parser.add_argument("--force", action="store_true", help="replace what another attack left in --out")
+    parser.add_argument("--force", action="store_true", help="replace the results of another attack in --out")
     parser.add_argument(
         "--json", action="store_true", help="print attack.json; with --verify, both as attack and verify"
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the attack and prints where the patches are."""
+    """Runs the attack, prints the folder of the patches and returns exit code 0."""
     import json
 
     from gear.cli.requests import guard_of, request_of

@@ -1,4 +1,4 @@
-"""`gear bench`."""
+"""`gear bench`: runs a whole benchmark of networks, defenses, scenes and patches, and writes a report."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="a key of the config"
     )
-    parser.add_argument("--device", choices=("auto", "cpu", "cuda"), help="where networks run (as the config says)")
+    parser.add_argument(
+        "--device", choices=("auto", "cpu", "cuda"), help="device of the networks (the one in the config)"
+    )
     parser.add_argument("--workers", type=positive, default=1, metavar="N", help="processes of each collection (1)")
     parser.add_argument(
         "--list", action="store_true", help="print the commands that the bench consists of, and run none"
@@ -38,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the bench and prints its tables."""
+    """Runs the benchmark (or lists its commands), prints its tables and returns the exit code."""
     import json
 
     from gear.cli.requests import request_of

@@ -1,4 +1,4 @@
-"""`gear collect`."""
+"""`gear collect`: renders a dataset split, pictures with exact ground truth."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ EXAMPLE = """examples:
 
 
 def positive(text: str) -> int:
-    """A number of at least 1, for argparse."""
+    """Parses a whole number of at least 1, for argparse."""
     number = int(text)
     if number < 1:
         raise argparse.ArgumentTypeError("must be at least 1")
@@ -23,7 +23,7 @@ def positive(text: str) -> int:
 
 
 def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
-    """Flags that describe a collection; shared with `gear show-config`."""
+    """Adds the flags that describe a collection; `gear show-config` has the same flags."""
     parser.add_argument("--task", help="task plugin: semseg, detect2d, stereo3d, depth, or an installed one")
     parser.add_argument("--scene", help="scene of the town's library (billboard01 … 09, truck …), or FILE.yml:NAME")
     parser.add_argument("--town", help="name of a town, or path of its MJCF (town10)")
@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Collects and prints where the dataset is."""
+    """Collects the split, prints its folder and returns exit code 0."""
     from gear.cli.requests import request_of
     from gear.reporting.display import Display
     from gear.verbs.collect.request import CollectRequest

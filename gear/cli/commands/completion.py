@@ -1,4 +1,4 @@
-"""`gear completion`."""
+"""`gear completion`: prints a script with which a shell completes gear's commands and flags."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ EXAMPLE = """examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's arguments."""
     parser.epilog = EXAMPLE
-    parser.add_argument("shell", choices=SHELLS, help="whose script is printed")
+    parser.add_argument("shell", choices=SHELLS, help="shell for which the script is printed")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints a script that completes gear's commands and flags."""
+    """Prints the script and returns exit code 0."""
     import shtab
 
     from gear.cli.main import full_parser

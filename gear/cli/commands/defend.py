@@ -1,4 +1,4 @@
-"""`gear defend`."""
+"""`gear defend`: writes the pictures of a dataset as a defense cleans them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("dataset", help="root of a dataset of any task")
     parser.add_argument("--defense", required=True, metavar="NAME", help="defense plugin; gear plugins --kind defense")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the cleaned pictures")
-    parser.add_argument("--split", help="its split, where it has several")
+    parser.add_argument("--split", help="split to clean, if the dataset has several")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the defense's random draws (0)")
     parser.add_argument(
         "--set",
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Cleans the pictures and prints where they are."""
+    """Cleans the pictures, prints their folder and returns exit code 0."""
     from gear.cli.requests import request_of
     from gear.reporting.display import Display
     from gear.verbs.defend.request import DefendRequest

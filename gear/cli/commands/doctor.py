@@ -1,4 +1,4 @@
-"""`gear doctor`."""
+"""`gear doctor`: checks the renderers of this machine."""
 
 from __future__ import annotations
 
@@ -14,12 +14,16 @@ EXAMPLE = """examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
-    parser.add_argument("--renderer", help="only this one: raster, filament or classic")
+    parser.add_argument("--renderer", help="check only this renderer: raster, filament or classic")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Checks the renderers; the exit code is 0 if at least one (or the requested one) works, otherwise 2."""
+    """Checks the renderers and prints a report.
+
+    Returns:
+        Exit code: 0 if at least one renderer works (with `--renderer`: if that one works), otherwise 2.
+    """
     from gear.verbs.doctor import doctor
 
     report = doctor(args.renderer)

@@ -1,4 +1,4 @@
-"""`gear evaluate`."""
+"""`gear evaluate`: measures a model, with or without a defense, on datasets."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         nargs="+",
         metavar="DIR",
-        help="datasets of its task, twins among them; DIR:SPLIT, or a folder of datasets",
+        help="datasets of the model's task, also twins; DIR:SPLIT, or a folder of datasets",
     )
-    parser.add_argument("--split", help="of the datasets, where they have several")
+    parser.add_argument("--split", help="split to evaluate, if the datasets have several")
     parser.add_argument("--defense", metavar="NAME", help="defense plugin; gear plugins --kind defense")
     for flags, dest, what in (
         (("--set", "--model-set"), "model_settings", "model"),
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         dest="reports",
-        help="further metrics: reference (what a shipped network is held to), outside_patch, or a metric plugin"
+        help="further metrics: reference (by which shipped networks are judged), outside_patch, or a metric plugin"
         " (gear plugins --kind metric) as NAME or NAME:KEY=VALUE,...; repeatable",
     )
     parser.add_argument("--out", metavar="DIR", help="folder for the results (evaluations/<task>/<model>[+<defense>])")
@@ -72,12 +72,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:
     """Adds the flags that name the calibration data of a defense."""
-    parser.add_argument("--calibration", metavar="DIR", help="clean dataset that the defense is calibrated on")
-    parser.add_argument("--calibration-patched", metavar="DIR", help="its twin with patches")
+    parser.add_argument("--calibration", metavar="DIR", help="clean dataset on which the defense is calibrated")
+    parser.add_argument("--calibration-patched", metavar="DIR", help="twin of the calibration dataset, with patches")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Evaluates and prints the table."""
+    """Runs the evaluation, prints its table and returns exit code 0."""
     import json
 
     from gear.cli.requests import guard_of, request_of

@@ -1,4 +1,4 @@
-"""`gear export`."""
+"""`gear export`: writes a dataset in the layout of another tool, such as YOLO."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Exports the dataset and prints where it is."""
+    """Exports the dataset, prints the new folder and returns exit code 0."""
     from gear.reporting.display import Display
     from gear.verbs.export import export
 

@@ -1,4 +1,4 @@
-"""`gear gap`."""
+"""`gear gap`: how far composed patches differ from rendered ones, in pictures and in metrics."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset with probes")
-    parser.add_argument("--twin", metavar="DIR", help="its twin with patches, rendered")
-    parser.add_argument("--patch", help="a patch folder or picture, or random; the twin with it is rendered")
+    parser.add_argument("--twin", metavar="DIR", help="the rendered twin of the dataset, with patches")
+    parser.add_argument("--patch", help="a patch folder or picture, or random; the twin is rendered with it")
     add_places(parser)
-    parser.add_argument("--split", help="its split, where it has several")
+    parser.add_argument("--split", help="split to compare, if the dataset has several")
     parser.add_argument(
         "--model", metavar="NAME", help="also compare the effect of composed and rendered patches on this model"
     )
@@ -59,17 +59,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_places(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags for a town that does not come with gear."""
+    """Adds the flags for datasets of a town that is not part of gear: its MJCF file and its scene library."""
     parser.add_argument(
         "--town",
         metavar="FILE",
-        help="MJCF of the dataset's town, where it is not one of gear's: the twin is rendered in it",
+        help="MJCF file of the dataset's town, if it is not one of gear's; the twin is rendered in it",
     )
     parser.add_argument("--scenes", metavar="FILE", help="scene library of that town")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compares the pictures and prints the table."""
+    """Compares composed and rendered patches, prints the table and returns exit code 0."""
     from gear.cli.requests import guard_of, request_of
     from gear.dataset.json_text import dump_json
     from gear.measuring.gap.request import GapRequest

@@ -1,4 +1,4 @@
-"""`gear merge`."""
+"""`gear merge`: joins folders that `gear collect --shard` filled into one dataset."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Merges the folders and prints where the dataset is."""
+    """Merges the folders, prints the dataset's folder and returns exit code 0."""
     from gear.reporting.display import Display
     from gear.verbs.merge import merge
 

@@ -1,4 +1,4 @@
-"""`gear models`."""
+"""`gear models`: lists the installed networks, or shows one with its weights."""
 
 from __future__ import annotations
 
@@ -23,20 +23,22 @@ Nothing is downloaded: fetch published weights yourself, then `gear weights conv
 """
 
 HEAD = ("network", "tasks", "size", "weights", "usable", "summary")
-"""Titles of the list's columns."""
+"""Titles of the columns of the list."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
-    parser.add_argument("action", nargs="?", choices=("list", "show"), default="list", help="list, or show one (list)")
-    parser.add_argument("name", nargs="?", help="with show: its name")
+    parser.add_argument(
+        "action", nargs="?", choices=("list", "show"), default="list", help="list all, or show one (list)"
+    )
+    parser.add_argument("name", nargs="?", help="name of the network, with show")
     parser.add_argument("--task", help="only networks that do this task")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lists the installed networks, or prints one."""
+    """Lists the installed networks, or shows one; returns exit code 0."""
     from gear.networks.shipped import shipped_networks
     from gear.verbs.models import list_models
 
@@ -76,7 +78,7 @@ def the_one(models: Sequence[ModelFacts], name: str | None) -> ModelFacts:
 
 
 def row(model: ModelFacts) -> list[str]:
-    """The cells of a network in the list."""
+    """The cells of one network in the list, in the order of `HEAD`."""
     spec = model.spec
     size = f"{spec.parameters / 1e6:.1f} M" if spec.parameters else "-"
     weights = "shipped" if model.shipped else "published" if spec.published else "-"
@@ -87,7 +89,7 @@ def row(model: ModelFacts) -> list[str]:
 
 
 def details(model: ModelFacts) -> list[str]:
-    """All facts about one network, as lines."""
+    """All facts about one network, as lines of text."""
     spec = model.spec
     size = f"{spec.parameters / 1e6:.1f} M parameters" if spec.parameters else "size not stated"
     facts = [("tasks", ", ".join(spec.tasks)), ("size", size)]
@@ -102,7 +104,7 @@ def details(model: ModelFacts) -> list[str]:
 
 
 def shipped_line(weights: ShippedWeights | None) -> str:
-    """The reference weights in one line."""
+    """One line about the reference weights of a network."""
     if weights is None:
         return "none"
     facts = weights.to_json()

@@ -1,4 +1,4 @@
-"""`gear new`."""
+"""`gear new`: writes a small, complete Python package for a new plugin."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Writes the package and prints the next steps."""
+    """Writes the package, prints the next steps and returns exit code 0."""
     import shlex
 
     from gear.verbs.scaffold.write import new_package

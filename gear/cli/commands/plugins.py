@@ -1,4 +1,4 @@
-"""`gear plugins`."""
+"""`gear plugins`: lists the installed plugins, or shows one with its options."""
 
 from __future__ import annotations
 
@@ -24,15 +24,17 @@ EXAMPLE = """examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
-    parser.add_argument("action", nargs="?", choices=("list", "show"), default="list", help="list, or show one (list)")
-    parser.add_argument("name", nargs="?", help="with show: its name, or package/name")
-    parser.add_argument("--kind", choices=KINDS, help="only this kind")
+    parser.add_argument(
+        "action", nargs="?", choices=("list", "show"), default="list", help="list all, or show one (list)"
+    )
+    parser.add_argument("name", nargs="?", help="name of the plugin, or package/name, with show")
+    parser.add_argument("--kind", choices=KINDS, help="only plugins of this kind")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--strict-plugins", action="store_true", help="a plugin that failed to load is an error")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lists plugins, or prints one with its options."""
+    """Lists plugins, or shows one with its options; returns the exit code."""
     from gear.plugins.manager import catalogue
 
     found = catalogue()
@@ -45,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def show_all(found: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
-    """Lists the plugins that work, those that are broken, and clashes of names."""
+    """Lists the plugins that work, those that are broken, and clashes of names; returns the exit code."""
     from gear.plugins.describe import summary
 
     rows = [summary(plugin) for kind in kinds for plugin in found.of_kind(kind)]
@@ -70,7 +72,7 @@ def show_all(found: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
 
 
 def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) -> int:
-    """Prints one plugin with its options."""
+    """Prints one plugin with its options; returns the exit code."""
     from gear.plugins.describe import options, source_of, summary, training
 
     plugin = the_one(found, kinds, args.name)

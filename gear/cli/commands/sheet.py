@@ -1,4 +1,4 @@
-"""`gear sheet`."""
+"""`gear sheet`: draws samples of a dataset with their ground truth into one picture."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset")
-    parser.add_argument("--split", help="its split, where it has several")
+    parser.add_argument("--split", help="split to draw, if the dataset has several")
     parser.add_argument("--samples", type=positive, default=12, metavar="N", help="rows of the sheet (12)")
     parser.add_argument("--out", default="sheet.png", metavar="FILE", help="PNG to write (sheet.png)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Writes the sheet and prints its path."""
+    """Writes the picture, prints its path and returns exit code 0."""
     from gear.reporting.display import Display
     from gear.verbs.sheet import sheet
 

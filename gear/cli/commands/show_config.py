@@ -1,4 +1,4 @@
-"""`gear show-config`."""
+"""`gear show-config`: prints the complete collection config that results from flags and files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints the collection config that the flags and files result in, after checking that all names in it exist."""
+    """Prints the collection config after checking that all names in it exist; returns exit code 0."""
     from gear.collecting.lookup import look_up
     from gear.config.dump import to_yaml
     from gear.config.load import load_collection

@@ -1,4 +1,4 @@
-"""`gear towns`."""
+"""`gear towns`: lists towns and their scenes, or draws a map of a town and a picture of every scene."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lists towns, or draws one."""
+    """Lists towns, or draws one; returns the exit code."""
     from gear.values.errors import GearError
     from gear.verbs.towns.facts import read_town, town_names
     from gear.verbs.towns.write import check_pictures
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def draw(args: argparse.Namespace) -> int:
-    """Writes the map and the sheet and prints their paths."""
+    """Writes the map and the sheet of one town, prints their paths and returns the exit code."""
     from gear.reporting.display import Display
     from gear.verbs.towns.write import write_town
 

@@ -1,4 +1,4 @@
-"""`gear train`."""
+"""`gear train`: trains a network on collected data."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SECONDS = {"s": 1, "m": 60, "h": 3600, "": 60}
 
 
 def budget(text: str) -> float:
-    """Parses `90s`, `10m`, `1.5h` or a number of minutes to seconds; for argparse."""
+    """Parses a duration such as `90s`, `10m` or `1.5h` to seconds; a plain number means minutes. For argparse."""
     match = re.fullmatch(r"(\d+(?:\.\d*)?)([smh]?)", text.strip())
     if not match or not float(match[1]):
         raise argparse.ArgumentTypeError(f"a time is written 90s, 10m or 1.5h, got {text!r}")
@@ -38,8 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLE
     parser.add_argument("--task", required=True, metavar="NAME", help="task plugin; gear plugins --kind task")
     parser.add_argument("--model", required=True, metavar="NAME", help="model plugin; gear plugins --kind model")
-    parser.add_argument("--data", required=True, nargs="+", metavar="DIR", help="what to train on")
-    parser.add_argument("--val", nargs="+", default=[], metavar="DIR", help="what to validate on (a share of --data)")
+    parser.add_argument("--data", required=True, nargs="+", metavar="DIR", help="datasets to train on")
+    parser.add_argument(
+        "--val", nargs="+", default=[], metavar="DIR", help="datasets to validate on (a share of --data)"
+    )
     parser.add_argument("--out", required=True, metavar="DIR", help="folder of the results")
     length = parser.add_mutually_exclusive_group()
     length.add_argument("--epochs", type=positive, metavar="N", help="passes over the data (as the network's recipe)")
@@ -54,15 +56,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--init",
         metavar="FILE|NAME",
-        help="first weights: a file, shipped, imagenet …, trunk:FILE or trunk:MODEL for what fits of another network's "
-        "(random)",
+        help="initial weights: a file, shipped, imagenet …; trunk:FILE or trunk:MODEL takes what fits of another "
+        "network's (random)",
     )
     parser.add_argument(
         "--precision",
         choices=("auto", "float32", "bfloat16"),
-        help="of the training steps: auto is bfloat16 with --time-budget where it is quicker, else float32 (auto)",
+        help="precision of training steps: auto is bfloat16 with --time-budget if that is faster, else float32 (auto)",
     )
-    parser.add_argument("--device", choices=("auto", "cpu", "cuda"), help="where it runs (auto)")
+    parser.add_argument("--device", choices=("auto", "cpu", "cuda"), help="device of the training (auto)")
     parser.add_argument(
         "--workers", type=positive, metavar="N", help="reading threads; the result does not depend on them (2)"
     )
@@ -83,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Trains and prints the result."""
+    """Trains the network, prints the result and returns exit code 0."""
     from gear.cli.requests import request_of
     from gear.reporting.display import Display
     from gear.verbs.train.request import TrainRequest

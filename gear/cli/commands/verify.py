@@ -1,4 +1,4 @@
-"""`gear verify`."""
+"""`gear verify`: checks every file of a dataset against its recorded hash, and can make damaged samples again."""
 
 from __future__ import annotations
 
@@ -16,17 +16,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset")
     parser.add_argument("--split", help="split to check (all)")
-    parser.add_argument("--repair", action="store_true", help="make again what is damaged or missing")
+    parser.add_argument("--repair", action="store_true", help="make damaged and missing samples again")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     parser.add_argument("--patch", help="patch that the dataset shows, where its own copy is damaged")
-    parser.add_argument("--town", metavar="FILE", help="MJCF file of a town that is none of gear's own")
+    parser.add_argument("--town", metavar="FILE", help="MJCF file of the dataset's town, if it is not one of gear's")
     parser.add_argument("--scenes", metavar="FILE", help="scene library of that town")
-    parser.add_argument("--simulation", metavar="FILE", help="simulation config that is none of gear's own")
+    parser.add_argument("--simulation", metavar="FILE", help="simulation config, if it is not one of gear's")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes that make samples again (1)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints one line for each file that is not as it was written; the exit code is 1 when there are any."""
+    """Prints one line for each damaged, missing or unexpected file.
+
+    Returns:
+        Exit code: 0 if all files are as they were written, otherwise 1.
+    """
     import json
 
     from gear.reporting.display import Display

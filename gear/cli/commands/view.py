@@ -1,4 +1,4 @@
-"""`gear view`."""
+"""`gear view`: writes one self-contained HTML page that shows a dataset."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ The page is one file; it needs no server and no network. In it: ? lists the keys
 
 
 def megabytes(text: str) -> float:
-    """A size of at least 1 MB, for argparse."""
+    """Parses a size of at least 1 MB, for argparse."""
     number = float(text)
     if not 1 <= number <= 4000:
         raise argparse.ArgumentTypeError("must be 1 to 4000")
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset of any task")
-    parser.add_argument("--split", help="its split, where it has several")
+    parser.add_argument("--split", help="split to show, if the dataset has several")
     parser.add_argument("--samples", type=positive, metavar="N", help="only the first N samples (all)")
     parser.add_argument("--out", default="view.html", metavar="FILE", help="HTML file to write (view.html)")
     parser.add_argument(
@@ -40,7 +40,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Writes the page and prints its path; the exit code is 1 when samples could not be shown."""
+    """Writes the page and prints its path.
+
+    Returns:
+        Exit code: 0, or 1 if some samples could not be shown.
+    """
     from gear.reporting.display import Display
     from gear.view.write import write_view
 

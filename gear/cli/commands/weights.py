@@ -1,4 +1,4 @@
-"""`gear weights`."""
+"""`gear weights`: converts published weights files, averages two weights files, or shows a file's metadata."""
 
 from __future__ import annotations
 
@@ -47,9 +47,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     averaging.add_argument(
         "first", metavar="FIRST", help="a safetensors file, or a model whose shipped weights are meant"
     )
-    averaging.add_argument("second", metavar="SECOND", help="likewise")
+    averaging.add_argument(
+        "second", metavar="SECOND", help="the other one: a safetensors file, or a model whose shipped weights are meant"
+    )
     averaging.add_argument("out", metavar="OUT", help="the file to write; ends in .safetensors")
-    averaging.add_argument("--share", type=float, default=0.5, metavar="X", help="of the second, between 0 and 1 (0.5)")
+    averaging.add_argument(
+        "--share", type=float, default=0.5, metavar="X", help="share of the second file in the average, 0 to 1 (0.5)"
+    )
     averaging.add_argument("--half", action="store_true", help="store matrices in float16, half the size")
     averaging.add_argument("--json", action="store_true", help="print JSON")
     showing = actions.add_parser("show", help="print the metadata of a weights file")
@@ -58,12 +62,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the chosen action: convert, average or show."""
+    """Runs the chosen action (convert, average or show) and returns its exit code."""
     return {"convert": convert, "average": average, "show": show}[args.action](args)
 
 
 def convert(args: argparse.Namespace) -> int:
-    """Converts and prints the hash."""
+    """`gear weights convert`: writes the safetensors file, prints its hash and returns exit code 0."""
     from gear.verbs.weights.convert import convert_weights
 
     report = convert_weights(
@@ -73,7 +77,7 @@ def convert(args: argparse.Namespace) -> int:
 
 
 def average(args: argparse.Namespace) -> int:
-    """Averages and prints the hash."""
+    """`gear weights average`: writes the average of two weights files, prints its hash and returns exit code 0."""
     from gear.verbs.weights.average import average_weights
 
     return _say(average_weights(args.first, args.second, args.out, share=args.share, halves=args.half), args)
@@ -91,7 +95,7 @@ def _say(report: ConvertReport, args: argparse.Namespace) -> int:
 
 
 def show(args: argparse.Namespace) -> int:
-    """Prints the metadata in the file's header."""
+    """`gear weights show`: prints the metadata in a weights file's header and returns exit code 0."""
     from gear.verbs.weights.show import show_weights
 
     facts = show_weights(args.file).to_json()

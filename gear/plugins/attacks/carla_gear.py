@@ -1,9 +1,8 @@
-"""The scene-specific attack with the settings with which CARLA-GeAR's patches were made, without the defects of
-its code.
+"""The scene-specific attack with the settings of the CARLA-GeAR paper, without the defects of its code.
 
-The original's step sizes are in the input units of each network; here they are converted to patches in 0..1. Its
-segmentation networks took normalised pictures, so that a step of 0.5 was 0.5 standard deviations of ImageNet; its
-detectors and depth networks took pictures in 0..1; its stereo network took 0..255 with a step of 10.
+The original's step sizes are in the units of each network's input; here they are converted to patches in 0..1. Its
+segmentation networks took normalised pictures, so its step of 0.5 was 0.5 standard deviations of ImageNet. Its
+detectors and depth networks took pictures in 0..1. Its stereo network took 0..255, with a step of 10.
 """
 
 from __future__ import annotations
@@ -26,15 +25,15 @@ if TYPE_CHECKING:
 IMAGENET_STD = (0.229, 0.224, 0.225)
 PaperTask = Literal["semseg", "depth", "detect2d", "stereo3d"]
 STEREO_LOSSES_LEFT_OUT = ("rpn_class", "class")
-"""Stereo R-CNN's two classification losses, which the paper computes and does not attack."""
+"""Names of Stereo R-CNN's two classification losses, which the paper computes but does not attack."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CarlaGearConfig:
-    """Options: only the size; all other settings are the paper's.
+    """Options: only the size of the patches; all other settings are the paper's.
 
     Attributes:
-        height_px, width_px: size of every patch.
+        height_px, width_px: size of every patch, pixels.
     """
 
     height_px: int = 150
@@ -45,7 +44,10 @@ class CarlaGearConfig:
 
 
 class CarlaGear:
-    """One gradient of unit length per term, a constant learning rate, gamma 1 for segmentation and 0.8 for depth."""
+    """The attack: the gradient of each term is scaled to length 1, and the learning rate is constant.
+
+    The weight gamma is 1 for segmentation and 0.8 for depth; `gear.plugins.attacks.optimisation.objectives` defines it.
+    """
 
     def __init__(self, config: CarlaGearConfig) -> None:
         self._config = config
@@ -60,10 +62,10 @@ class CarlaGear:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch per surface.
+        """Optimises one patch for each surface.
 
-        The paper's budget is 51 epochs of 100 samples: 2550 steps for segmentation, which takes two samples per step,
-        and 5100 for the other tasks.
+        The paper's budget is 51 epochs of 100 samples: 2550 steps for segmentation (two samples per step), and 5100 for
+        the other tasks.
         """
         from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
 
@@ -108,7 +110,7 @@ BRIGHTNESS: dict[PaperTask, float] = {"semseg": 0.02 / 0.224, "depth": 0.02, "de
 
 
 def task_of(sample: Any) -> PaperTask:
-    """The paper's task that a sample belongs to."""
+    """The task of the paper to which a sample belongs."""
     from gear.plugins.attacks.optimisation.objectives import kind_of
 
     kind = kind_of(sample)

@@ -1,4 +1,4 @@
-"""Cityscapes classes as options of targeted attacks."""
+"""Checks of Cityscapes classes in the options of targeted attacks."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if labe
 
 
 def check_classes(attacked: str, target: str) -> None:
-    """Checks that the target and the attacked class are evaluated classes or empty, and that an attacked class has
-    a target.
+    """Checks the options `attacked` and `target`: each is empty or a class that Cityscapes evaluates, and `attacked` is
+    only allowed together with `target`.
 
     Raises:
-        FieldError: one of these does not hold.
+        FieldError: an option is wrong; the message names it.
     """
     for name, value in (("attacked", attacked), ("target", target)):
         if value and value not in LABEL_IDS:
@@ -26,10 +26,10 @@ def check_classes(attacked: str, target: str) -> None:
 
 
 def check_seen(attacked: str, dataset: Sequence[Any]) -> None:
-    """Checks that some sample shows the attacked class, if one is named.
+    """Checks that at least one sample of the dataset shows the attacked class; "" passes.
 
     Raises:
-        GearError: no sample shows it, so that there is nothing to attack.
+        GearError: no sample shows the class, so there is nothing to attack.
     """
     if attacked and not any(bool((sample.label_ids == LABEL_IDS[attacked]).any()) for sample in dataset):
         raise GearError(

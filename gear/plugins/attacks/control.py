@@ -1,4 +1,6 @@
-"""Controls to compare attacks with: noise, one colour, and noise with the statistics of another patch."""
+"""Patches that are not optimised, as a comparison for attacks: noise, one colour, or noise with the statistics
+of another patch.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +29,9 @@ class ControlConfig:
 
     Attributes:
         kind: `noise` draws every value uniformly; `solid` is one colour; `matched` is noise with the mean colour, the
-            colour covariance and the power spectrum of the patches in `like`: as smooth and as colourful, but not
+            covariance of colours and the power spectrum of the patches in `like`: as smooth and as colourful, but not
             optimised.
-        height_px, width_px: size of every patch; `matched` takes the size of `like`.
+        height_px, width_px: size of every patch, pixels; `matched` takes the size of the patches in `like`.
         rgb: colour for `solid`, sRGB in 0..1.
         like: patch folder for `matched`.
     """
@@ -51,16 +53,16 @@ class ControlConfig:
 
 
 class Control:
-    """An attack that never queries the model."""
+    """An "attack" that never runs the model and does not optimise."""
 
     def __init__(self, config: ControlConfig) -> None:
         self._config = config
 
     def read_sha256(self) -> str | None:
-        """Hash of the exact patches in `like`, if that option is used.
+        """Hash of the exact patches in `like`; None if the option is not used.
 
         Raises:
-            GearError: the folder has none.
+            GearError: the folder has no exact patches.
         """
         if not self._config.like:
             return None
@@ -76,7 +78,7 @@ class Control:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Makes one patch per surface.
+        """Makes one patch for each surface.
 
         Raises:
             GearError: the folder `like` has too few patches.
@@ -96,14 +98,18 @@ class Control:
 
 
 def matched(original: Floats, rng: np.random.Generator) -> Floats:
-    """Noise with the statistics of a picture: its Fourier magnitudes with random phases, which are the same for
-    all channels, so
-    that colours vary together as in the picture (random phase noise; Galerne et al., 2011). Mean and standard deviation
-    are restored after values outside 0..1 are clipped.
+    """Random phase noise with the statistics of a picture (Galerne et al., 2011).
+
+    The noise has the picture's Fourier magnitudes with random phases. The phases are the same for all channels, so that
+    colours vary together as in the picture. Values outside 0..1 are clipped; mean and standard deviation are then
+    restored.
 
     Args:
         original: (H, W, 3) in 0..1.
-        rng: generator of the phases.
+        rng: random generator of the phases.
+
+    Returns:
+        (H, W, 3) in 0..1.
     """
     phases = np.angle(np.fft.fft2(rng.standard_normal(original.shape[:2])))
     mean, spread = original.mean(axis=(0, 1)), original.std(axis=(0, 1))
@@ -116,10 +122,11 @@ def matched(original: Floats, rng: np.random.Generator) -> Floats:
 
 
 def read_exact(folder: Path) -> list[Floats]:
-    """The exact patches of a folder that `gear attack` wrote, in the order of the surfaces, (H, W, 3) in 0..1.
+    """The exact (not rounded) patches in a folder that `gear attack` wrote, in the order of the surfaces: (H, W, 3) in
+    0..1.
 
     Raises:
-        GearError: the folder has none.
+        GearError: the folder has no exact patches.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load_file
@@ -138,7 +145,7 @@ def read_exact(folder: Path) -> list[Floats]:
 
 control: AttackSpec[ControlConfig] = AttackSpec(
     name="control",
-    summary="No attack: noise, one colour, or noise with another patch's statistics, to measure attacks against.",
+    summary="Patches without optimisation to compare attacks with: noise, one colour, or a patch's statistics.",
     config=ControlConfig,
     build=Control,
     needs_gradients=False,

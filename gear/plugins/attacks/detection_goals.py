@@ -1,7 +1,7 @@
-"""Targeted attacks on detectors: objects vanish, or an object appears where the patch is.
+"""Targeted attacks on detectors: all objects vanish, or an object appears on the patch.
 
-For both goals the labels are rewritten and the detector's own training losses against them are minimised, as in Lee and
-Kolter (2019) and in DPatch (Liu et al., 2019).
+For both goals the labels are replaced by the wanted ones, and the detector's own training losses against them are
+minimised, as in Lee and Kolter (2019) and in DPatch (Liu et al., 2019).
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ Goal = Literal["vanish", "appear"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectionGoal:
-    """An objective for samples with objects: both goals for `detect2d`, vanishing for `stereo3d`.
+    """An objective for samples with labelled objects: both goals for `detect2d`, vanishing for `stereo3d`.
 
     Attributes:
-        goal: no object is to be detected, or an object at the patch.
-        category_id: COCO category of the object that is to appear.
-        left_out: names of losses that are ignored.
+        goal: whether all objects vanish or one appears on the patch.
+        category_id: COCO category of the object that appears.
+        left_out: names of losses that are not used.
     """
 
     goal: Goal
@@ -45,7 +45,7 @@ class DetectionGoal:
         return {name: Term(value=-loss) for name, loss in losses.items() if name not in self.left_out}
 
     def rewritten(self, sample: Any) -> Any:
-        """The sample with the labels that the detector is to predict: none, or one object per visible surface."""
+        """The sample with the labels that the detector shall predict: none, or one object on each visible surface."""
         objects = self._on_surfaces(sample) if self.goal == "appear" else ()
         return dataclasses.replace(sample, objects=objects)
 

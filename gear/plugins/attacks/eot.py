@@ -1,8 +1,8 @@
-"""An attack that does not know the scene: patches are pasted upright at random sizes and places (EOT).
+"""An attack that does not use the scene: patches are pasted upright at random sizes and places (EOT).
 
-Expectation over transformation (Athalye et al., ICML 2018) with the transforms of Nesti et al. (WACV 2022), who compare
-their scene-specific attack with it: scale, shift, noise, brightness, contrast. The place of the board, its light and
-its occluders are not used.
+It is expectation over transformation (Athalye et al., ICML 2018) with the transforms of Nesti et al. (WACV 2022), who
+compare their scene-specific attack with it: scale, shift, noise, brightness and contrast. The position of the board,
+its light and its occluders are not used.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EotAppearance(Appearance):
-    """The appearance changes of Nesti et al. (WACV 2022); a class, so that setting one field keeps the others."""
+    """The appearance changes of Nesti et al. (WACV 2022). It is a class of its own so that a user can change one
+    field and keep the others.
+    """
 
     noise: float = 0.1
 
@@ -34,7 +36,7 @@ class EotConfig(Settings):
 
     Attributes:
         share: width of a pasted patch before scaling, as a share of the picture's width.
-        least_scale, most_scale: range of the scale.
+        least_scale, most_scale: range of the random factor on that width.
         shift: largest distance of the patch's centre from the picture's centre, as a share of the patch's size.
     """
 
@@ -53,7 +55,7 @@ class EotConfig(Settings):
 
 
 class Eot:
-    """Optimises patches that are pasted at random places; the compositor of the scene is not used."""
+    """Optimises patches that are pasted at random places; it does not use the scene's compositor."""
 
     def __init__(self, config: EotConfig) -> None:
         self._config = config
@@ -68,7 +70,7 @@ class Eot:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch per surface; all of them are pasted into every picture."""
+        """Optimises one patch for each surface; all of them are pasted into every picture."""
         from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
         from gear.plugins.attacks.optimisation.objectives import default_objective
         from gear.plugins.attacks.optimisation.upright_pasting import Upright
@@ -90,7 +92,7 @@ class Eot:
 
 eot: AttackSpec[EotConfig] = AttackSpec(
     name="eot",
-    summary="Patches pasted upright at random places and sizes, without the scene's geometry: the baseline.",
+    summary="EOT baseline: patches pasted upright at random places and sizes, without the scene's geometry.",
     config=EotConfig,
     build=Eot,
     needs_probes=False,

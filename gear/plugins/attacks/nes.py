@@ -1,8 +1,7 @@
-"""A black-box attack with gradients estimated from differences of the objective (NES; Ilyas et al., ICML 2018; or
-SPSA).
+"""A black-box attack that estimates gradients from differences of the objective: NES (Ilyas et al., ICML 2018) or SPSA.
 
-The gradient is estimated on a coarse grid that is upsampled to the patch, so that there are fewer numbers to estimate
-from the same number of queries.
+The gradient is estimated on a coarse grid and enlarged to the patch, so that fewer values must be estimated from the
+same number of queries.
 """
 
 from __future__ import annotations
@@ -27,13 +26,13 @@ class NesConfig:
     """Options.
 
     Attributes:
-        height_px, width_px: size of every patch.
-        grid_px: side of a grid cell in patch pixels.
-        draws: normal perturbations (`nes`), or random signs (`spsa`).
-        pairs: antithetic pairs of queries per step.
-        spread: size of the perturbations, in 0..1.
-        step: step size of every value, in 0..1.
-        batch: samples per query.
+        height_px, width_px: size of every patch, pixels.
+        grid_px: side of a cell of the coarse grid, in patch pixels.
+        draws: kind of random perturbations: normally distributed (`nes`), or random signs (`spsa`).
+        pairs: number of query pairs per step; each pair is a perturbation and its negative.
+        spread: size of the perturbations, on values in 0..1.
+        step: size of the step of every value, on values in 0..1.
+        batch: number of samples per query.
     """
 
     height_px: int = 150
@@ -55,7 +54,7 @@ class NesConfig:
 
 
 class Nes:
-    """Signed steps along the estimated gradient."""
+    """The attack: steps along the sign of the estimated gradient."""
 
     def __init__(self, config: NesConfig) -> None:
         self._config = config
@@ -70,7 +69,7 @@ class Nes:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch per surface."""
+        """Optimises one patch for each surface."""
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
         from gear.plugins.attacks.optimisation.loop import batch_of
         from gear.plugins.attacks.optimisation.objectives import default_objective
@@ -122,7 +121,7 @@ class Nes:
 
 nes: AttackSpec[NesConfig] = AttackSpec(
     name="nes",
-    summary="Black-box: gradients estimated from differences of the objective, NES or SPSA, counted in queries.",
+    summary="Black-box attack: gradients estimated from queries by NES or SPSA; the budget is --queries.",
     config=NesConfig,
     build=Nes,
     needs_gradients=False,

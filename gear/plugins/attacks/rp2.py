@@ -1,5 +1,4 @@
-"""Robust physical perturbations (RP2; Eykholt et al., CVPR 2018) on a billboard: all terms are summed into one
-loss.
+"""Robust physical perturbations (RP2; Eykholt et al., CVPR 2018) on a billboard: all terms are added to one loss.
 
 A perturbation of a base colour is kept small in the 2-norm and printable, while the mean loss over varied pictures is
 optimised: towards a target class for segmentation, away from the ground truth otherwise.
@@ -30,7 +29,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rp2Appearance(Appearance):
-    """Stronger changes of light and no blur; a class, so that setting one field keeps the others."""
+    """Stronger changes of light and no blur. It is a class of its own so that a user can change one field and
+    keep the others.
+    """
 
     brightness: float = 0.1
     contrast: float = 0.3
@@ -39,16 +40,15 @@ class Rp2Appearance(Appearance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rp2Config(TextureSettings):
-    """Options. Learning rate, height and the weight of the norm are those of the published GTSRB experiment; the
-    others are
-    gear's.
+    """Options. Learning rate, height and `norm_weight` are those of the published GTSRB experiment; the others are
+    gear's choice.
 
     Attributes:
-        base: grey value to which the perturbation is added, 0 to 1.
+        base: grey value, 0 to 1, to which the perturbation is added.
         norm_weight: weight of the perturbation's 2-norm.
         printability_weight: weight of the non-printability score, a mean over pixels.
         smoothness_weight: weight of the smoothness term, a mean over pixels.
-        attacked, target: classes for semantic segmentation, as in `scene_specific`.
+        attacked, target: for semantic segmentation: classes, as in the attack `scene_specific`.
     """
 
     height_px: int = 32
@@ -71,7 +71,7 @@ class Rp2Config(TextureSettings):
 
 
 class Rp2:
-    """Adam on the sum of all terms."""
+    """The attack: Adam on the sum of all terms."""
 
     def __init__(self, config: Rp2Config) -> None:
         self._config = config
@@ -86,7 +86,7 @@ class Rp2:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch per surface."""
+        """Optimises one patch for each surface."""
         from gear.plugins.attacks.optimisation.loop import Problem, one_gradient, optimise_textures
 
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
@@ -99,7 +99,7 @@ class Rp2:
         return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
 
     def objective(self, sample: Any) -> Objective:
-        """The loss of the target class, or the untargeted one."""
+        """The loss towards the target class if there is one, otherwise the untargeted loss."""
         from gear.plugins.attacks.optimisation.objectives import SemsegObjective, default_objective, kind_of
 
         config = self._config
@@ -137,7 +137,7 @@ class Rp2:
 
 rp2: AttackSpec[Rp2Config] = AttackSpec(
     name="rp2",
-    summary="Robust physical perturbations: a small printable perturbation, one summed loss.",
+    summary="RP2 (robust physical perturbations): a small, printable change of a base colour; one summed loss.",
     config=Rp2Config,
     build=Rp2,
 )

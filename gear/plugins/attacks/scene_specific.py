@@ -1,4 +1,4 @@
-"""The scene-specific attack with gear's settings: textures of one scene's surfaces, optimised by Adam through the
+"""The scene-specific attack with gear's settings: Adam optimises the textures of one scene's surfaces through the
 compositor.
 
 The method is that of CARLA-GeAR (Nesti et al., 2022), after Nesti et al. (WACV 2022), on patches in 0..1 and with a
@@ -34,19 +34,20 @@ class SceneSpecificConfig(Settings):
     """Options.
 
     Attributes:
-        learning_rate: null for 0.25 against depth networks, on which coarse patterns are effective, and 0.06 against
-            others.
-        gamma: semantic segmentation: weight of the pixels that are still right, 0 to 1; below 0 their current share of
-            all pixels. Depth: weight of the pixels whose error is below half a metre; 0.8 where below 0.
-        attacked, target: semantic segmentation: Cityscapes classes; pixels of `attacked` (all where empty) are pushed
-            to `target`; untargeted where `target` is empty.
-        direction: depth: change it in any direction, farther or nearer.
-        goal: any harm; make all objects vanish (detectors and stereo networks); or make an object appear on the patch
-            (2D detection).
-        appears: COCO category of the object that is to appear.
-        losses: detectors and stereo networks: sign of a loss by name, `+` to maximise, `-` to minimise, 0 to ignore,
-            such as `bbox_regression=-`; losses without a sign are maximised. With a `goal` other than harm every loss
-            is minimised, and a loss can only be ignored.
+        learning_rate: peak learning rate of Adam, one number or one for each channel. null takes 0.25 against depth
+            networks, on which coarse patterns are effective, and 0.06 against others.
+        gamma: for semantic segmentation: weight 0 to 1 of the pixels that are still classified correctly; below 0 their
+            current share of all pixels. For depth: weight of the pixels whose error is below half a metre; below 0
+            stands for 0.8.
+        attacked, target: for semantic segmentation: Cityscapes classes. Pixels of `attacked` (all pixels if empty) are
+            pushed to `target`. If `target` is empty, the attack is untargeted.
+        direction: for depth: `any` error, or depth that is `farther` or `nearer`.
+        goal: `harm` for any harm; `vanish` makes all objects vanish (detectors and stereo networks); `appear` makes an
+            object appear on the patch (2D detection).
+        appears: COCO category of the object that appears.
+        losses: for detectors and stereo networks: sign of each loss by name, `+` to maximise, `-` to minimise, 0 to
+            ignore, such as `bbox_regression=-`. Losses without a sign are maximised. With a `goal` other than `harm`
+            all losses are minimised, and a loss can only be ignored.
     """
 
     learning_rate: float | tuple[float, float, float] | None = None
@@ -73,13 +74,13 @@ class SceneSpecificConfig(Settings):
 
 
 LEARNING_RATES = {"depth": 0.25}
-"""Learning rates of tasks that need another one than the default; measured in docs/results/attacks.md."""
+"""Learning rates of tasks for which 0.06 is not the best; docs/results/attacks.md has the measurements."""
 
 SIGNS = {"+": 1.0, "-": -1.0, "0": 0.0}
 
 
 class SceneSpecific:
-    """Adam on the textures of all surfaces at once."""
+    """The attack: Adam on the textures of all surfaces together."""
 
     def __init__(self, config: SceneSpecificConfig) -> None:
         self._config = config
@@ -94,7 +95,7 @@ class SceneSpecific:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch per surface."""
+        """Optimises one patch for each surface."""
         from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
 
         objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
@@ -179,7 +180,7 @@ class SceneSpecific:
 
 scene_specific: AttackSpec[SceneSpecificConfig] = AttackSpec(
     name="scene_specific",
-    summary="Adam on the patches of one scene through the compositor, over appearances; gear's settings.",
+    summary="The main attack: Adam optimises a scene's patches through the compositor, with gear's settings.",
     config=SceneSpecificConfig,
     build=SceneSpecific,
 )

@@ -1,7 +1,7 @@
-"""A black-box attack by random search: squares of one colour, kept if they increase the objective.
+"""A black-box attack by random search: squares of one colour, kept if they increase the harm.
 
-Square attack (Andriushchenko et al., ECCV 2020) in the form of Sparse-RS for universal patches (Croce et al., AAAI
-2022): every colour is a corner of the colour cube, and the squares shrink along a schedule of the queries used.
+It is the Square attack (Andriushchenko et al., ECCV 2020) in the form of Sparse-RS for universal patches (Croce et al.,
+AAAI 2022): every colour is a corner of the colour cube, and the squares shrink as queries are used up.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from gear.values.errors import FieldError
 from gear.values.rng import derive_rng
 
 SCHEDULE = ((0.001, 1), (0.005, 2), (0.02, 4), (0.05, 8), (0.1, 16), (0.2, 32), (0.4, 64), (0.6, 128), (0.8, 256))
-"""Share of the queries used, and the divisor of the squares' area up to that share."""
+"""Pairs of a share of used queries and a divisor; up to that share the squares' area is divided by that divisor."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,10 +30,10 @@ class SquareConfig:
     """Options.
 
     Attributes:
-        height_px, width_px: size of every patch.
-        area: area of the first squares, as a share of the patch's.
-        batch: samples per query.
-        turns: how often the samples are redrawn within the budget.
+        height_px, width_px: size of every patch, pixels.
+        area: area of the first squares, as a share of the patch's area.
+        batch: number of samples per query.
+        turns: number of times that the samples are drawn anew within the budget.
     """
 
     height_px: int = 150
@@ -51,7 +51,7 @@ class SquareConfig:
 
 
 class Square:
-    """Random search over one square of one colour at a time."""
+    """The attack: random search that changes one square of one colour at a time."""
 
     def __init__(self, config: SquareConfig) -> None:
         self._config = config
@@ -66,7 +66,7 @@ class Square:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch per surface."""
+        """Optimises one patch for each surface."""
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
         from gear.plugins.attacks.optimisation.loop import batch_of
         from gear.plugins.attacks.optimisation.objectives import default_objective
@@ -129,7 +129,7 @@ class Square:
 
 square: AttackSpec[SquareConfig] = AttackSpec(
     name="square",
-    summary="Black-box: random search with squares of full colours, counted in queries.",
+    summary="Black-box attack: random search with squares of one colour; the budget is --queries.",
     config=SquareConfig,
     build=Square,
     needs_gradients=False,

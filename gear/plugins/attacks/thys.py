@@ -1,7 +1,7 @@
-"""The objectness attack of Thys et al. (CVPR workshops 2019) on a billboard: nothing is to be detected.
+"""The objectness attack of Thys et al. (CVPR workshops 2019) on a billboard: the detector shall detect nothing.
 
-Loss = mean over pictures of the highest objectness + 0.01 NPS + max(2.5 TV, 0.1), as published; Adam with learning rate
-0.03 from mid-grey noise.
+Loss = mean over pictures of the highest objectness + 0.01 NPS + max(2.5 TV, 0.1), as published, where NPS is the
+non-printability score and TV the total variation. Adam starts from mid-grey noise with learning rate 0.03.
 """
 
 from __future__ import annotations
@@ -26,12 +26,14 @@ if TYPE_CHECKING:
     from gear.plugins.attacks.optimisation.loop import Seen
 
 SCORES = ("objectness", "cls_logits")
-"""Raw outputs of detectors that are scores after a sigmoid."""
+"""Names of detectors' raw outputs that become scores by a sigmoid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThysAppearance(Appearance):
-    """The published uniform ranges as standard deviations; a class, so that setting one field keeps the others."""
+    """The published uniform ranges, as standard deviations. It is a class of its own so that a user can change
+    one field and keep the others.
+    """
 
     noise: float = 0.06
     brightness: float = 0.06
@@ -40,12 +42,12 @@ class ThysAppearance(Appearance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThysConfig(TextureSettings):
-    """Options, with the published constants as defaults.
+    """Options; the defaults are the published constants.
 
     Attributes:
         printability_weight: weight of the non-printability score, a sum over pixels divided by the number of values.
         variation_weight: weight of the total variation, a sum over values divided by their number.
-        least_variation: total variation below this value is not penalised further.
+        least_variation: the total variation, times its weight, is not penalised further below this value.
     """
 
     learning_rate: float | tuple[float, float, float] = 0.03
@@ -56,7 +58,7 @@ class ThysConfig(TextureSettings):
 
 
 class Thys:
-    """Minimises the most confident detection of every picture."""
+    """The attack: minimises the score of the most confident detection in every picture."""
 
     def __init__(self, config: ThysConfig) -> None:
         self._config = config
@@ -71,7 +73,7 @@ class Thys:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch per surface.
+        """Optimises one patch for each surface.
 
         Raises:
             GearError: the model has no output of objectness.
@@ -87,7 +89,7 @@ class Thys:
         return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
 
     def objective(self, sample: Any) -> Objective:
-        """The objective of the most confident detection."""
+        """The objective that lowers the most confident detection."""
         return SurestObjective()
 
     def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:
@@ -116,7 +118,7 @@ class Thys:
 
 
 class SurestObjective:
-    """An objective that grows as the confidence of the most confident detection falls."""
+    """An objective that grows as the score of the most confident detection falls."""
 
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
@@ -128,7 +130,7 @@ class SurestObjective:
 
 
 def surest(outputs: Mapping[str, Tensor]) -> Tensor:
-    """(B,) highest score of each picture, 0 to 1.
+    """(B,) highest score in each picture, 0 to 1.
 
     Raises:
         GearError: the model has no output of objectness.
@@ -143,7 +145,7 @@ def surest(outputs: Mapping[str, Tensor]) -> Tensor:
 
 thys: AttackSpec[ThysConfig] = AttackSpec(
     name="thys",
-    summary="Objectness: lowers the surest detection of every picture (after Thys et al.).",
+    summary="Objectness attack: lowers the most confident detection in every picture (Thys et al., 2019).",
     config=ThysConfig,
     build=Thys,
     tasks=("detect2d",),

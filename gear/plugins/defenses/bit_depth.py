@@ -40,17 +40,17 @@ class BitDepth(PerPicture):
         self._table = np.rint(np.rint(np.arange(256) / 255 * steps) / steps * 255).astype(np.uint8)
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The squeezed picture; no mask."""
+        """The picture with fewer bits per channel; no mask."""
         return self._table[picture], None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The squeezed values with the gradient of the identity."""
+        """The values with fewer bits; the gradient passes as if nothing had been done (BPDA)."""
         return straight_through(pictures, each_as_uint8(pictures, lambda picture: self._table[picture]))
 
 
 spec = DefenseSpec(
     name="bit_depth",
-    summary="Fewer bits a channel (feature squeezing).",
+    summary="Feature squeezing: fewer bits per colour channel.",
     config=BitDepthConfig,
     build=BitDepth,
     gradient="surrogate",

@@ -1,4 +1,6 @@
-"""FPDA (Rossolini et al., IEEE TNNLS 2023): HyperNeuron on features averaged over channels."""
+"""FPDA (Rossolini et al., IEEE TNNLS 2023): scores unusual features like HyperNeuron, after averaging them over
+channels.
+"""
 
 from __future__ import annotations
 
@@ -14,16 +16,18 @@ if TYPE_CHECKING:
     from torch import Tensor
 
 PEAK_CELLS = 3
-"""Side of the window that `peak` averages over."""
+"""Side in cells of the window over which the option `peak` averages."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FpdaConfig(DetectorConfig):
-    """Options. The paper says that features are compressed over channels and compared by z-scores.
+    """Options. The paper says that features are compressed over channels and compared by z-scores, but not how in
+    detail.
 
     Attributes:
-        compress: mean over channels, of the features or of their magnitudes.
-        aggregate: mean of the z-scores' magnitudes, or the largest mean of a 3 x 3 window, for distant patches.
+        compress: what is averaged over channels: the features (`mean`) or their magnitudes (`mean_abs`).
+        aggregate: `mean` is the mean magnitude of the z-scores; `peak` the largest mean of a 3 x 3 window, for patches
+            far away.
     """
 
     compress: Literal["mean", "mean_abs"] = "mean"
@@ -50,7 +54,7 @@ def build(config: FpdaConfig) -> Defense:
 
 spec = DefenseSpec(
     name="fpda",
-    summary="FPDA: HyperNeuron on features averaged over channels (one of the paper's detectors).",
+    summary="FPDA: scores unusual features, averaged over channels (a detector of the paper).",
     config=FpdaConfig,
     build=build,
     outputs=frozenset({"score"}),

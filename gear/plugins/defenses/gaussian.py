@@ -1,4 +1,4 @@
-"""Gaussian blur on every picture."""
+"""A defense that blurs every picture with a Gaussian."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class GaussianConfig:
     """Options of the blur.
 
     Attributes:
-        sigma_px: standard deviation, 0.1 to 20; the kernel ends at three of it.
+        sigma_px: standard deviation in pixels, 0.1 to 20; the kernel reaches three standard deviations.
     """
 
     sigma_px: float = 1.0
@@ -67,9 +67,9 @@ class Gaussian(PerPicture):
 
 
 def _mirrored(side_px: int, radius_px: int) -> npt.NDArray[np.int64]:
-    """Indices of the pixels of a row of `side_px` pixels with mirrored borders, mirrored repeatedly where the
-    border is wider than
-    the row. Torch's own padding allows no border wider than the picture.
+    """Indices of the pixels of a row of `side_px` pixels with mirrored borders of `radius_px` pixels.
+
+    If a border is wider than the row, the row is mirrored repeatedly; torch's own padding does not allow such borders.
     """
     there_and_back_px = max(2 * (side_px - 1), 1)
     steps = np.arange(-radius_px, side_px + radius_px) % there_and_back_px

@@ -19,11 +19,14 @@ FAR = 3.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HyperNeuronConfig(DetectorConfig):
-    """Options. The paper says that the score comes from the z-scores of all features of one layer, but not how.
+    """Options. The paper says that the score comes from the z-scores of all features of one layer, but not how they are
+    combined.
 
     Attributes:
-        statistics: statistics of each neuron (channel and position), or of each channel's mean over a picture.
-        aggregate: mean of the z-scores' magnitudes, their root mean square, or the share of magnitudes above 3.
+        statistics: what has a mean and a deviation: each `neuron` (channel and position), or the mean over a picture of
+            each `channel`.
+        aggregate: `mean` magnitude of the z-scores, their root mean square (`rms`), or the `share` of magnitudes above
+            3.
     """
 
     statistics: Literal["neuron", "channel"] = "neuron"
@@ -47,7 +50,7 @@ def build(config: HyperNeuronConfig) -> Defense:
 
 spec = DefenseSpec(
     name="hyperneuron",
-    summary="HyperNeuron: scores how unusual the deepest feature map is (one of the paper's detectors).",
+    summary="HyperNeuron: scores how unusual the deepest feature map is (a detector of the paper).",
     config=HyperNeuronConfig,
     build=build,
     outputs=frozenset({"score"}),

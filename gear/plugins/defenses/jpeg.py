@@ -1,4 +1,4 @@
-"""JPEG compression of every picture (Dziugaite et al., 2016)."""
+"""A defense that compresses every picture with JPEG (Dziugaite et al., 2016)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Jpeg(PerPicture):
         return self._recode(picture), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The decoded values with the gradient of the identity."""
+        """The decoded values; the gradient passes as if nothing had been done (BPDA)."""
         return straight_through(pictures, each_as_uint8(pictures, self._recode))
 
     def _recode(self, picture: UInt8Image) -> UInt8Image:

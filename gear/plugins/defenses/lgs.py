@@ -49,10 +49,11 @@ class LgsConfig:
 
 
 class Lgs(PerPicture):
-    """x * (1 - clip(lambda * g * B, 0, 1)): g the normalised gradient, B the union of busy windows.
+    """The defense: x * (1 - clip(lambda * g * B, 0, 1)), with the normalised gradient g and the union B of windows
+    whose mean gradient exceeds the threshold.
 
-    First-order differences of the grey picture, normalised to 0..1 over each picture. Windows that reach over the right
-    and lower border are averaged over what lies inside, so that no strip is left out.
+    g holds first-order differences of the grey picture, normalised to 0..1 for each picture. Windows that reach over
+    the right or lower border are averaged over their part inside, so that no strip of the picture is left out.
     """
 
     def __init__(self, config: LgsConfig) -> None:
@@ -110,7 +111,7 @@ class Lgs(PerPicture):
 
 spec = DefenseSpec(
     name="lgs",
-    summary="Local gradients smoothing: darkens what changes too quickly (one of the paper's defenses).",
+    summary="Local gradients smoothing: darkens regions with strong gradients (a defense of the paper).",
     config=LgsConfig,
     build=Lgs,
     outputs=frozenset({"images", "mask", "score"}),

@@ -1,4 +1,4 @@
-"""Median filter on every picture."""
+"""A defense that applies a median filter to every picture."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Median(PerPicture):
         return np.asarray(cv2.medianBlur(np.ascontiguousarray(picture), self._side_px), np.uint8), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The median picks a pixel of its window; the gradient goes to that pixel."""
+        """The filtered values. The median takes one pixel of its window; the gradient goes to that pixel."""
         from torch.nn import functional
 
         batch, channels, height, width = pictures.shape

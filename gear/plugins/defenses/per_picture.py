@@ -1,4 +1,4 @@
-"""Base of defenses that clean each picture separately: no model, no calibration, no randomness."""
+"""Base class of defenses that clean each picture separately: no model, no calibration, no randomness."""
 
 from __future__ import annotations
 
@@ -20,15 +20,22 @@ Mask = npt.NDArray[np.float32]
 
 
 class PerPicture(ABC):
-    """A `Defense` made of a function that cleans one picture, in NumPy and in torch."""
+    """A `Defense` that subclasses define by two functions that clean pictures: one in NumPy, one in torch."""
 
     @abstractmethod
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The cleaned (H, W, 3) sRGB picture, a new array, and the estimated patch mask in 0..1, or None."""
+        """Cleans one picture.
+
+        Args:
+            picture: (H, W, 3) uint8 sRGB.
+
+        Returns:
+            The cleaned picture, a new array, and the estimated mask of the patch in 0..1, (H, W), or None.
+        """
 
     @abstractmethod
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """(B, 3, H, W) in 0..1 to the same, with the gradient that the spec declares."""
+        """Cleans (B, 3, H, W) pictures in 0..1, with the gradient that the plugin's spec declares."""
 
     def fit(
         self,
@@ -37,7 +44,7 @@ class PerPicture(ABC):
         model: Model | None,
         rng: np.random.Generator,
     ) -> None:
-        """Needs no calibration."""
+        """Does nothing, since these defenses need no calibration."""
         return
 
     def apply(
@@ -63,7 +70,7 @@ class PerPicture(ABC):
 
 
 def straight_through(pictures: Tensor, cleaned: Tensor) -> Tensor:
-    """The cleaned values with the gradient of doing nothing (BPDA with the identity; Athalye et al., ICML 2018)."""
+    """The cleaned values, with the gradient of doing nothing (BPDA with the identity; Athalye et al., ICML 2018)."""
     return pictures + (cleaned - pictures).detach()
 
 

@@ -17,7 +17,7 @@ def build(config: ZMaskConfig) -> Defense:
 
 spec = DefenseSpec(
     name="zmask",
-    summary="Z-Mask: covers what over-activates shallow and deep layers (one of the paper's defenses).",
+    summary="Z-Mask: covers regions that over-activate shallow and deep layers (a defense of the paper).",
     config=ZMaskConfig,
     build=build,
     outputs=frozenset({"images", "mask", "score"}),

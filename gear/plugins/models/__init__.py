@@ -1,1 +1,1 @@
-"""Built-in models, one file each."""
+"""Built-in model plugins, one file each. `gear models` lists them."""

@@ -17,7 +17,7 @@ NAME = "adabins"
 
 
 def build(options: AdaBinsOptions) -> Model:
-    """The network with its weights.
+    """Makes the network with its weights.
 
     Raises:
         GearError: timm, torchvision or the weights are missing.
@@ -32,7 +32,7 @@ def build(options: AdaBinsOptions) -> Model:
 
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
-    """A checkpoint of the authors with the key names of the graph."""
+    """Renames the keys of the authors' checkpoint to those of gear's network."""
     from gear.networks.depth.adabins import from_official
 
     return from_official(state)

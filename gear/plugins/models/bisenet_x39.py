@@ -1,4 +1,4 @@
-"""BiSeNet with Xception39, a network of the paper: semantic segmentation in real time."""
+"""BiSeNet with Xception39: real-time semantic segmentation, one of the networks in the CARLA-GeAR paper."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ AUXILIARY_WEIGHT = 1.0
 
 
 def build(options: SegmentationOptions) -> SemsegNetwork:
-    """The network with its weights."""
+    """Makes the network with its weights."""
     from gear.networks.input_scale import input_scale_of
     from gear.networks.segmentation.bisenet import BiSeNetX39
     from gear.networks.segmentation.losses import SegmentationLosses
@@ -37,7 +37,7 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A published state with the network's own keys: `gear.networks.segmentation.bisenet.from_official`."""
+    """Converts a published state with `gear.networks.segmentation.bisenet.from_official`."""
     from gear.networks.segmentation.bisenet import from_official
 
     return from_official(state)

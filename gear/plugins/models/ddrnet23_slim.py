@@ -1,4 +1,4 @@
-"""DDRNet-23-slim, a network of the paper: semantic segmentation in real time."""
+"""DDRNet-23-slim: real-time semantic segmentation, one of the networks in the CARLA-GeAR paper."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ AUXILIARY_WEIGHT = 0.4
 
 
 def build(options: SegmentationOptions) -> SemsegNetwork:
-    """The network with its weights."""
+    """Makes the network with its weights."""
     from gear.networks.input_scale import input_scale_of
     from gear.networks.segmentation.ddrnet import DDRNet23Slim
     from gear.networks.segmentation.losses import SegmentationLosses
@@ -37,7 +37,7 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A published state with the network's own keys: `gear.networks.segmentation.ddrnet.from_official`."""
+    """Converts a published state with `gear.networks.segmentation.ddrnet.from_official`."""
     from gear.networks.segmentation.ddrnet import from_official
 
     return from_official(state)

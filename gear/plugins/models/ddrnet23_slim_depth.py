@@ -1,4 +1,4 @@
-"""Depth from DDRNet-23-slim's trunk: a reference network that two CPU cores train in minutes."""
+"""Monocular depth on DDRNet-23-slim: gear's reference network for depth, which two CPU cores train in minutes."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from gear.networks.depth.options import DepthOptions
 NAME = "ddrnet23_slim_depth"
 
 HABIT = 0.5
-"""Default factor of the input: half the sides make it fast on CPUs, and depth is smooth nearly everywhere."""
+"""Default input scale. Half the sides make the network fast on CPUs; little is lost, because depth is smooth
+nearly everywhere.
+"""
 
 
 def build(options: DepthOptions) -> Model:
-    """The network with its weights.
+    """Makes the network with its weights.
 
     Raises:
         GearError: the weights are missing.

@@ -1,4 +1,4 @@
-"""Faster R-CNN with ResNet-50 and a feature pyramid, a network of the paper: 2D detection."""
+"""Faster R-CNN with ResNet-50 and a feature pyramid: 2D detection, one of the networks in the CARLA-GeAR paper."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAME = "fasterrcnn_r50_fpn"
 
 
 def build(options: OfficialDetectorOptions) -> FasterRcnnDetector:
-    """The network with its weights."""
+    """Makes the network with its weights."""
     from gear.networks.detection.fasterrcnn import FasterRcnnDetector
     from gear.networks.detection.graphs import fasterrcnn_r50_fpn
     from gear.networks.detection.network import OFFICIAL_CATEGORIES, Sizing, fitted
@@ -32,7 +32,7 @@ def build(options: OfficialDetectorOptions) -> FasterRcnnDetector:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A published state with the network's own keys: `gear.networks.detection.official.from_official`."""
+    """Converts a published state with `gear.networks.detection.official.from_official`."""
     from gear.networks.detection.official import from_official
 
     return from_official(state)

@@ -1,4 +1,4 @@
-"""GLPDepth with its published encoder, MiT-b4 (Kim et al., arXiv 2201.07436)."""
+"""GLPDepth with its published encoder, MiT-b4 (Kim et al., arXiv 2201.07436): monocular depth."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAME = "glpdepth"
 
 
 def build(options: GlpnOptions) -> Model:
-    """The network with its weights.
+    """Makes the network with its weights.
 
     Raises:
         GearError: transformers or the weights are missing.
@@ -31,7 +31,7 @@ def build(options: GlpnOptions) -> Model:
 
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
-    """A checkpoint of the authors, or of transformers, with the key names of the graph."""
+    """Renames the keys of a checkpoint, by the authors or from transformers, to those of gear's network."""
     from gear.networks.depth.glpn_official import from_official
 
     return from_official(state)

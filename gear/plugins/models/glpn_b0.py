@@ -1,4 +1,4 @@
-"""GLPDepth with the smallest encoder, MiT-b0: a reference network that one GPU trains in minutes."""
+"""GLPDepth with the smallest encoder, MiT-b0: a reference network for depth that one GPU trains in minutes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NAME = "glpn_b0"
 
 
 def build(options: GlpnB0Options) -> Model:
-    """The network with its weights.
+    """Makes the network with its weights.
 
     Raises:
         GearError: transformers or the weights are missing.

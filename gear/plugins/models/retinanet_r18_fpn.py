@@ -1,4 +1,6 @@
-"""RetinaNets that gear trains: with ResNet-18, and with EfficientNet-Lite0, which may start from ImageNet."""
+"""Two RetinaNets that are trained on gear's own data: with ResNet-18, and with EfficientNet-Lite0 (ImageNet
+weights at the start).
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,7 @@ RECIPE = Recipe(
 
 
 def build_r18(options: ReferenceDetectorOptions) -> RetinaNetDetector:
-    """The network with ResNet-18 and its weights."""
+    """Makes the network with ResNet-18 and its weights."""
     from gear.networks.detection.graphs import retinanet_r18_fpn
     from gear.networks.detection.network import Sizing, scaled
     from gear.networks.detection.retinanet import RetinaNetDetector
@@ -48,7 +50,7 @@ def build_r18(options: ReferenceDetectorOptions) -> RetinaNetDetector:
 
 
 def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
-    """The network with EfficientNet-Lite0 and its weights."""
+    """Makes the network with EfficientNet-Lite0 and its weights."""
     from gear.networks.detection.graphs import retinanet_lite0_fpn
     from gear.networks.detection.network import Sizing, scaled
     from gear.networks.detection.retinanet import LiteRetinaNetDetector
@@ -64,14 +66,14 @@ def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
 
 
 def scale_of(options: ReferenceDetectorOptions, name: str) -> float:
-    """The factor by which pictures are resized: from the options, else from the weights, else 0.5."""
+    """The factor by which pictures are resized: from the options, otherwise from the weights, otherwise 0.5."""
     from gear.networks.input_scale import input_scale_of
 
     return input_scale_of(options, name, INPUT_SCALE)
 
 
 def start_from_imagenet(model: Any) -> None:
-    """Loads ImageNet weights into the trunk: `gear.networks.efficientnet_lite0.start_from_imagenet`."""
+    """Loads ImageNet weights into the trunk; see `gear.networks.efficientnet_lite0.start_from_imagenet`."""
     from gear.networks.efficientnet_lite0 import start_from_imagenet
 
     start_from_imagenet(model.graph.get_submodule("backbone"))

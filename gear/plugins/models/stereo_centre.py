@@ -1,4 +1,4 @@
-"""Objects by their centres in a rectified pair: gear's trainable references for stereo 3D detection."""
+"""Stereo networks that find objects by their centres: gear's reference networks for stereo 3D detection."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RECIPE = Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=4, epochs=20, gradi
 
 
 def build_resnet(options: StereoCentreOptions) -> StereoCentreNetwork:
-    """The network on its ResNet-18, with its weights."""
+    """Makes the network on ResNet-18, with its weights."""
     from gear.networks.network import Normalise
     from gear.networks.stereo.centre_network import StereoCentreNetwork
     from gear.networks.stereo.centre_resnet import StereoCentre
@@ -31,7 +31,7 @@ def build_resnet(options: StereoCentreOptions) -> StereoCentreNetwork:
 
 
 def build_lite0(options: StereoCentreOptions) -> StereoCentreNetwork:
-    """The network on EfficientNet-Lite0, with its weights."""
+    """Makes the network on EfficientNet-Lite0, with its weights."""
     from gear.networks.efficientnet_lite0 import MEAN, STD
     from gear.networks.network import Normalise
     from gear.networks.stereo.centre_lite0 import StereoCentreLite0
@@ -42,7 +42,7 @@ def build_lite0(options: StereoCentreOptions) -> StereoCentreNetwork:
 
 
 def start_from_imagenet(model: Any) -> None:
-    """Loads ImageNet weights into the trunk: `gear.networks.efficientnet_lite0.start_from_imagenet`."""
+    """Loads ImageNet weights into the trunk; see `gear.networks.efficientnet_lite0.start_from_imagenet`."""
     from gear.networks.efficientnet_lite0 import start_from_imagenet
 
     start_from_imagenet(model.graph)

@@ -1,4 +1,4 @@
-"""Stereo R-CNN (Li, Chen, Shen, CVPR 2019), the stereo network that CARLA-GeAR attacks."""
+"""Stereo R-CNN (Li, Chen, Shen, CVPR 2019): stereo 3D detection, one of the networks in the CARLA-GeAR paper."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from gear.networks.stereo.options import LEFT, RIGHT, StereoRcnnOptions
 
 
 def build(options: StereoRcnnOptions) -> Model:
-    """The network with its weights."""
+    """Makes the network with its weights."""
     from gear.networks.stereo.rcnn_network import StereoRcnnNetwork
 
     return StereoRcnnNetwork(options)
 
 
 def from_official(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A published state with the network's own keys; variances of the losses are added where they are missing."""
+    """The tensors of a published state; missing variances of the losses get their initial values."""
     from gear.networks.stereo.rcnn_graph import from_official
 
     return from_official(state)

@@ -1,4 +1,4 @@
-"""Random changes of a patch's appearance (expectation over transformation), in the order of CARLA-GeAR's transforms."""
+"""Random changes of a patch's appearance (expectation over transformation), in the order that CARLA-GeAR uses."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from gear.plugins.attacks.optimisation.settings import Appearance
 
 
 def vary(appearance: Appearance, patch: Tensor, rng: np.random.Generator) -> Tensor:
-    """One random appearance of a (3, h, w) patch in 0..1, differentiable: noise, brightness, contrast, blur."""
+    """Changes the appearance of a (3, h, w) patch in 0..1 at random: noise, brightness, contrast, blur;
+    differentiable.
+    """
     brightness, contrast, seed = rng.normal(), rng.normal(), int(rng.integers(2**63))
     side = int(rng.integers(3, max(appearance.blur_px, 3) + 1))
     seen = patch

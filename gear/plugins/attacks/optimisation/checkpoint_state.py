@@ -1,4 +1,4 @@
-"""Checks the state in the checkpoint of an attack before it is continued."""
+"""Checks the saved state of an attack before the attack is resumed from it."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from gear.contracts.attacks import State
 from gear.values.errors import GearError
 
 TEXTURE_AXES = 4
-"""Names of the axes of arrays with the shape of the textures."""
+"""Number of axes of arrays that have the shape of the textures (S, 3, h, w)."""
 
 
 def check_saved(saved: State, fresh: State) -> None:
-    """Checks that a saved state has the arrays of an initial state: same names, shapes and types.
+    """Checks that a saved state has the same arrays as an initial state: equal names, shapes and types.
 
     Raises:
-        GearError: it has not.
+        GearError: the saved state differs; the message names the array.
     """
     if missing := fresh.keys() - saved.keys():
         raise GearError(f"the saved attack is of an older gear, it lacks {', '.join(sorted(missing))}; start it afresh")

@@ -1,4 +1,4 @@
-"""A cache of the outputs of networks on pictures without a patch, which no patch changes."""
+"""A cache of what networks output on pictures without a patch; these outputs stay the same during an attack."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from gear.contracts.models import Model
 
 
 class CleanOutputs:
-    """Caches outputs, or values that an objective computes from them, by network and sample."""
+    """Cache of outputs, or of values that an objective computes from them, by network and sample."""
 
     def __init__(self) -> None:
         self._kept: dict[tuple[int, int], Tensor] = {}
 
     def of(self, model: Model, samples: Sequence[Any], indexes: Sequence[int], ask: Callable[[Any], Tensor]) -> Tensor:
-        """The cached values of a batch, (B, ...) in main memory.
+        """The values for a batch, (B, ...) in main memory; missing ones are computed and stored.
 
         Args:
             model: model whose outputs are cached.
             samples: samples of the batch.
             indexes: indices of the samples in the dataset.
-            ask: computes the value of a sample that is not cached; runs without gradients.
+            ask: function that computes the value of one sample; it runs without gradients.
         """
         for sample, index in zip(samples, indexes, strict=True):
             if (id(model), index) not in self._kept:

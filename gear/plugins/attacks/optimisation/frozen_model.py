@@ -10,7 +10,9 @@ from torch import nn
 
 
 def networks_of(model: Any) -> Iterator[tuple[str, nn.Module]]:
-    """The torch modules of a model: the model, or its attributes that are modules, and its taps."""
+    """The torch modules of a model, with their names: the model itself or those of its attributes that are
+    modules, and its taps.
+    """
     if isinstance(model, nn.Module):
         yield "model", model
         return
@@ -23,7 +25,9 @@ def networks_of(model: Any) -> Iterator[tuple[str, nn.Module]]:
 
 @contextlib.contextmanager
 def frozen(model: Any) -> Iterator[None]:
-    """A context in which no parameter requires a gradient: backward passes reach only the picture and cost less."""
+    """Context in which no parameter requires a gradient, so that backward passes compute only gradients of the
+    pictures.
+    """
     parameters = {id(p): p for _, network in networks_of(model) for p in network.parameters() if p.requires_grad}
     for parameter in parameters.values():
         parameter.requires_grad_(False)

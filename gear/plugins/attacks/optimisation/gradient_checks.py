@@ -1,4 +1,4 @@
-"""Checks for masked gradients: a step along the gradient must change the objective by the predicted amount."""
+"""Checks for masked gradients: a small step along the gradient must change the objective as the gradient predicts."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import torch
 from torch import Tensor
 
 STEP = 0.02
-"""Root mean square of the probing step over the patch's values, in 0..1: about five levels of a byte."""
+"""Root mean square over the patch's values of the test step, on values in 0..1: about five levels of a byte."""
 
 
 def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequence[Tensor]) -> tuple[float, float]:
-    """The change of an objective along its gradient: predicted by the gradient, and measured.
+    """The change of an objective along its gradient, as the gradient predicts it and as it is measured.
 
-    A ratio of measured to predicted change far below 1 indicates a masked gradient: by a defense, by saturation, or by
+    If the measured change is far below the predicted one, the gradient is masked: by a defense, by saturation, or by
     arithmetic that is not differentiable.
 
     Args:
@@ -43,5 +43,5 @@ def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequ
 
 
 def _room(patch: Tensor, gradient: Tensor) -> Tensor:
-    """1 where both ends of a step stay inside 0..1, else 0."""
+    """1 for values at which both ends of the step stay inside 0..1, otherwise 0."""
     return ((patch > STEP) & (patch < 1 - STEP)).to(gradient)

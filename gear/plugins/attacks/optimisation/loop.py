@@ -1,4 +1,4 @@
-"""The optimisation of textures: Adam along an ascent direction that the attack chooses."""
+"""The optimisation loop for textures: Adam along an ascent direction that the attack chooses."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ NO_GRADIENT = (
 
 
 ARRAYS, NUMBERS = ("textures", "mean", "square"), ("done", "seed", "has_gradient", "steps_without")
-"""What a checkpoint holds."""
+"""Names of the arrays and of the numbers in a checkpoint."""
 
 
 class TextureOptimiser:
-    """The state of a texture optimisation: textures, Adam's moments, and the number of steps done.
+    """The state of a texture optimisation: textures, Adam's moments, and the number of completed steps.
 
     `state` returns all of it, so that an interrupted optimisation can be resumed.
 
     Attributes:
-        has_gradient: whether any gradient has reached the textures.
-        steps_without: number of steps since the last gradient that was not zero.
+        has_gradient: whether any gradient other than zero has reached the textures.
+        steps_without: number of steps since the last such gradient.
     """
 
     def __init__(self, surfaces: int, settings: TextureSettings, rng: np.random.Generator, saved: State | None) -> None:
@@ -61,12 +61,12 @@ class TextureOptimiser:
         self.has_gradient, self.steps_without = bool(saved["has_gradient"]), int(saved["steps_without"])
 
     def note_gradient(self, gradient: float | None) -> None:
-        """Records the length of a step's gradient; None where the batch has nothing left that could be harmed."""
+        """Records the length of a step's gradient; None if nothing in the batch can be harmed any more."""
         self.steps_without = self.steps_without + 1 if gradient == 0 else 0
         self.has_gradient |= (gradient or 0.0) > 0
 
     def step(self, ascent: Tensor, share: float) -> None:
-        """One Adam step along the gradient, with `share` of the learning rate; textures stay in 0..1."""
+        """Makes one Adam step along the gradient, with `share` of the learning rate; textures stay in 0..1."""
         self.done += 1
         self.mean.lerp_(ascent, 1 - BETAS[0])
         self.square.lerp_(ascent.square(), 1 - BETAS[1])
@@ -75,7 +75,7 @@ class TextureOptimiser:
         self.textures = (self.textures + share * self.rate * mean / (square.sqrt() + EPSILON)).clamp(0, 1)
 
     def patches(self) -> tuple[Patch, ...]:
-        """The current textures, one patch per surface."""
+        """The current textures as patches, one for each surface."""
         rgb = self.textures.permute(0, 2, 3, 1).contiguous().numpy()
         return tuple(Patch(name=f"patch_{n}", rgb=one.copy()) for n, one in enumerate(rgb))
 
@@ -88,7 +88,7 @@ class TextureOptimiser:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Problem:
-    """An attacked model with the samples, the compositor and the settings of the attack.
+    """What an attack optimises: a model, samples, the compositor and the settings.
 
     Attributes:
         model, dataset, compositor: the arguments of `Attack.optimise`.
@@ -112,8 +112,15 @@ class Problem:
         return count
 
     def seen(self, textures: Tensor, indexes: Sequence[int], step: int, seed: int) -> Seen:
-        """Composes the textures into some samples' pictures. The appearance changes are drawn per sample and are the
-        same in both views of a stereo pair.
+        """Composes the textures into the pictures of some samples.
+
+        Changes of appearance are drawn for each sample; they are the same in both views of a stereo pair.
+
+        Args:
+            textures: (S, 3, h, w) in 0..1, one for each surface.
+            indexes: indices of the samples in the dataset.
+            step: number of the step, which the random draws depend on.
+            seed: seed of the random draws.
         """
         samples = [self.dataset[index] for index in indexes]
         looks = []
@@ -141,9 +148,11 @@ class Seen:
 
 
 Direction = Callable[[Tensor, Seen], tuple[Tensor, dict[str, float]]]
-"""A function from (S, 3, h, w) textures that require gradients, and a batch that shows them, to the ascent direction of
-the same shape and scalars for curves. The scalars hold `gradient`, the length of the objective's gradient, unless the
-batch has nothing left that could be harmed.
+"""A function that computes an ascent direction.
+
+It takes (S, 3, h, w) textures that require gradients and a batch that shows them. It returns the direction, with the
+same shape, and scalars for the training curves. The scalars contain `gradient`, the length of the objective's gradient,
+unless nothing in the batch can be harmed any more.
 """
 
 
@@ -156,15 +165,15 @@ def optimise_textures(
     monitor: Monitor | None = None,
     before: Callable[[int], None] | None = None,
 ) -> tuple[Patch, ...]:
-    """Optimises textures for all surfaces of the dataset jointly.
+    """Optimises the textures of all surfaces of the dataset together.
 
     Args:
         problem: model, samples, compositor and settings.
         ascend: computes the ascent direction.
-        budget: number of steps.
+        budget: largest number of steps.
         rng: generator of all random choices.
         monitor: called after every step.
-        before: called before every step with the number of steps done.
+        before: called before every step with the number of completed steps.
 
     Raises:
         GearError: no gradient of the objective reaches the textures, a gradient is not finite, or there is nothing to
@@ -197,7 +206,17 @@ def optimise_textures(
 
 
 def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
-    """Indices of the samples of a step. Every epoch has its own permutation, and a resumed run has the same batches."""
+    """Indices of the samples of a step.
+
+    Every epoch has another permutation of the samples. The indices depend only on the arguments, so a resumed run has
+    the same batches.
+
+    Args:
+        step: number of the step, from 0.
+        count: number of samples in the dataset.
+        size: number of samples per step.
+        seed: seed of the permutations.
+    """
     size = min(size, count)
     steps_per_epoch = count // size
     epoch, place = divmod(step, steps_per_epoch)
@@ -206,8 +225,8 @@ def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
 
 
 def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -> Direction:
-    """The direction of the scene-specific attack: the gradient of each term at unit length, minus those of the
-    regularisers.
+    """The direction of the scene-specific attack: the sum of the terms' gradients, each scaled to length 1,
+    minus the regularisers' gradients.
     """
 
     def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
@@ -246,10 +265,10 @@ def one_gradient(
     """The direction of attacks with one loss: the gradient of the sum of some scalars, without scaling.
 
     Args:
-        value: computes the objective's scalars by name from the textures and a batch; empty where nothing is left that
-            could be harmed.
-        penalties: computes further scalars from the textures alone. Their gradients exist even where no picture shows
-            the patch, so they do not count as gradients of the objective.
+        value: function from textures and a batch to the objective's scalars by name; it returns an empty mapping if
+            nothing in the batch can be harmed any more.
+        penalties: function from textures to further scalars. Their gradients exist even if no picture shows the patch,
+            so they do not count as gradients of the objective.
     """
 
     def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
@@ -274,7 +293,13 @@ def unit(gradient: Tensor) -> Tensor:
 
 
 def gradient_to(value: Tensor, textures: Tensor, *, keep: bool = False) -> Tensor:
-    """The gradient of a scalar with respect to a tensor; zeros where the scalar does not depend on it."""
+    """The gradient of a scalar with respect to the textures; zeros if the scalar does not depend on them.
+
+    Args:
+        value: the scalar.
+        textures: tensor that requires gradients.
+        keep: whether the graph is kept for another backward pass.
+    """
     if not value.requires_grad:
         return torch.zeros_like(textures)
     (gradient,) = torch.autograd.grad(value, textures, retain_graph=keep, allow_unused=True)

@@ -1,6 +1,4 @@
-"""Models that wrap models: several that are attacked at once, and one behind a defense that the attack takes into
-account.
-"""
+"""Models that wrap models: several that are attacked together, and one behind a defense."""
 
 from __future__ import annotations
 
@@ -20,11 +18,11 @@ from gear.values.frames import UInt8Image
 
 DefendsBatches = Callable[[Mapping[str, Tensor]], DefendedBatch]
 CleansBatches = Callable[[Mapping[str, Tensor]], Mapping[str, Tensor]]
-"""A function from (B, 3, H, W) pictures in 0..1, by camera name, to cleaned pictures of the same shapes."""
+"""A function that cleans pictures: from (B, 3, H, W) in 0..1 by camera name to the same."""
 
 
 class Group(nn.Module):
-    """Several models as one. Outputs, losses and taps are those of all members, named `<member>/<name>`.
+    """Several models that are attacked together. Outputs, losses and taps of a member are named `<member>/<name>`.
 
     Attributes:
         members: the models by name.
@@ -56,12 +54,11 @@ class Group(nn.Module):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefenseWeights:
-    """Weights with which an adaptive attack lowers a defense's score and mask while it harms the task; 0 leaves a term
-    out.
+    """Weights of the two terms by which an adaptive attack also fools the defense; 0 leaves a term out.
 
     Attributes:
-        score: weight of the defense's score.
-        mask: weight of the defense's mask on the patch.
+        score: weight of the term that lowers the defense's score.
+        mask: weight of the term that removes the defense's mask from the patch.
     """
 
     score: float = 1.0
@@ -72,16 +69,16 @@ USUAL_WEIGHTS = DefenseWeights()
 
 
 class Defended(nn.Module):
-    """A model whose pictures a defense cleans, for attacks that take the defense into account.
+    """A model whose pictures are cleaned by a defense, for adaptive attacks.
 
     Args:
         model: the model as the defense wraps it.
         defense: the defense.
         bare: the model without the wrapper, if the defense wraps it; its networks are attacked as well.
-        clean: cleans batches; the defense's `forward` by default.
-        detect: cleans batches and gives scores and masks; replaces `clean`.
+        clean: function that cleans batches; None for the defense's `forward`.
+        detect: function that cleans batches and also returns scores and masks; it replaces `clean`.
         weights: weights of the terms that lower the defense's score and mask.
-        calibrate: fits the defense; called by `calibrate`.
+        calibrate: function that fits the defense; the method `calibrate` calls it.
 
     Attributes:
         device: device of the model without the wrapper.
@@ -109,7 +106,9 @@ class Defended(nn.Module):
         self.networks = _networks(*(one for one in inside if one is not model or not isinstance(one, nn.Module)))
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """The prediction of the guarded model without the defense; attacks optimise `forward`."""
+        """The prediction of the guarded model on pictures that are not cleaned. Attacks use `forward`, which
+        cleans them.
+        """
         return self.model.predict(views)
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
@@ -117,7 +116,7 @@ class Defended(nn.Module):
         return self.model.forward(self.defended(views).views, targets)
 
     def defended(self, views: Mapping[str, Tensor]) -> DefendedBatch:
-        """The defense's result for a batch. The last result is cached together with its graph."""
+        """The defense's result for a batch. The last result and its graph are cached."""
         has_gradients = torch.is_grad_enabled()
         if self._last is None or self._last[0] is not views or self._last[1] != has_gradients:
             self._last = (views, has_gradients, self._defend(views))
@@ -129,13 +128,13 @@ class Defended(nn.Module):
 
 
 class Cleaned(Defended):
-    """A model whose pictures a defense without gradients cleans, for attacks that need no gradients.
+    """A model whose pictures are cleaned by a defense that is not differentiable, for attacks that need no gradients.
 
     The defense receives uint8 pictures, one sample at a time.
 
     Args:
         model, defense, bare: as for `Defended`.
-        clean: cleans the pictures of one sample.
+        clean: function that cleans the pictures of one sample.
     """
 
     def __init__(
@@ -169,26 +168,24 @@ def _cleaned_as_bytes(
 
 
 def _as_bytes(batch: Tensor) -> UInt8Image:
-    """(B, 3, H, W) values in 0..1 as (B, H, W, 3) uint8."""
+    """Converts (B, 3, H, W) values in 0..1 to (B, H, W, 3) uint8."""
     levels = (batch.clamp(0, 1) * 255).round().to(torch.uint8)
     return levels.permute(0, 2, 3, 1).contiguous().cpu().numpy()
 
 
 def _networks(*models: Model) -> nn.ModuleList:
-    """The torch modules inside of models that may be no modules themselves, so that they are frozen and
-    hashed as well.
-    """
+    """The torch modules in models that may not be modules themselves, so that they are frozen and hashed too."""
     return nn.ModuleList([network for model in models for _, network in networks_of(model)])
 
 
 def device_name(model: Model) -> str:
-    """The device that a model states; `cpu` where it states none."""
+    """Name of the device of a model; `cpu` if the model does not state one."""
     return str(getattr(model, "device", "cpu"))
 
 
 def members_of(model: Model) -> Mapping[str, Model]:
-    """The attacked models by prefix of their metrics: the members of a group, or the model itself with an
-    empty prefix.
+    """The attacked models by prefix of their metrics: the members of a group, or the model itself with the
+    prefix "".
     """
     if isinstance(model, Group):
         return {f"{name}/": member for name, member in model.members.items()}

@@ -1,8 +1,8 @@
-"""The objectives of attacks: terms for each task, computed from a model's outputs or losses.
+"""The objectives of attacks: for each task, terms that are computed from a model's outputs or losses.
 
-Every term grows with the harm. For segmentation and depth, pixels on the patch do not count, since an attack is
-measured by its effect on the rest of the picture. The losses of detectors and stereo networks cover the whole picture,
-as in training; no labelled object is on a board.
+Every term grows with the harm. For segmentation and depth, pixels that show the patch do not count, because an attack
+is measured by its effect on the rest of the picture. Losses of detectors and stereo networks cover the whole picture,
+as in training; there are no labelled objects on boards.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Kind = Literal["semseg", "depth", "losses"]
 
 
 def default_objective(sample: Any) -> Objective:
-    """The objective of untargeted harm to the sample's task."""
+    """The objective of an untargeted attack on the task of a sample."""
     kind = kind_of(sample)
     if kind == "semseg":
         return SemsegObjective()
@@ -43,14 +43,14 @@ def default_objective(sample: Any) -> Objective:
 
 
 def kind_of(sample: Any) -> Kind:
-    """The kind of terms that suit a sample, decided by its ground truth: labels, depth, or the model's own losses."""
+    """The kind of objective that fits a sample, by its ground truth: labels, depth, or the model's own losses."""
     if hasattr(sample, "label_ids"):
         return "semseg"
     return "depth" if hasattr(sample, "depth_m") else "losses"
 
 
 def outside(samples: Sequence[Any], view: str, device: torch.device) -> Tensor:
-    """(B, H, W) bool: pixels that show no patch surface."""
+    """(B, H, W) bool: True for pixels that show no patch surface."""
     masks = []
     for sample in samples:
         height, width = sample.images[view].shape[:2]
@@ -64,13 +64,14 @@ def outside(samples: Sequence[Any], view: str, device: torch.device) -> Tensor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SemsegObjective:
-    """Cross-entropy of the correctly classified pixels (Y) and of the misclassified ones (N); Rossolini et al., 2022.
+    """Cross-entropy in two terms: over the correctly classified pixels (Y) and over the misclassified ones (N)
+    (Rossolini et al., 2022).
 
     Attributes:
-        gamma: weight of Y's gradient, where N's has 1 - gamma; `dynamic` is the share of pixels that are classified
-            correctly.
-        attacked, target: label ids. Pixels of the class `attacked` (of any class if None) are pushed to the class
-            `target`; the attack is untargeted if `target` is None.
+        gamma: weight of the gradient of Y; that of N has 1 - gamma. `dynamic` takes the share of pixels that are
+            classified correctly.
+        attacked, target: label ids. Pixels of the class `attacked` (of all classes if None) are pushed to the class
+            `target`. If `target` is None, the attack is untargeted.
     """
 
     gamma: float | Literal["dynamic"] = "dynamic"
@@ -80,7 +81,9 @@ class SemsegObjective:
 
     @property
     def needs_clean_output(self) -> bool:
-        """Whether `harm` needs the output on the picture without the patch, once per sample."""
+        """Whether `harm` needs the network's output on the picture without the patch; it is computed once per
+        sample.
+        """
         return self.target is None and self.gamma != "dynamic"
 
     def terms(
@@ -100,11 +103,11 @@ class SemsegObjective:
         return _split(loss, {"correct": (right, gamma), "wrong": (wrong, 1 - gamma)})
 
     def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
-        """With a fixed `gamma`, the weighted sum of the terms, but with Y and N taken from the output without the
-        patch.
+        """The harm as one number. With a fixed `gamma` it is the weighted sum of both terms, where Y and N come from
+        the output without the patch.
 
-        With the current Y and N the metric would fall as the attack succeeds: pixels that become wrong leave Y, the
-        mean over the rest of Y is small, and it is 0 once no pixel is right.
+        With the current Y and N the value would fall while the attack succeeds: pixels that become wrong leave Y, the
+        mean over the rest of Y is small, and it is 0 when no pixel is right any more.
         """
         if not self.needs_clean_output:
             terms = [one.weight * one.value for one in self.terms(model, views, samples, indexes).values()]
@@ -143,10 +146,10 @@ class DepthObjective:
     errors.
 
     Args:
-        gamma: weight of the term of small errors, those of at most `split_m`; large errors have 1 - gamma.
-        split_m: limit between small and large errors in metres.
-        direction: `any` error, or only depth that is `farther` or `nearer` than the output without the patch; then the
-            one term is the mean change of the logarithm of depth.
+        gamma: weight of the term of small errors (at most `split_m`); that of large errors has 1 - gamma.
+        split_m: limit between small and large errors, metres.
+        direction: `any` error, or only depth that is `farther` or `nearer` than the output without the patch. For the
+            last two there is one term, the mean change of the logarithm of depth.
     """
 
     needs_clean_output = True
@@ -160,7 +163,7 @@ class DepthObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """Two terms, `small` and `large`; or one, named after the direction."""
+        """Two terms, `small` and `large`; or one term, named after the direction."""
         depth_m, clean, free = self._outputs(model, views, samples, indexes)
         if self._direction != "any":
             return {self._direction: Term(value=self._pushed(depth_m, clean, free))}
@@ -169,10 +172,10 @@ class DepthObjective:
         return _split(error, {"small": (small, self._gamma), "large": (free & ~small, 1 - self._gamma)})
 
     def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
-        """The mean error over small and large errors together.
+        """The mean error over all pixels, small and large errors together.
 
-        A weighted sum of both means would fall when an error grows past `split_m`, and one pixel with a large error
-        would count for more than all pixels with small errors.
+        A weighted sum of the means of small and large errors would fall when an error grows past `split_m`, and one
+        pixel with a large error would count for more than all pixels with small errors.
         """
         depth_m, clean, free = self._outputs(model, views, samples, indexes)
         if self._direction != "any":
@@ -199,10 +202,11 @@ class DepthObjective:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LossObjective:
-    """The model's own training losses against the ground truth, one term per loss, for detectors and stereo networks.
+    """The model's own training losses against the ground truth, for detectors and stereo networks; one term for each
+    loss.
 
     Attributes:
-        signs: weight of each loss by name: 1 maximises it, -1 minimises it, 0 ignores it; losses without a sign have
+        signs: weight of each loss by name: 1 maximises it, -1 minimises it, 0 ignores it. Losses without an entry have
             weight 1.
     """
 
@@ -211,7 +215,7 @@ class LossObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One term per loss."""
+        """One term for each loss."""
         losses = model.forward(views, samples)
         signs = {name: self.signs.get(name, 1.0) for name in losses}
         return {name: Term(value=loss, weight=signs[name]) for name, loss in losses.items() if signs[name]}
@@ -226,7 +230,7 @@ def counted(
 ) -> list[Tensor]:
     """Scalars whose sum is the harm by which patches are compared, over all members of a group.
 
-    These are the objective's `harm` if it has one, and its weighted terms otherwise.
+    For each member it is the objective's `harm` if it has that method, otherwise its weighted terms.
     """
     if isinstance(objective, HarmObjective):
         harms = [objective.harm(member, views, samples, indexes) for member in members_of(model).values()]
@@ -259,17 +263,17 @@ def all_terms(
     samples: Sequence[Any],
     indexes: Sequence[int],
 ) -> dict[str, Term]:
-    """The objective's terms for one model, with the terms against its defense, if it has one."""
+    """The objective's terms for one model, and the terms against its defense if it has one."""
     return {**objective.terms(member, views, samples, indexes), **defense_terms(member, views, samples)}
 
 
 def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[Any]) -> dict[str, Term]:
-    """The terms `defense_score` and `defense_mask`, which grow as the defense's score falls and its mask leaves the
+    """The terms `defense_score` and `defense_mask`; they grow as the defense's score falls and as its mask leaves the
     patch.
 
-    They are the negative means of the scores, and of the unrounded mask on the visible pixels of the patch, as in the
-    defense-aware attacks of Z-Mask's supplement (Rossolini et al., AAAI 2023). Empty for a model without a defense, for
-    a defense that gives neither score nor mask, and for weights of 0.
+    They are the negative mean of the scores, and the negative mean of the unrounded mask over the visible pixels of the
+    patch, as in the defense-aware attacks of Z-Mask's supplement (Rossolini et al., AAAI 2023). The result is empty for
+    a model without a defense, for a defense that returns neither score nor mask, and for weights of 0.
     """
     if not isinstance(member, Defended):
         return {}
@@ -283,7 +287,7 @@ def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[
 
 
 def not_finite(what: str, indexes: Sequence[int]) -> GearError:
-    """The error for a value that is not finite, with the samples for which it was computed."""
+    """The error for a value that is not finite; it names the samples for which the value was computed."""
     which = f"sample{'s' * (len(indexes) > 1)} {', '.join(map(str, indexes))}"
     return GearError(
         f"{what} is NaN or infinite, as is what the model says of {which} with the patch; see to its weights"
@@ -291,8 +295,8 @@ def not_finite(what: str, indexes: Sequence[int]) -> GearError:
 
 
 def loss_names(model: Model, sample: Any) -> list[str]:
-    """Names of a model's losses, or of those of all members of a group, in the order in which the model
-    returns them.
+    """Names of a model's losses (or of those of all members of a group), in the order in which the model returns
+    them.
     """
     views = as_batch([sample.images], list(sample.images))
     with torch.no_grad(), frozen(model):
@@ -301,7 +305,7 @@ def loss_names(model: Model, sample: Any) -> list[str]:
 
 
 def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
-    """(B, H, W) int64 targets for logits over 19 train ids or over label ids; 255 is ignored in both.
+    """(B, H, W) int64 targets for logits over 19 train ids or over label ids; 255 means that a pixel is ignored.
 
     Raises:
         ValueError: there are fewer classes than Cityscapes has train ids.
@@ -316,22 +320,22 @@ def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
 
 
 def class_of(label_id: int, classes: int) -> int:
-    """The channel of a label id in logits over `classes` classes."""
+    """The channel that belongs to a label id in logits with `classes` channels."""
     return int(TRAIN_IDS[label_id]) if classes == TRAIN_CLASSES else label_id
 
 
 def _is_right(logits: Tensor, labels: Tensor) -> Tensor:
-    """(B, H, W) bool: whether the most probable class is the label; without meaning where the label is ignored."""
+    """(B, H, W) bool: True where the most probable class is the label; meaningless where the label is ignored."""
     # `amax` is much faster than `argmax`.
     given = logits.gather(1, labels.clamp(max=logits.shape[1] - 1)[:, None])[:, 0]
     return given == logits.amax(1)
 
 
 def _output(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
-    """The output `name` of a model, checked for the picture's size.
+    """The output `name` of a model; its size must be that of the picture.
 
     Raises:
-        GearError: the model does not give this output, or gives it at another size.
+        GearError: the model has no such output, or its size differs.
     """
     outputs = model.forward(views)
     if name not in outputs:
@@ -350,7 +354,7 @@ def _output(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
 
 
 def _logits(model: Model, views: Mapping[str, Tensor]) -> Tensor:
-    """(B, C, H, W) logits of a network over Cityscapes' classes.
+    """(B, C, H, W) logits of a network over the classes of Cityscapes.
 
     Raises:
         GearError: the network has other classes.
@@ -373,15 +377,14 @@ def _mask(counts: str, height: int, width: int) -> npt.NDArray[np.bool_]:
 
 
 def _split(values: Tensor, parts: Mapping[str, tuple[Tensor, float]]) -> Mapping[str, Term]:
-    """One term per part: the mean over the part's pixels with the part's weight. Parts that are empty or have weight 0
-    have no term.
+    """One term for each part: the mean over the part's pixels, with the part's weight.
 
-    Counting the pixels of a part is several times as fast as `any`.
+    Parts that are empty or have weight 0 give no term. Counting the pixels of a part is several times as fast as `any`.
     """
     return {n: Term(value=_mean(values, where), weight=w) for n, (where, w) in parts.items() if w and where.sum()}
 
 
 def _mean(values: Tensor, where: Tensor) -> Tensor:
-    """Mean over the chosen pixels; 0 with a gradient of 0 where none is chosen."""
+    """Mean over the selected pixels; if none is selected, 0 with a gradient of 0."""
     # The mask is converted once: a product with bools converts them in the forward and in the backward pass.
     return (values * where.to(values.dtype)).sum() / where.sum().clamp_min(1)

@@ -1,4 +1,4 @@
-"""The objective for attacks without gradients: its value on some samples, with a budget of forward passes."""
+"""The objective for attacks without gradients: its value on some samples, with a limit on forward passes."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from gear.plugins.attacks.optimisation.objectives import counted, not_finite
 from gear.values.errors import GearError
 
 Textures = npt.NDArray[np.float32]
-"""(S, 3, h, w) in 0..1."""
+"""Textures of all surfaces, (S, 3, h, w) in 0..1."""
 
 
 class Oracle:
-    """Computes the harm of textures; one query is one forward pass of one model on a batch.
+    """Computes the harm of textures and counts queries. One query is one forward pass of one model on a batch.
 
-    Objectives that need the output on the picture without the patch (`needs_clean_output`) cost one more query per new
-    sample.
+    Objectives that need the output on the picture without the patch (`needs_clean_output`) cost one more query for each
+    new sample.
 
     Attributes:
-        left: queries that are left.
+        left: number of queries that are left.
     """
 
     def __init__(
@@ -41,30 +41,30 @@ class Oracle:
         self._seen: set[int] = set()
 
     def state(self) -> State:
-        """The used queries, for a checkpoint."""
+        """The number of used queries, for a checkpoint."""
         return {"left": np.array(self.left), "paid": np.array(sorted(self._seen), np.int64)}
 
     def restore(self, state: State) -> None:
-        """Restores the number of used queries from `state`.
+        """Restores the number of used queries from a checkpoint.
 
         Raises:
-            GearError: the saved state lacks that number.
+            GearError: the saved state does not contain that number.
         """
         check_saved(state, {"left": np.array(0), "paid": np.zeros(np.size(state.get("paid", ())), np.int64)})
         self.left, self._seen = int(state["left"]), {int(index) for index in state["paid"]}
 
     def cost(self, indexes: Sequence[int]) -> int:
-        """Queries that one evaluation on these samples costs."""
+        """Number of queries that one evaluation on these samples costs."""
         asks = isinstance(self._objective, HarmObjective) and self._objective.needs_clean_output
         clean = len(set(indexes) - self._seen) if asks else 0
         return len(members_of(self._model)) * (1 + clean)
 
     def harm(self, textures: Textures, indexes: Sequence[int]) -> float:
-        """The objective as one number, from forward passes without gradients.
+        """The harm of textures as one number, from forward passes without gradients.
 
         Raises:
-            RuntimeError: there are no queries left.
-            GearError: the objective is not finite.
+            RuntimeError: no queries are left.
+            GearError: the harm is not finite.
         """
         cost = self.cost(indexes)
         if self.left < cost:
@@ -82,6 +82,6 @@ class Oracle:
 
 
 def as_patches(textures: Textures) -> tuple[Patch, ...]:
-    """One patch per texture."""
+    """The textures as patches."""
     rgb = np.ascontiguousarray(textures.transpose(0, 2, 3, 1), np.float32)
     return tuple(Patch(name=f"patch_{n}", rgb=one) for n, one in enumerate(rgb))

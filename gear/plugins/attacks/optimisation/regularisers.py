@@ -1,4 +1,4 @@
-"""Regularisers that keep a patch printable: smoothness, and colours of a printing press."""
+"""Regularisers that keep a patch printable: smoothness, and colours that a printing press can print."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ SOLIDS_LAB = {
     ("m", "y"): (47.0, 68.0, 48.0),
     ("c", "m", "y"): (23.0, 0.0, 0.0),
 }
-"""CIELAB (D50) of paper and of the solid overprints of offset printing on coated paper: ISO 12647-2:2004, paper type 1,
-on which the characterisation data FOGRA39 rest."""
+"""CIELAB (D50) colours of paper and of solid overprints in offset printing on coated paper, from ISO
+12647-2:2004, paper type 1, on which the characterisation data FOGRA39 are based.
+"""
 
 COVERS = (0.0, 0.5, 1.0)
-"""Dot areas of each ink whose mixtures make the palette."""
+"""Dot areas of each ink, 0..1, whose combinations are the printable colours."""
 
 
 def smoothness(patch: Tensor) -> Tensor:
-    """Sum of squared differences of neighbouring pixels of a (3, h, w) patch: the paper's term, 0 for a single
-    colour.
+    """Sum of squared differences between neighbouring pixels of a (3, h, w) patch, as in the CARLA-GeAR paper; 0
+    for a single colour.
     """
     down, right = patch[:, 1:] - patch[:, :-1], patch[:, :, 1:] - patch[:, :, :-1]
     return down.square().sum() + right.square().sum()
@@ -42,8 +43,8 @@ def smoothness(patch: Tensor) -> Tensor:
 def non_printability(patch: Tensor) -> Tensor:
     """Sum over the pixels of a (3, h, w) patch in 0..1 of the distance to the nearest printable colour.
 
-    After Sharif et al. (CCS 2016), with the smallest distance as in Thys et al. (2019) instead of the product of
-    distances, whose gradient nearly vanishes with many colours.
+    Sharif et al. (CCS 2016) multiply the distances to all printable colours; with many colours the gradient of that
+    product nearly vanishes. The smallest distance is used instead, as in Thys et al. (2019).
     """
     palette = palette_srgb().to(patch)
     pixels = patch.flatten(1).T
@@ -52,7 +53,8 @@ def non_printability(patch: Tensor) -> Tensor:
 
 @functools.cache
 def palette_srgb() -> Tensor:
-    """(27, 3) sRGB values in 0..1: all mixtures of cyan, magenta and yellow at 0, 50 and 100 % coverage.
+    """The printable colours: (27, 3) sRGB values in 0..1 of all mixtures of cyan, magenta and yellow at 0, 50 and 100 %
+    coverage.
 
     Half coverage mixes paper and solid ink by area (Neugebauer's equations with Demichel's areas) in linear light.
     """
@@ -71,7 +73,7 @@ D50 = np.array([0.9642, 1.0, 0.8251])
 LINEAR_RGB_FROM_XYZ_D50 = np.array(
     [[3.1338561, -1.6168667, -0.4906146], [-0.9787684, 1.9161415, 0.0334540], [0.0719453, -0.2289914, 1.4052427]]
 )
-"""sRGB's primaries under D50 (Bradford adaptation)."""
+"""Matrix from CIE XYZ (D50) to linear sRGB, with Bradford adaptation."""
 
 
 def _xyz_from_lab(lab: tuple[float, float, float]) -> Floats:

@@ -1,4 +1,4 @@
-"""Settings of the texture optimisation. Importing them does not import torch, so that specs can use them."""
+"""Settings of the texture optimisation. The module does not import torch, so that plugin specs load quickly."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ USUAL_RATE = 0.06
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Appearance:
-    """Random changes of a printed and photographed patch, on values in 0..1; 0 for none.
+    """Random changes that imitate printing and photographing a patch, on values in 0..1; 0 switches a change off.
 
     Attributes:
         noise: standard deviation of noise on every value.
-        brightness: standard deviation of an offset on all values.
+        brightness: standard deviation of an offset that is the same for all values.
         contrast: standard deviation of a factor around 1.
-        blur_px: largest side of a box blur; the side is uniform between 3 and this value; below 3 for none.
+        blur_px: largest side of a box blur in pixels. The side is drawn uniformly between 3 and this; below 3 there is
+            no blur.
     """
 
     noise: float = 0.02
@@ -35,13 +36,13 @@ class Appearance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextureSettings:
-    """Settings of textures optimised by Adam, on values in 0..1.
+    """Settings of textures that Adam optimises, on values in 0..1.
 
     Attributes:
-        height_px, width_px: size of every patch.
-        batch: samples per step.
-        learning_rate: peak learning rate of Adam, one number or one per channel; null for 0.06, or the attack's default
-            for the task.
+        height_px, width_px: size of every patch, pixels.
+        batch: number of samples per step.
+        learning_rate: peak learning rate of Adam, one number or one for each channel; null takes the attack's own rate
+            for the task, 0.06 where it has none.
         decay: whether the learning rate falls to 0 along a cosine.
         appearance: random changes of the patch, drawn anew for every sample of every step.
     """
@@ -65,19 +66,19 @@ class TextureSettings:
 
     @property
     def rate(self) -> float | tuple[float, float, float]:
-        """The learning rate, or its default."""
+        """The learning rate; 0.06 if the setting is null."""
         return USUAL_RATE if self.learning_rate is None else self.learning_rate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings(TextureSettings):
-    """Texture settings with gradients of unit length per term, and regularisers.
+    """Texture settings for gradients that are scaled to length 1, with regularisers.
 
     Attributes:
-        smoothness: length of the gradient of the smoothness term; the objective's gradient has length 1.
+        smoothness: length of the gradient of the smoothness term, where the objective's gradient has length 1.
         printability: length of the gradient of the non-printability term.
-        per_term: whether the gradient of each term is scaled to unit length separately, with one backward pass per
-            term.
+        per_term: whether the gradient of each term is scaled to length 1 separately, which needs one backward pass for
+            each term.
     """
 
     smoothness: float = 0.1

@@ -1,4 +1,4 @@
-"""Pictures with patches pasted upright at random places, for attacks that do not know the scene."""
+"""Pictures with patches pasted upright at random places, for attacks that do not use the scene."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from gear.formats import rle
 from gear.values.rng import derive_rng
 
 Place = tuple[int, int, int, int]
-"""top, left, height, width in pixels; inside the picture."""
+"""Place of a pasted patch: top, left, height, width in pixels, inside the picture."""
 
 
 class Upright(Sequence[Any]):
-    """A dataset and a compositor in one: the surfaces of its samples are the places where patches are pasted.
+    """A dataset and a compositor in one; the surfaces of its samples are the random places where patches are pasted.
 
-    Both views of a stereo pair show a patch at the same place, like something far away.
+    Both views of a stereo pair show a patch at the same pixels, like an object very far away.
 
     Args:
-        dataset: dataset of the pictures; their own surfaces stay as they are.
+        dataset: dataset of the pictures; its own surfaces are not changed.
         seed: seed of the places.
         aspect: height of a patch divided by its width.
         share: width of a patch as a share of the picture's width.
@@ -47,7 +47,7 @@ class Upright(Sequence[Any]):
         self._step = 0
 
     def begin(self, step: int) -> None:
-        """Begins a step, for which new places are drawn."""
+        """Starts a step; new places are drawn for each step."""
         self._step = step
 
     def __len__(self) -> int:
@@ -73,8 +73,15 @@ class Upright(Sequence[Any]):
         return dataclasses.replace(sample, surfaces=tuple(surfaces))
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """Composes patches into pictures: (B, 3, H, W) in 0..1. Patches are (3, h, w) for all samples, or (B, 3,
-        h, w) with one per sample.
+        """Composes patches into pictures.
+
+        Args:
+            patches: (3, h, w) for all samples, or (B, 3, h, w) with a patch for each sample; 0..1.
+            samples: B indices in the dataset.
+            view: name of the camera.
+
+        Returns:
+            (B, 3, H, W) in 0..1.
         """
         pictures = []
         for number, index in enumerate(samples):
@@ -91,7 +98,7 @@ class Upright(Sequence[Any]):
         return torch.stack(pictures)
 
     def places(self, index: int) -> list[Place]:
-        """The place of each patch of a sample in this step: side by side, scaled and shifted."""
+        """The places of a sample's patches in this step: side by side, then scaled and shifted."""
         sample = self._dataset[index]
         height, width = next(iter(sample.images.values())).shape[:2]
         count = len(sample.record.surfaces)

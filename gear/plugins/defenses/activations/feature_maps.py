@@ -36,16 +36,16 @@ def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> d
     """Feature maps of a batch, with gradients if torch records them.
 
     Args:
-        model: with such taps.
+        model: model with these taps.
         batch: (B, 3, H, W) pictures in 0..1 by camera name.
-        names: of taps.
+        names: names of the taps.
 
     Returns:
         (B, C, h, w) float32 on the CPU by name of the tap. If a tap processes both pictures of stereo pairs in one
         batch, left pictures first, only the maps of the left pictures are returned.
 
     Raises:
-        GearError: the model has no such tap, or its output is no map.
+        GearError: the model has no such tap, or the tap's output is not a feature map.
     """
     taps, wanted = model.taps(), tuple(dict.fromkeys(names))
     count = len(next(iter(batch.values())))
@@ -76,7 +76,7 @@ def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> d
 
 
 def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:
-    """Name of the tap whose map has the fewest cells, and the last of these; `ct1` for BiSeNet.
+    """Name of the tap whose feature map has the fewest cells, of several such taps the last one; `ct1` for BiSeNet.
 
     Raises:
         GearError: the model has no taps.
@@ -91,6 +91,6 @@ def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:
 
 
 def spread(items: Sequence[Any], most: int) -> Iterator[Any]:
-    """Yields at most a given number of items, evenly spaced from the first on."""
+    """Yields at most `most` items, evenly spaced, starting with the first."""
     count = min(most, len(items))
     return (items[index * len(items) // count] for index in range(count))

@@ -1,4 +1,4 @@
-"""Common options of detectors."""
+"""Options that several detectors share."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlarmConfig:
-    """Option for the threshold of the alarm.
+    """Option that sets the score above which a detector raises an alarm.
 
     Attributes:
         false_alarms: share of clean calibration pictures whose score may exceed 0.5.

@@ -114,9 +114,9 @@ def usual(samples: Iterable[Tensor]) -> Usual:
 def alarm_level(clean: Sequence[float], false_alarms: float) -> float:
     """The score that new clean pictures exceed with a probability of at most `false_alarms`.
 
-    It is the score of rank ceil((n + 1)(1 - false_alarms)) of n clean ones: averaged over all draws of the calibration
-    pictures, the bound holds for any distribution of the scores (Vovk et al., 2005). A quantile between scores would
-    not hold it.
+    It is the score of rank ceil((n + 1)(1 - false_alarms)) among the n clean ones. Averaged over all draws of the
+    calibration pictures, the bound holds for any distribution of the scores (Vovk et al., 2005). It would not hold for
+    a quantile that is interpolated between scores.
 
     Raises:
         GearError: there are too few scores for such a rank.
