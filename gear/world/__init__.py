@@ -1,1 +1,3 @@
-"""The world: towns, actors and boards in MJCF, composed once, placed often."""
+"""The world: a town with actors and boards, composed from MJCF files and compiled once; each sample then only
+moves actors and changes patches.
+"""

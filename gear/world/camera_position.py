@@ -1,4 +1,4 @@
-"""Whether a camera is inside the ego car, where it would see nothing but the car."""
+"""Checks that no camera is inside the ego car, where it would see only the car."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from gear.values.rig import Rig
 
 DIRECTIONS = 96
 CLOSED_SHARE = 0.9
-"""Share of directions in which a camera's view ends at the car from where on it is inside of it."""
+"""A camera counts as inside the car if its view ends at the car in at least this share of all directions."""
 
 
 def check_outside(rig: Rig, car: Shape, scene_name: str) -> None:
-    """Refuses a rig with a camera inside the ego car.
+    """Checks that all cameras of a rig are outside the ego car.
 
     Args:
         rig: the cameras, in the car's frame.
-        car: triangles of the ego car, in its frame.
-        scene_name: for the error.
+        car: triangles of the ego car, in the same frame.
+        scene_name: name of the scene, for error messages.
 
     Raises:
-        PlacementError: names the camera and its position.
+        PlacementError: a camera is inside; the message names it and its position.
     """
     for mount in rig.cameras:
         x, y, z = mount.position_m
@@ -33,11 +33,11 @@ def check_outside(rig: Rig, car: Shape, scene_name: str) -> None:
 
 
 def enclosed_share(shape: Shape, point_m: Array) -> float:
-    """Share of directions, 0..1, in which a ray from a point meets a shape (Möller and Trumbore 1997).
+    """Share of directions, 0..1, in which a ray from a point hits a shape (Möller and Trumbore 1997).
 
     Args:
-        shape: triangles.
-        point_m: (3,) in the shape's frame.
+        shape: the triangles.
+        point_m: (3,) start of the rays, in the shape's frame.
     """
     if (np.abs(point_m - shape.box_centre_m) > shape.box_size_m / 2).any():
         return 0.0
@@ -58,7 +58,7 @@ def enclosed_share(shape: Shape, point_m: Array) -> float:
 
 
 def _directions() -> Array:
-    """(N, 3) unit vectors, evenly over the sphere: a Fibonacci lattice."""
+    """(N, 3) unit vectors, spread evenly over the sphere (Fibonacci lattice)."""
     number = np.arange(DIRECTIONS) + 0.5
     z = 1 - 2 * number / DIRECTIONS
     turn = number * np.pi * (3 - np.sqrt(5))

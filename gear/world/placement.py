@@ -1,7 +1,8 @@
-"""Questions to the placement model: where the ground is, what overlaps, what hides a face, how actors come to rest.
+"""Questions about geometry that the placement model answers: where the ground is, what overlaps, what hides a face, and
+how actors come to rest.
 
-MuJoCo answers them: with rays for the ground and for lines of sight, with its collision detection for overlaps, and
-with a short simulation from a reset state for actors on uneven ground.
+MuJoCo computes the answers: by rays for the ground and for lines of sight, by its collision detection for overlaps, and
+by a short simulation from a reset state for actors on uneven ground.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ from gear.world.compilation.actor_pool import PARKED_DEPTH_M
 from gear.world.compilation.model_compilation import ACTOR_GROUP, GROUND_GROUP, OBSTACLE_GROUP
 
 EVEN_M = 0.005
-"""Most distance of four feet from their common plane on even ground, where no simulation is needed."""
+"""Ground is even, and needs no simulation, if the four feet are at most this far from their common plane, metres."""
 
 STEP_UP_M = 1.2
-"""Rays to the ground start this far above the height of the lane, so that a bridge above a road is not its ground."""
+"""Height above the lane at which rays to the ground start, metres; low enough that a bridge above a road is not
+taken for its ground.
+"""
 
 SETTLE_DROP_M = 0.01
 SETTLE_STEP_S = 0.005
@@ -34,7 +37,7 @@ OVERLAP_M = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroundPose:
-    """An actor's pose on the ground.
+    """The pose of an actor on the ground.
 
     Attributes:
         world_from_actor: the pose.
@@ -57,17 +60,19 @@ _ACTORS = _groups(ACTOR_GROUP)
 
 
 class PlacementSpace:
-    """The placement model of a world. Every answer starts from the reset state, so none depends on an earlier one."""
+    """Answers questions with the placement model of a world. Every answer starts from the reset state, so
+    answers do not depend on earlier ones.
+    """
 
     def __init__(
         self, model: mujoco.MjModel, bodies: Mapping[str, ActorType], parked_m: float = -PARKED_DEPTH_M
     ) -> None:
-        """Takes a placement model.
+        """Uses a placement model.
 
         Args:
             model: the placement model.
             bodies: the assets of its actors, by body name.
-            parked_m: height at which the actors are that a question does not name.
+            parked_m: height to which actors that a question does not name are moved.
         """
         self._model = model
         self._parked_m = parked_m
@@ -81,7 +86,7 @@ class PlacementSpace:
         self._pose({})
 
     def ground_m(self, x_m: float, y_m: float, near_z_m: float) -> float | None:
-        """Height of the ground at a place, looked for near a height; None where there is no ground near it."""
+        """Height of the ground at (x_m, y_m); None if there is no ground near the height `near_z_m`."""
         start_m = np.array([x_m, y_m, near_z_m + STEP_UP_M])
         geom = np.zeros(1, np.int32)
         down = np.array([0.0, 0.0, -1.0])
@@ -93,19 +98,19 @@ class PlacementSpace:
     def ground_pose(
         self, actor_type: ActorType, x_m: float, y_m: float, near_z_m: float, yaw_rad: float
     ) -> GroundPose | None:
-        """Puts an actor on the ground at a place and a heading.
+        """Places an actor on the ground.
 
-        A person stands upright at its middle. A vehicle stands on the plane through the ground below its four feet, by
-        least squares.
+        A person stands upright on the ground below its middle. A vehicle stands on the plane that fits the ground below
+        its four feet best (least squares).
 
         Args:
-            actor_type: its asset.
-            x_m, y_m: place in the world.
-            near_z_m: height near which the ground is looked for.
+            actor_type: asset of the actor.
+            x_m, y_m: position in world coordinates.
+            near_z_m: height near which the ground is searched.
             yaw_rad: heading, counter-clockwise from east.
 
         Returns:
-            The pose; None where there is no ground below one of the feet.
+            The pose; None if there is no ground below one of the feet.
         """
         if actor_type.is_person:
             z_m = self.ground_m(x_m, y_m, near_z_m)
@@ -137,7 +142,9 @@ class PlacementSpace:
         return GroundPose(pose, bool(uneven_m <= EVEN_M))
 
     def overlaps(self, poses: Mapping[str, RigidTransform]) -> list[tuple[str, str]]:
-        """Pairs of bodies that overlap at given poses; the second is "" where an actor overlaps the town or a board."""
+        """Pairs of bodies that overlap at the given poses; the second name is "" if an actor overlaps the town
+        or a board.
+        """
         self._pose(poses)
         mujoco.mj_collision(self._model, self._data)
         pairs: set[tuple[str, str]] = set()
@@ -156,7 +163,7 @@ class PlacementSpace:
         return ACTOR_GROUP in groups and all(group in (ACTOR_GROUP, OBSTACLE_GROUP) for group in groups)
 
     def settle(self, poses: Mapping[str, RigidTransform]) -> dict[str, RigidTransform]:
-        """Drops actors from just above their poses and returns the poses at which they come to rest."""
+        """Drops actors from just above the given poses and returns the poses at which they come to rest."""
         lifted = {
             name: RigidTransform.from_parts(
                 "world", "actor", pose.rotation, pose.translation_m + pose.rotation[:, 2] * SETTLE_DROP_M
@@ -176,11 +183,15 @@ class PlacementSpace:
         return settled
 
     def visible(self, eye_m: Array, targets_m: Array) -> npt.NDArray[np.bool_]:
-        """Which of (N, 3) points are visible from a point, past the town, its boards and its ground, as (N,) bool."""
+        """(N,) bool: which of (N, 3) points can be seen from the point `eye_m`; the town, its boards and its
+        ground may hide them.
+        """
         return self._rays(eye_m, targets_m, _STATIC)[0] < 0
 
     def occluders(self, eye_m: Array, targets_m: Array, poses: Mapping[str, RigidTransform]) -> list[str | None]:
-        """For each of (N, 3) points, the body of the actor that hides it from a point, or None."""
+        """For each of (N, 3) points: name of the actor's body that hides it from the point `eye_m`; None if no
+        actor does.
+        """
         self._pose(poses)
         geoms = self._rays(eye_m, targets_m, _ACTORS)[0]
         roots = [int(self._model.body_rootid[self._model.geom_bodyid[g]]) if g >= 0 else -1 for g in geoms]
@@ -189,7 +200,11 @@ class PlacementSpace:
     def _rays(
         self, eye_m: Array, targets_m: Array, groups: npt.NDArray[np.uint8]
     ) -> tuple[npt.NDArray[np.int32], Array]:
-        """Casts rays to (N, 3) targets: (N,) id of the geom hit before each target, else -1, and (N,) distances."""
+        """Casts rays to (N, 3) targets.
+
+        Returns:
+            (N,) id of the geom that each ray hits before its target, -1 for none, and (N,) distances.
+        """
         rays = np.ascontiguousarray(targets_m - eye_m, dtype=np.float64)
         reach_m = np.linalg.norm(rays, axis=1)
         count = len(rays)
@@ -204,7 +219,9 @@ class PlacementSpace:
         return geoms, distances_m
 
     def _pose(self, poses: Mapping[str, RigidTransform]) -> None:
-        """Resets the state, moves the named actors to their poses, and all others far below, apart from each other."""
+        """Resets the state, moves the named actors to their poses, and all other actors far below the town,
+        apart from each other.
+        """
         mujoco.mj_resetData(self._model, self._data)
         for number, (name, address) in enumerate(self._qpos.items()):
             if name in poses:

@@ -1,4 +1,4 @@
-"""Plans the samples of a split. A sample is a pure function of the world, the split's seed and its index."""
+"""Plans the samples of a split. Each sample depends only on the world, the split's seed and the sample's index."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from gear.world.traffic.spawn import Spawn, Spawner
 from gear.world.world import World
 
 SEQUENCES_CACHED = 4
-"""Planned sequences that are kept, since frames are mostly asked for in their order."""
+"""Number of planned sequences that are kept, because frames are usually requested in order."""
 
 
 class ScenePlanner:
-    """Plans the records of one split."""
+    """Plans the scene records of one split."""
 
     def __init__(self, world: World, rig: Rig, split: SplitConfig, *, split_name: str) -> None:
-        """Prepares what all samples share.
+        """Prepares everything that the samples share.
 
         Args:
-            world: compiled; the planner uses its placement model.
-            rig: cameras on the ego car. The first one must have the boards in view.
+            world: compiled world; the planner uses its placement model.
+            rig: cameras on the ego car. The first one must see the boards.
             split: seed, and length of the sequences.
-            split_name: name of the split in records. Draws do not depend on it, so `test_night` shows the scenes of
-                `test`.
+            split_name: name of the split in records. Random draws do not depend on it, so `test_night` has the same
+                scenes as `test`.
 
         Raises:
             PlacementError: a camera is inside the ego car.
@@ -68,17 +68,17 @@ class ScenePlanner:
         """Plans one sample.
 
         Args:
-            index: number of the sample; it counts all frames of the split.
+            index: number of the sample, counted over all frames of the split.
 
         Raises:
-            PlacementError: the limits of the scene are too tight; the error names the limit.
+            PlacementError: the limits of the scene are too tight; the message names the limit.
         """
         sequence, frame = divmod(index, self._split.frames)
         state = self._frames_of(sequence)[frame]
         return self._record(state, index, sequence, frame)
 
     def _frames_of(self, sequence: int) -> Sequence[FrameState]:
-        """All frames of a sequence, out of the last ones that were planned where it is among them."""
+        """All frames of a sequence; the sequences that were planned last are kept."""
         if sequence not in self._cached:
             self._cached[sequence] = self._sample(sequence)
             if len(self._cached) > SEQUENCES_CACHED:

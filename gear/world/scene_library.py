@@ -1,4 +1,4 @@
-"""Reading a scene library so that one faulty scene does not stop the others."""
+"""Reads a scene library in such a way that a faulty scene does not prevent the use of the others."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class SceneFile:
 
     Attributes:
         library: the scenes that could be read; at least one.
-        faulty: the error of each other scene, by the scene's name.
+        faulty: the error of each faulty scene, by the scene's name.
     """
 
     library: SceneLibrary
@@ -32,15 +32,15 @@ class SceneFile:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of all scenes of the file, the faulty ones last."""
+        """Names of all scenes in the file; faulty ones come last."""
         return (*self.library.scenes, *self.faulty)
 
     def scene(self, name: str) -> SceneSpec:
-        """The scene of that name.
+        """The scene with this name.
 
         Raises:
             ConfigError: that scene is faulty.
-            UnknownNameError: there is none of that name.
+            UnknownNameError: there is no scene with this name.
         """
         if name in self.faulty:
             raise self.faulty[name]
@@ -53,7 +53,7 @@ def read_scene_file(path: Path) -> SceneFile:
     """Reads a scene library.
 
     Raises:
-        ConfigError: it is no YAML, breaks the form of a library, or none of its scenes can be read.
+        ConfigError: the file is not YAML, is no scene library, or none of its scenes can be read.
     """
     root = parse_file(path)
     faulty: dict[str, ConfigError] = {}

@@ -1,4 +1,4 @@
-"""The form of a scene library: where boards stand, and which traffic may surround them."""
+"""The format of a scene library: where boards stand, and which traffic may surround them."""
 
 from __future__ import annotations
 
@@ -19,11 +19,14 @@ CountRange = tuple[int, int]
 
 
 FACE_SIDE_M = (0.1, 100.0)
-"""Least and most width and height of a face: smaller shows no patch, larger was meant in other units."""
+"""Smallest and largest side of a face, metres. A smaller face cannot show a patch; a larger one was given in
+other units.
+"""
 
 FARTHEST_M = 10_000.0
-"""Most distance from the origin or the first board. At that distance the 32-bit floats of models and renderers have
-steps of a millimetre."""
+"""Largest distance from the origin or from the first board, metres. At that distance, the 32-bit floats of
+models and renderers have steps of a millimetre.
+"""
 
 
 def _check_range(name: str, value: Range | None, *, least: float = -FARTHEST_M) -> None:
@@ -41,12 +44,12 @@ class BoardSpec:
     """One billboard.
 
     Attributes:
-        position_m: ground point under the middle of its face, in the world.
-        facing_deg: direction that its face looks in, counter-clockwise from east.
-        asset: name of its MJCF in `mjcf/surfaces`.
+        position_m: ground point under the middle of its face, world coordinates.
+        facing_deg: direction in which its face looks, counter-clockwise from east.
+        asset: name of its MJCF file in `mjcf/surfaces`.
         size_m: width and height of its face; None for the size in the asset's file. The whole board is scaled about its
-            foot, so a higher face also hangs higher.
-        places: place in the file of each key that the file gives.
+            foot, so a taller face also hangs higher.
+        places: position in the file of each key that the file gives, for error messages.
     """
 
     position_m: Vec3
@@ -74,11 +77,11 @@ class EgoLimits:
     """Where the ego car may be, in the frame of the first board.
 
     Attributes:
-        ahead_m: least and largest distance ahead of the face.
-        lateral_m: least and largest distance to the left of the direction that the face looks in.
+        ahead_m: smallest and largest distance in front of the face.
+        lateral_m: smallest and largest distance to the left of the direction in which the face looks.
         max_incidence_deg: largest angle between the face's normal and the direction to the reference camera; 0 is
-            head-on.
-        min_free: share of each face that must be visible to the reference camera.
+            frontal.
+        min_free: share of each face that the reference camera must see.
     """
 
     ahead_m: Range
@@ -96,7 +99,7 @@ class EgoLimits:
 
 
 ONE_PLACE_M, ONE_WAY_DEG = 0.05, 5.0
-"""Two boards that differ by less than this in position and direction are one board, written twice."""
+"""Two boards that differ by less than this in position and direction are the same board, written twice by mistake."""
 
 
 def _is_one_way(board: BoardSpec, other: BoardSpec) -> bool:
@@ -111,10 +114,10 @@ class NpcLimits:
     """How many other road users there are, and where they may be.
 
     Attributes:
-        count: least and largest number; each number between is equally likely.
-        ahead_m, lateral_m: least and largest distances in the frame of the first board, as in `EgoLimits`; None for no
-            limit.
-        radius_m: least and largest distance from the ego car; None for no limit. All limits that are given hold.
+        count: smallest and largest number; each number between them is equally likely.
+        ahead_m, lateral_m: smallest and largest distances in the frame of the first board, as in `EgoLimits`; None for
+            no limit.
+        radius_m: smallest and largest distance from the ego car; None for no limit. All given limits must hold.
     """
 
     count: CountRange
@@ -138,10 +141,10 @@ class NpcLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleLimits(NpcLimits):
-    """The limits of vehicles.
+    """The limits of other vehicles.
 
     Attributes:
-        parked_share: share of the vehicles that is parked, as far as there are free parking bays.
+        parked_share: share of the vehicles that are parked, as far as there are free parking bays.
         mix: factors by which kinds of vehicles (`car`, `bus`, …) are more frequent than usual; 0 for never.
     """
 
@@ -157,12 +160,12 @@ class VehicleLimits(NpcLimits):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TruckSpec:
-    """A vehicle that carries the patch on its rear, ahead of the ego car in the same lane.
+    """A vehicle with the patch on its rear; it drives ahead of the ego car in the same lane.
 
     Attributes:
-        asset: name of its MJCF in `mjcf/vehicles`.
-        gap_m: least and largest distance between the front of the ego car and the rear of the vehicle.
-        places: place in the file of each key that the file gives.
+        asset: name of its MJCF file in `mjcf/vehicles`.
+        gap_m: smallest and largest distance between the front of the ego car and the rear of the vehicle.
+        places: position in the file of each key that the file gives, for error messages.
     """
 
     asset: str = "truck_box"
@@ -175,12 +178,12 @@ class TruckSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneSpec:
-    """One scene: boards, a truck or neither, and limits for the traffic around them.
+    """One scene: either boards, or a truck, or neither, and limits for the traffic around them.
 
     Attributes:
-        boards: the boards, which take `patch_0`, `patch_1`, … in this order.
-        truck: the vehicle that carries the patch; a scene has boards or a truck, not both.
-        ego: limits of the ego car; required with boards. Without boards the ego car may be on any lane.
+        boards: the boards, which show `patch_0`, `patch_1`, … in this order.
+        truck: the vehicle that carries the patch; a scene cannot have both boards and a truck.
+        ego: limits of the ego car; required if there are boards. Without boards the ego car may be on any lane.
         npc_vehicles, pedestrians: limits of the other vehicles and of the people.
     """
 
@@ -250,9 +253,9 @@ class SceneLibrary:
     """The scenes of one town.
 
     Attributes:
-        town: name of the town that the poses belong to.
-        scenes: by name.
-        places: place in the file of each key that the file gives.
+        town: name of the town in which the scenes take place.
+        scenes: scenes by name.
+        places: position in the file of each key that the file gives, for error messages.
     """
 
     town: str

@@ -1,4 +1,4 @@
-"""A town with its scene, compiled once. A sample moves its actors and changes its surfaces; it compiles nothing."""
+"""A town with its scene, compiled once. A sample moves its actors and changes its patches, without compiling."""
 
 from __future__ import annotations
 
@@ -30,19 +30,20 @@ from gear.world.surfaces.face_texture import SurfaceAlbedo, SurfaceAlbedos
 from gear.world.surfaces.patch_faces import Face, find_faces
 
 FACES_KEPT, TEXTURES_PER_FACE = 8, 5
-"""Resampled textures that a world keeps: `FACES_KEPT` in all, or `TEXTURES_PER_FACE` for each face if that is more: in
-one sample a face may show a patch, its neutral texture, white, black and grey."""
+"""Number of resampled textures that a world keeps: `FACES_KEPT` in total, or `TEXTURES_PER_FACE` for each face
+if that is more. In one sample a face may show a patch, its neutral texture, white, black and grey.
+"""
 
 _OUT_OF_SIGHT_M = -1e5
-"""Height at which no camera sees a geom."""
+"""Height to which geoms are moved that no camera shall see, metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlacedStage:
-    """One sample, ready to be rendered and to be measured.
+    """One sample, ready to be rendered and measured.
 
     Attributes:
-        stage: what a renderer needs. Its `data` belongs to the world and is valid until the next `place`.
+        stage: what a renderer needs. Its `data` belongs to the world and is valid until the next call of `place`.
         geoms: label, object and surface of each geom of the render model.
         objects: countable objects by object id.
     """
@@ -67,14 +68,14 @@ class World:
     """A compiled town with a scene, a weather and a pool of actors.
 
     Attributes:
-        library: the town's MJCF and the folders of its assets.
-        scene_name, scene, weather: what it was built for.
+        library: the town's MJCF file and the folders of its assets.
+        scene_name, scene, weather: what the world was built for.
         model: the render model: visible geoms, actors as mocap bodies.
-        placement_model: the placement model: collision geoms, actors as free bodies of the same names.
+        placement_model: the placement model: collision geoms, actors as free bodies with the same names.
         classes: labels of the render model's geoms.
         slots: the pool of actors.
-        types: the assets of the pool, measured, by name.
-        faces: faces that take patches, in patch order.
+        types: the measured assets of the pool, by name.
+        faces: the faces that can show patches, in patch order.
         statics: countable objects of the town, such as traffic lights.
         lanes: lanes, walks and parking bays.
     """
@@ -118,10 +119,10 @@ class World:
 
     @staticmethod
     def of(plan: WorldPlan, scene_name: str, compiled: CompiledWorld) -> World:
-        """Makes a world of compiled models: measures its actors and faces, and reads its lanes.
+        """Makes a world from compiled models: measures its actors and faces, and reads its lanes.
 
         Args:
-            plan: that the models were compiled from.
+            plan: the plan from which the models were compiled.
             scene_name: name of the scene in records.
             compiled: the models.
 
@@ -155,7 +156,7 @@ class World:
 
     @property
     def parked_m(self) -> float:
-        """Height in metres at which the actors wait that a sample does not use, below every lane of the town."""
+        """Height in metres at which unused actors are kept, below every lane of the town."""
         return min(0.0, self.lanes.lowest_m) - PARKED_DEPTH_M
 
     @property
@@ -164,7 +165,7 @@ class World:
         return self.library.town_name
 
     def surface_records(self, carrier_id: int | None = None) -> tuple[SurfaceRecord, ...]:
-        """The faces as data; `carrier_id` is the id of the actor that carries them in a scene with a truck."""
+        """The faces as records; `carrier_id` is the id of the actor that carries them in a scene with a truck."""
         return tuple(face.record(carrier_id) for face in self.faces)
 
     def place(self, record: SceneRecord, surfaces: SurfaceAlbedos | None = None) -> PlacedStage:
@@ -172,11 +173,11 @@ class World:
 
         Args:
             record: a sample of this world's town and scene.
-            surfaces: what each surface shows, by its name; a surface that is not named shows its neutral texture.
+            surfaces: what each surface shows, by its name; surfaces that are missing show their neutral texture.
 
         Raises:
-            PlacementError: the record has more actors of an asset than this world holds.
-            ValueError: no surface has one of the names.
+            PlacementError: the record has more actors of an asset than this world.
+            ValueError: `surfaces` contains a name that no surface has.
         """
         faces = self._textures_of(surfaces or {})
         taken = self._assign(record)
@@ -206,22 +207,21 @@ class World:
         )
 
     def with_surfaces(self, placed: PlacedStage, surfaces: SurfaceAlbedos) -> Stage:
-        """The sample that was placed last, with other textures on its faces; nothing is moved.
+        """The sample that was placed last, with other textures on its faces; no actor is moved.
 
         Args:
             placed: result of the last `place`.
             surfaces: as for `place`.
 
         Raises:
-            ValueError: no surface has one of the names.
+            ValueError: `surfaces` contains a name that no surface has.
         """
         return replace(placed.stage, faces=self._textures_of(surfaces))
 
     @contextmanager
     def without_ground(self, placed: PlacedStage) -> Iterator[Stage]:
-        """The sample that was placed last, with neutral faces and without its ground, so that it is seen from below.
-
-        The ground returns when the context ends.
+        """Context with the sample that was placed last, with neutral faces and without its ground, so that it can be
+        seen from below.
 
         Args:
             placed: result of the last `place`.
@@ -291,7 +291,7 @@ class World:
         )
 
     def _texture(self, face: Face, albedo: SurfaceAlbedo) -> UInt8Image:
-        """The texture of a face. The last ones are kept: a dataset shows one patch thousands of times."""
+        """The texture of a face. The last ones are kept, because a dataset shows one patch thousands of times."""
         key: str = (
             albedo
             if isinstance(albedo, str)

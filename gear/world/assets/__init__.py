@@ -1,1 +1,1 @@
-"""MJCF assets: finding them by name, their facts, their geoms' classes and triangles."""
+"""The MJCF files of towns, actors and boards: finding them by name, reading their facts, labels and triangles."""

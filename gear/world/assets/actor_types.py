@@ -1,4 +1,4 @@
-"""Measures the compiled assets: shapes and sizes of actors, and the countable objects of a town."""
+"""Measures compiled assets: shapes and sizes of actors, and the countable objects of a town."""
 
 from __future__ import annotations
 
@@ -21,23 +21,28 @@ from gear.world.compilation.actor_pool import Slot
 from gear.world.compilation.model_compilation import PlacementBody
 
 PERSON_MASS_KG = 75.0
-"""Mass of a person in the placement model."""
+"""Mass of every person in the placement model, kg."""
 
 ACTOR_SIDE_M = (0.1, 100.0)
-"""Least and most length of an actor's longest side. An asset beyond was drawn in other units."""
+"""Smallest and largest length of an actor's longest side, metres. An asset outside this range was drawn in other
+units.
+"""
 
 COUNTABLE = frozenset(label.code for label in LABELS if label.coco_id is not None and not label.is_instance)
-"""Codes of the labels whose objects in the town are counted one by one; each object needs a body of its own."""
+"""Codes of labels whose objects in the town are counted one by one. Each such object needs a body of its own in
+the MJCF.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ActorType:
-    """One asset of the pool of actors, measured.
+    """One asset that actors use, with its measured shape.
 
     Attributes:
-        facts: what its file says of it.
-        shape: its visible triangles in the actor's frame (x ahead, y to the left, z up, origin on the ground).
-        half_length_m, half_width_m: half of its footprint: the smallest rectangle around the origin that contains it.
+        facts: the facts that its MJCF file states.
+        shape: its visible triangles in the actor frame (x to the front, y to the left, z up, origin on the ground).
+        half_length_m, half_width_m: half the sides of its footprint, the smallest rectangle centred on the origin that
+            contains it.
     """
 
     facts: ActorFacts
@@ -47,32 +52,34 @@ class ActorType:
 
     @property
     def vehicle(self) -> VehicleKind | None:
-        """Its kind of vehicle; None for people."""
+        """The kind of vehicle; None for people."""
         return self.facts.vehicle
 
     @property
     def is_person(self) -> bool:
-        """Whether it is a person on foot."""
+        """Whether the asset is a person on foot."""
         return self.facts.vehicle is None
 
     @property
     def label(self) -> Label:
-        """The semantic label of its kind."""
+        """The semantic label."""
         return self.facts.label
 
     @property
     def front_m(self) -> float:
-        """Distance of its front from its origin."""
+        """Distance from the origin to the front, metres."""
         return float(self.shape.box_centre_m[0] + self.shape.box_size_m[0] / 2)
 
     @property
     def rear_m(self) -> float:
-        """Distance of its rear from its origin."""
+        """Distance from the origin to the rear, metres."""
         return float(self.shape.box_size_m[0] / 2 - self.shape.box_centre_m[0])
 
     @property
     def placement_body(self) -> PlacementBody:
-        """Its body in the placement model. Its feet are a fifth inside of its footprint, where wheels are."""
+        """The body in the placement model. Its four feet are where wheels are: inside the footprint by a fifth
+        of its half sides.
+        """
         return PlacementBody(
             half_length_m=0.8 * self.half_length_m,
             half_width_m=0.8 * self.half_width_m,
@@ -82,13 +89,13 @@ class ActorType:
 
 
 def body_tree(model: mujoco.MjModel, body_id: int) -> list[int]:
-    """Ids of a body and of all bodies below it. They are consecutive, since MuJoCo numbers bodies depth first."""
+    """Ids of a body and of all its descendants. They are consecutive, because MuJoCo numbers bodies depth first."""
     outside = np.flatnonzero(model.body_parentid[body_id + 1 :] < body_id)
     return list(range(body_id, body_id + 1 + int(outside[0]) if len(outside) else model.nbody))
 
 
 def visible_geoms(model: mujoco.MjModel, body_id: int, label_code: npt.NDArray[np.uint8]) -> list[int]:
-    """Ids of the visible geoms of a body and of all bodies below it; `label_code` is (ngeom,) uint8."""
+    """Ids of the visible geoms of a body and of its descendants; `label_code` is (ngeom,) uint8."""
     owners = np.isin(model.geom_bodyid, body_tree(model, body_id))
     return [int(geom) for geom in np.flatnonzero(owners & (label_code != HIDDEN_CODE))]
 
@@ -96,13 +103,13 @@ def visible_geoms(model: mujoco.MjModel, body_id: int, label_code: npt.NDArray[n
 def actor_types(
     model: mujoco.MjModel, data: mujoco.MjData, classes: GeomClasses, slots: Sequence[Slot]
 ) -> dict[str, ActorType]:
-    """Measures every asset of the pool on its first instance.
+    """Measures every asset of the pool, on its first instance.
 
     Args:
         model: the render model.
-        data: with kinematics up to date.
+        data: MuJoCo data of the model with kinematics up to date.
         classes: labels of the geoms.
-        slots: the pool.
+        slots: the pool of actors.
 
     Returns:
         The assets by name.
@@ -149,7 +156,7 @@ class StaticObjects:
 
     Attributes:
         objects: the objects by their ids.
-        object_id: (ngeom,) int32 id of the object that each geom belongs to, else -1.
+        object_id: (ngeom,) int32: id of the object to which each geom belongs; -1 for none.
     """
 
     objects: Mapping[int, SceneObject]
@@ -159,17 +166,17 @@ class StaticObjects:
 def static_objects(
     model: mujoco.MjModel, data: mujoco.MjData, classes: GeomClasses, slots: Sequence[Slot], path: Path
 ) -> StaticObjects:
-    """Finds the countable objects of a town: one for each label in `COUNTABLE` and each body with geoms of it.
+    """Finds the countable objects of a town: one object for each body with geoms of a label in `COUNTABLE`.
 
     Args:
         model: the render model.
-        data: with kinematics up to date.
+        data: MuJoCo data of the model with kinematics up to date.
         classes: labels of the geoms.
-        slots: the pool, whose bodies belong to no object of the town.
-        path: the town's file, for errors.
+        slots: the pool of actors, whose bodies are no objects of the town.
+        path: the town's file, for error messages.
 
     Raises:
-        TownError: such a geom is in no body of its own, or is infinite.
+        TownError: a geom with such a label has no body of its own, or is infinite.
     """
     actor_bodies = {body for slot in slots for body in body_tree(model, model.body(slot.body).id)}
     object_id = np.full(model.ngeom, -1, np.int32)

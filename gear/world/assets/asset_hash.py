@@ -1,4 +1,4 @@
-"""The files that the pictures of a town can show, and one hash over all of them."""
+"""Finds all files that pictures of a town can show, and hashes them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gear.values.resources import data_dir
 from gear.world.assets.library import AssetLibrary, read_xml
 
 ASSET_SUFFIXES = (".xml", ".obj", ".msh", ".stl", ".png")
-"""Suffixes of the files in the folders of a town that are assets."""
+"""Suffixes of the files in a town's folders that count as assets."""
 
 
 def asset_files(library: AssetLibrary) -> dict[str, Path]:
@@ -44,7 +44,7 @@ def asset_files(library: AssetLibrary) -> dict[str, Path]:
 
 
 def _referred(path: Path) -> Iterator[tuple[str, Path]]:
-    """The existing files that an MJCF file and its includes refer to: each name as it is written, and its path."""
+    """The existing files to which an MJCF file and its includes refer: each name as written, and its path."""
     elements: list[tuple[Path, ET.Element]] = []
     files, folders = [path], dict[str, str]()
     for file in files:  # grows by the files that are included
@@ -70,10 +70,10 @@ def _referred(path: Path) -> Iterator[tuple[str, Path]]:
 
 
 def _check_asset(path: Path, target: Path) -> None:
-    """Refuses what MuJoCo would wait for when it reads it.
+    """Checks that a referenced file is a regular file.
 
     Raises:
-        TownError: a file that an MJCF file refers to is a device, a FIFO or a socket.
+        TownError: it is a device, a FIFO or a socket, for which MuJoCo would wait forever.
     """
     try:
         check_regular(target)
@@ -82,12 +82,14 @@ def _check_asset(path: Path, target: Path) -> None:
 
 
 def _bases(path: Path, file: Path) -> list[Path]:
-    """The folders to which paths in `file` may be relative: its own, and that of the MJCF file that includes it."""
+    """The folders to which paths in `file` may be relative: its own folder, and the folder of the MJCF file that
+    includes it.
+    """
     return list(dict.fromkeys((path.parent, file.parent)))
 
 
 def assets_digest(library: AssetLibrary) -> str:
-    """sha256 in hex over the names and contents of all files that `asset_files` finds."""
+    """sha256 (hex) over the names and contents of all files that `asset_files` finds."""
     files = asset_files(library)
     digest = hashlib.sha256()
     for name in sorted(files):

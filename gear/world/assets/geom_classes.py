@@ -1,4 +1,4 @@
-"""The label of each geom, which the name of its default class gives."""
+"""The semantic label of each geom, which follows from the name of its default class in the MJCF."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from gear.values.errors import TownError
 from gear.values.labels import LABEL_BY_NAME
 
 HIDDEN_CODE = 255
-"""Label code of hidden geoms, which no renderer draws."""
+"""Label code of geoms that no renderer draws."""
 
 FIRST_HIDDEN_GROUP = 3
-"""Geoms of this group and above are hidden; collision geoms are in it."""
+"""Geoms of this group and higher groups are hidden; collision geoms are among them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class GeomClasses:
-    """Labels by geom id of a compiled model.
+    """Labels of the geoms of a compiled model, by geom id.
 
     Attributes:
-        label_code: (ngeom,) uint8, `HIDDEN_CODE` for hidden geoms.
-        is_paint: (ngeom,) bool, whether a sample may choose the geom's colour.
-        is_face: (ngeom,) bool, whether the geom is a face that takes a patch.
+        label_code: (ngeom,) uint8 label codes; `HIDDEN_CODE` for hidden geoms.
+        is_paint: (ngeom,) bool: whether each sample may choose the geom's colour.
+        is_face: (ngeom,) bool: whether the geom is a face that can show a patch.
     """
 
     label_code: npt.NDArray[np.uint8]
@@ -35,19 +35,21 @@ class GeomClasses:
 
 
 def unprefixed_class(classname: str) -> str:
-    """The name of a class in its own file: dm_control prefixes it with `<file>/` when it composes files."""
+    """The name of a default class in its own file, without the prefix `<file>/` that dm_control adds when it
+    composes files.
+    """
     return classname.rsplit("/", 1)[-1]
 
 
 def classify(spec: mujoco.MjSpec, path: Path) -> GeomClasses:
-    """Finds the labels of a model's geoms.
+    """Finds the label of each geom of a model.
 
     Args:
-        spec: of the model, compiled, so that its geoms have ids.
-        path: the town's file, for errors.
+        spec: spec of the model; it must have been compiled, so that its geoms have ids.
+        path: the town's file, for error messages.
 
     Raises:
-        TownError: the class of a visible geom starts with no known label.
+        TownError: the class of a visible geom does not start with a known label.
     """
     geoms = spec.geoms
     label_code = np.full(len(geoms), HIDDEN_CODE, np.uint8)

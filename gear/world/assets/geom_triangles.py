@@ -1,4 +1,4 @@
-"""The triangles of compiled geoms, in the frame of the geom, of a body or of the world."""
+"""The triangles of compiled geoms, in the frame of the geom, of a body, or in world coordinates."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Faces = npt.NDArray[np.int32]
 Triangles = tuple[Array, Faces]
 
 ROUND_SEGMENTS = 24
-"""Sides of a round primitive. Its silhouette is within 1 % of the true one."""
+"""Number of sides with which round primitives are approximated; silhouettes differ by less than 1 %."""
 
 
 def geom_triangles(model: mujoco.MjModel, geom_id: int) -> Triangles:
@@ -62,7 +62,7 @@ def _box(half: Array) -> Triangles:
 
 
 def _revolved(radii: Array, heights: Array, y_scale: float = 1.0) -> Triangles:
-    """The surface of revolution about z of a profile (radius, height) from the bottom to the top."""
+    """The surface of revolution about z of a profile of radii and heights, given from bottom to top."""
     turn = np.arange(ROUND_SEGMENTS) * (2 * np.pi / ROUND_SEGMENTS)
     x, y = np.outer(radii, np.cos(turn)), np.outer(radii, np.sin(turn)) * y_scale
     vertices = np.stack([x, y, np.repeat(heights[:, None], ROUND_SEGMENTS, axis=1)], axis=-1).reshape(-1, 3)
@@ -76,17 +76,22 @@ def _revolved(radii: Array, heights: Array, y_scale: float = 1.0) -> Triangles:
 
 
 def world_triangles(model: mujoco.MjModel, data: mujoco.MjData, geom_id: int) -> Array:
-    """(N, 3, 3) corners in metres of one geom's triangles in the world; `data` has kinematics up to date.
+    """(N, 3, 3) corners in world coordinates, metres, of one geom's triangles.
+
+    Args:
+        model: compiled model.
+        data: MuJoCo data of the model with kinematics up to date.
+        geom_id: the geom.
 
     Raises:
-        ValueError: as `geom_triangles`.
+        ValueError: the geom is a plane or a height field, which have no finite surface.
     """
     vertices, faces = geom_triangles(model, geom_id)
     return np.asarray((vertices @ data.geom_xmat[geom_id].reshape(3, 3).T + data.geom_xpos[geom_id])[faces])
 
 
 def static_geoms(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
-    """(ngeom,) bool, whether each geom belongs to the town or its boards, and not to an actor."""
+    """(ngeom,) bool: True for geoms of the town and its boards, False for geoms of actors."""
     return np.asarray(model.body_mocapid[model.body_rootid[model.geom_bodyid]] < 0)
 
 
@@ -97,17 +102,17 @@ def body_shape(
     geom_ids: Sequence[int],
     label_code: npt.NDArray[np.uint8],
 ) -> Shape:
-    """Joins geoms into one shape in the frame of a body.
+    """Joins geoms to one shape in the frame of a body.
 
     Args:
-        model: compiled.
-        data: with kinematics up to date.
+        model: compiled model.
+        data: MuJoCo data of the model with kinematics up to date.
         body_id: the body.
         geom_ids: the geoms; at least one.
         label_code: (ngeom,) uint8 labels of all geoms.
 
     Raises:
-        ValueError: as `geom_triangles`.
+        ValueError: a geom is a plane or a height field, which have no finite surface.
     """
     body_position_m = data.xpos[body_id]
     body_rotation = data.xmat[body_id].reshape(3, 3)

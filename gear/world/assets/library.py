@@ -20,19 +20,19 @@ from gear.values.scene import Vec3
 Gait = Literal["walk", "stand", ""]
 
 PERSON = "person"
-"""Kind of the actors that walk; every other kind is one of `VEHICLES`."""
+"""Kind of the actors that walk; all other kinds are names in `VEHICLES`."""
 
 
 MOST_WEIGHT = 1e6
-"""Largest weight of an asset or a colour, so that sums and shares of weights are finite."""
+"""Largest weight of an asset or a colour; it keeps sums and shares of weights finite."""
 
 KEY_POINT = "key_point."
-"""Entries of an actor's `<custom>` section that name a point of it begin with this."""
+"""Start of the names of entries in an actor's `<custom>` section that describe a key point."""
 
 MOST_KEY_POINT_M = 100.0
 
 _NAN = re.compile(r"^([-+.\deE\s]*\s)?[-+]?nan(\s|$)", re.IGNORECASE)
-"""Matches a list of numbers in which one is NaN."""
+"""Regular expression that matches a list of numbers which contains NaN."""
 
 FOLDERS = {"town": "towns", "vehicle": "vehicles", "pedestrian": "pedestrians", "surface": "surfaces"}
 
@@ -41,7 +41,7 @@ def read_xml(path: Path) -> ET.Element:
     """Parses an MJCF file and returns its root element.
 
     Raises:
-        TownError: it is no XML, or cannot be read.
+        TownError: the file is not XML, or cannot be read.
     """
     try:
         return ET.parse(check_regular(path)).getroot()
@@ -50,10 +50,10 @@ def read_xml(path: Path) -> ET.Element:
 
 
 def read_numbers(path: Path) -> ET.Element:
-    """Parses an MJCF file as `read_xml` does, and refuses NaN: MuJoCo only warns of it and does not draw the geom.
+    """Parses an MJCF file like `read_xml`, and refuses NaN, of which MuJoCo only warns before it leaves out the geom.
 
     Raises:
-        TownError: it is no XML, cannot be read, or holds a NaN.
+        TownError: the file is not XML, cannot be read, or contains a NaN.
     """
     root = read_xml(path)
     for element in root.iter():
@@ -68,13 +68,13 @@ class ActorFacts:
     """The facts that an actor's MJCF file states.
 
     Attributes:
-        name: name of the asset: the stem of its file.
+        name: name of the asset: the file's name without suffix.
         path: path of the file.
         kind: `person`, or a name in `VEHICLES`.
         gait: `walk` or `stand` for people, "" for vehicles.
-        weight: probability of the asset relative to the others of its folder.
+        weight: how often the asset is drawn, relative to the other assets in its folder.
         palette: colours of its paint as linear albedo 0..1, each with its weight.
-        key_points: named points in its frame, metres, such as a person's joints.
+        key_points: named points such as a person's joints, in the actor frame, metres.
     """
 
     name: str
@@ -87,20 +87,20 @@ class ActorFacts:
 
     @property
     def label(self) -> Label:
-        """The label of its kind."""
+        """The semantic label of the kind."""
         return LABEL_BY_NAME[self.kind]
 
     @property
     def vehicle(self) -> VehicleKind | None:
-        """Its kind of vehicle; None for people."""
+        """The kind of vehicle; None for people."""
         return VEHICLES.get(self.kind)
 
 
 def read_actor_facts(path: Path) -> ActorFacts:
-    """Reads the facts of an actor from the `<custom>` sections of its MJCF file and of the files that it includes.
+    """Reads the facts of an actor from the `<custom>` sections of its MJCF file and of included files.
 
     Raises:
-        TownError: a file is no XML, or a fact breaks the conventions.
+        TownError: a file is not XML, or a fact breaks the conventions.
     """
     sections = (custom for root in _with_included(path) for custom in root.iter("custom"))
     entries = {item.get("name", ""): item.get("data", "") for custom in sections for item in custom}
@@ -137,7 +137,8 @@ def read_actor_facts(path: Path) -> ActorFacts:
 
 
 def _key_points(path: Path, entries: Mapping[str, str]) -> tuple[tuple[str, Vec3], ...]:
-    """The named points of an actor: `<numeric name="key_point.left_knee" data="0.02 0.09 0.48"/>`.
+    """The named points of an actor, from elements such as `<numeric name="key_point.left_knee" data="0.02 0.09
+    0.48"/>`.
 
     Raises:
         TownError: a point is not three numbers within `MOST_KEY_POINT_M` of the origin.
@@ -158,7 +159,7 @@ def _with_included(path: Path) -> Iterator[ET.Element]:
     """Yields the root elements of an MJCF file and of the files that it includes.
 
     Raises:
-        TownError: one of them is no XML, or cannot be read.
+        TownError: one of the files is not XML, or cannot be read.
     """
     files = [path]
     for file in files:  # grows by the files that are included
@@ -177,10 +178,10 @@ def _numbers(path: Path, name: str, text: str) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class AssetLibrary:
-    """The MJCF files of one town and of its actors and boards.
+    """The MJCF files of one town and of the actors and boards that it uses.
 
-    A town inside of a folder `towns` may have folders `vehicles`, `pedestrians` and `surfaces` next to that folder.
-    Each of them replaces gear's own.
+    A town in a folder `towns` may have its own folders `vehicles`, `pedestrians` and `surfaces` next to that folder;
+    each of them replaces the folder that comes with gear.
 
     Attributes:
         town: path of the town's MJCF file.
@@ -190,7 +191,10 @@ class AssetLibrary:
 
     @staticmethod
     def for_town(town: str | Path) -> AssetLibrary:
-        """The library of a town, given by its name or by the path of its MJCF with or without the suffix `.xml`.
+        """The library of a town.
+
+        Args:
+            town: name of a town of gear, or path of an MJCF file with or without the suffix `.xml`.
 
         Raises:
             UnknownNameError: there is no such town.
@@ -210,7 +214,7 @@ class AssetLibrary:
 
     @property
     def town_name(self) -> str:
-        """Name of the town: the stem of its file."""
+        """Name of the town: its file's name without suffix."""
         return self.town.stem
 
     def folder(self, kind: Literal["vehicle", "pedestrian", "surface"]) -> Path:
@@ -224,7 +228,7 @@ class AssetLibrary:
         """Path of an asset's MJCF file.
 
         Raises:
-            UnknownNameError: there is no asset of that name.
+            UnknownNameError: there is no asset with this name.
         """
         folder = self.folder(kind)
         path = folder / f"{name}.xml"

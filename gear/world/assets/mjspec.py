@@ -11,11 +11,11 @@ from gear.world.assets.library import read_xml
 
 
 def read_spec(path: Path) -> mujoco.MjSpec:
-    """Reads an MJCF file whose name may have any suffix; MuJoCo itself accepts only `.xml`.
+    """Reads an MJCF file with any suffix; MuJoCo itself accepts only `.xml`.
 
     Raises:
-        ValueError: MuJoCo refuses it.
-        TownError: it is no XML, or cannot be read.
+        ValueError: MuJoCo rejects the content.
+        TownError: the file is not XML, or cannot be read.
     """
     if path.suffix == ".xml":
         spec = mujoco.MjSpec.from_file(str(path))
@@ -30,5 +30,7 @@ def read_spec(path: Path) -> mujoco.MjSpec:
 
 
 def accept_flat_bodies(spec: mujoco.MjSpec) -> None:
-    """Lets a flat plate be a body of its own: its inertia is at the limit that MuJoCo accepts, and rounding decides."""
+    """Allows a flat plate as a body of its own. Its inertia is exactly at the limit that MuJoCo accepts, so that
+    rounding would decide.
+    """
     spec.compiler.balanceinertia = True

@@ -1,4 +1,4 @@
-"""The asset facts that one scene needs, read once before its world is planned."""
+"""Reads the facts of all assets that one scene needs, before its world is planned."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gear.world.assets.library import ActorFacts, AssetLibrary
 from gear.world.scene_spec import SceneSpec
 
 EGO_ASSET = "car_saloon"
-"""Name of the MJCF of the ego car, in `mjcf/vehicles`."""
+"""Name of the ego car's MJCF file in `mjcf/vehicles`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,8 +19,8 @@ class AssetFile:
     """An MJCF file as one world uses it.
 
     Attributes:
-        path: of the file.
-        face_size_m: width and height that its face is scaled to; None for the size in the file.
+        path: path of the file.
+        face_size_m: width and height to which its face is scaled; None keeps the size in the file.
     """
 
     path: Path
@@ -28,7 +28,9 @@ class AssetFile:
 
     @property
     def name(self) -> str:
-        """Name of its model in a composed world: the file's stem, and the size where it is scaled."""
+        """Name of its model in a composed world: the file's name without suffix, followed by the size if it is
+        scaled.
+        """
         if self.face_size_m is None:
             return self.path.stem
         return "{}_{:g}x{:g}m".format(self.path.stem, *self.face_size_m)
@@ -36,12 +38,12 @@ class AssetFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneAssets:
-    """The assets of one scene: their paths, and what their files say of themselves.
+    """The assets of one scene: their paths, and the facts in their files.
 
     Attributes:
-        library: the town's MJCF and the folders that belong to it.
+        library: the town's MJCF file and the folders of its assets.
         boards: the file of each board, in patch order.
-        vehicles: vehicles by name, in alphabetical order, with their weights multiplied by the scene's mix.
+        vehicles: vehicles by name, in alphabetical order; their weights are multiplied by the scene's mix.
         pedestrians: people by name, in alphabetical order.
         ego: the ego car.
         carrier: the vehicle that carries the patch; None in a scene without a truck.

@@ -1,1 +1,1 @@
-"""From MJCF files to compiled MuJoCo models, and the cache that keeps them."""
+"""Compiles MJCF files to MuJoCo models, and keeps compiled worlds in a cache."""

@@ -1,4 +1,4 @@
-"""The pool of actors that a scene's world holds: enough instances of each asset for every sample, and no more."""
+"""The pool of actors in a scene's world: just enough instances of each asset for every sample."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from gear.world.assets.scene_assets import SceneAssets
 from gear.world.scene_spec import SceneSpec
 
 PARKED_DEPTH_M = 60.0
-"""Actors that a sample does not use wait this far below the town, under its ground."""
+"""Actors that a sample does not use are kept this far below the town's ground, metres."""
 
 POOL_SLACK = 2.0
-"""An asset gets this many times the instances that its share of the largest crowd would be."""
+"""The pool has this many times the number of instances that an asset's share of the largest crowd would need."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,8 +24,8 @@ class Slot:
 
     Attributes:
         body: name of its body in the render model and in the placement model.
-        actor: the asset that it is an instance of.
-        carries_surface: whether its face has a texture of its own, which can show a patch.
+        actor: facts of its asset.
+        carries_surface: whether it has a face with its own texture, which can show a patch.
     """
 
     body: str
@@ -34,11 +34,12 @@ class Slot:
 
 
 def plan_slots(scene: SceneSpec, assets: SceneAssets) -> tuple[Slot, ...]:
-    """Decides which actors a world holds: the ego car, then vehicles, people, and the carrier of the patch.
+    """Decides which actors a world contains: the ego car, vehicles, people, and the carrier of the patch, in this
+    order.
 
     Args:
-        scene: its largest counts of vehicles and people decide the size of the pool.
-        assets: read for the same scene.
+        scene: the scene; its largest counts of vehicles and people determine the size of the pool.
+        assets: the assets of the same scene.
     """
     counts: Counter[str] = Counter({assets.ego.name: 1})
     actors = {assets.ego.name: assets.ego}
@@ -55,7 +56,7 @@ def plan_slots(scene: SceneSpec, assets: SceneAssets) -> tuple[Slot, ...]:
 
 
 def _instances(actors: Mapping[str, ActorFacts], largest_count: int) -> dict[str, int]:
-    """How many instances of each asset a crowd of at most `largest_count` actors needs."""
+    """Number of instances of each asset that a crowd of at most `largest_count` actors needs."""
     if not largest_count:
         return {}
     total = sum(actor.weight for actor in actors.values())

@@ -1,8 +1,8 @@
 """Reads meshes and textures in threads while their world is still being composed.
 
-Composing is Python's work and reading is MuJoCo's, so both run at once. What was read waits in MuJoCo's cache, by the
-path and the modification time of the file. MuJoCo reads a file again where the world uses it with other settings, such
-as a scaled mesh.
+Composing is work for Python and reading is work for MuJoCo, so both run at the same time. MuJoCo keeps what was read in
+its cache, by path and modification time of the file. It reads a file again if the world uses it with other settings,
+such as a scaled mesh.
 """
 
 from __future__ import annotations
@@ -18,43 +18,43 @@ import mujoco
 from gear.world.compilation.memory import disable_asset_cache
 
 _BATCH_BYTES = 2 << 20
-"""Size of the files that one thread reads at a time; it gives back its temporary memory after each batch."""
+"""Size of the files that a thread reads at once; after each batch it frees its temporary memory."""
 
 _CACHE_BYTES = 2 << 30
-"""Capacity of MuJoCo's cache, more than any town needs. In a smaller one the last files would be read twice."""
+"""Capacity of MuJoCo's cache, larger than any town. If it were too small, some files would be read twice."""
 
 _INERTIA = "shell"
-"""How gear's files compute the inertia of a mesh; MuJoCo's default refuses open surfaces."""
+"""How gear's files compute the inertia of a mesh; MuJoCo's default would reject open surfaces."""
 
 
 class AssetPrefetcher:
     """Reads files into MuJoCo's cache, in the threads of a pool."""
 
     def __init__(self, readers: ThreadPoolExecutor | None) -> None:
-        """Takes the pool; without one nothing is read."""
+        """Stores the pool; if it is None, nothing is read."""
         self._readers = readers
 
     def prefetch(self, files: Iterable[str]) -> None:
-        """Begins to read files: a path ending in `.png` is a texture, any other a mesh.
+        """Starts to read files: paths that end in `.png` are textures, all others are meshes.
 
-        A file that cannot be read is no error here: it is one where the world is compiled.
+        Files that cannot be read are ignored here; compiling the world reports them.
         """
         if self._readers is not None:
             for batch in _batches(files):
                 self._readers.submit(_read, batch)
 
     def wait(self) -> None:
-        """Waits until all files are read. No further file can be prefetched."""
+        """Waits until all files are read. Afterwards no more files can be prefetched."""
         if self._readers is not None:
             self._readers.shutdown()
 
 
 @contextlib.contextmanager
 def asset_prefetcher(readers: int) -> Iterator[AssetPrefetcher]:
-    """Opens MuJoCo's cache for a prefetcher, and empties and closes it at the end.
+    """Context with a prefetcher: opens MuJoCo's cache, and empties and closes it at the end.
 
     Args:
-        readers: number of threads that read; with 0 nothing is prefetched, and nothing is in memory twice.
+        readers: number of threads that read; with 0 nothing is prefetched, which saves memory.
     """
     disable_asset_cache()
     if not readers:
@@ -73,7 +73,7 @@ def asset_prefetcher(readers: int) -> Iterator[AssetPrefetcher]:
 
 
 def _batches(files: Iterable[str]) -> Iterator[list[str]]:
-    """Batches of files, the largest files first, so that no thread is left with a large one at the end."""
+    """Batches of files, largest files first, so that no thread has to read a large file alone at the end."""
     batch: list[str] = []
     batch_bytes = 0
     for size_bytes, file in sorted(((Path(file).stat().st_size, file) for file in files), reverse=True):
@@ -87,7 +87,7 @@ def _batches(files: Iterable[str]) -> Iterator[list[str]]:
 
 
 def _read(files: list[str]) -> None:
-    """Compiles a model of the files alone, which leaves them in MuJoCo's cache."""
+    """Compiles a model that consists only of these files, which leaves them in MuJoCo's cache."""
     root = ET.Element("mujoco")
     assets = ET.SubElement(root, "asset")
     for number, file in enumerate(files):

@@ -1,9 +1,9 @@
-"""Scales a board's MJCF so that its face has the size that a scene gives it.
+"""Scales a board's MJCF so that its face has the size that the scene asks for.
 
-A board looks along its +x axis and stands on the ground at its origin, so its width is scaled along y, its height along
-z, and its depth is kept. MuJoCo scales the meshes; the positions of geoms, bodies and sites and the sizes of geoms are
-scaled here. Posts (upright cylinders and capsules) and spheres keep their radius. A turned geom would be sheared, so a
-board that has one cannot be scaled.
+A board faces along its +x axis and stands on the ground at its origin. Its width is therefore scaled along y and its
+height along z; its depth is not changed. MuJoCo scales the meshes; this module scales the positions of geoms, bodies
+and sites and the sizes of geoms. Posts (upright cylinders and capsules) and spheres keep their radius. A board with
+rotated geoms cannot be scaled, since they would be sheared.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ def scale_board(root: ET.Element, path: Path, size_m: tuple[float, float]) -> No
     """Scales the MJCF of a board in place.
 
     Args:
-        root: of the file.
-        path: of the file.
-        size_m: width and height that its face is to have.
+        root: root element of the file.
+        path: path of the file, for error messages.
+        size_m: new width and height of the face.
 
     Raises:
         TownError: the file has no face, includes other files, or has parts that cannot be scaled.

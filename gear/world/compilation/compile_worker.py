@@ -1,4 +1,4 @@
-"""The subprocess in which `world_cache` compiles a world."""
+"""The subprocess in which `gear.world.compilation.world_cache` compiles a world."""
 
 from __future__ import annotations
 
@@ -25,20 +25,22 @@ from gear.world.scene_spec import SceneSpec
 from gear.world.weather.light import Lighting, lighting_of
 
 _SWITCH_S = 0.0005
-"""How long one thread may hold the interpreter, so that the threads which feed MuJoCo continue quickly."""
+"""Longest time that one thread keeps the interpreter, seconds; short, so that the threads which feed MuJoCo are
+not delayed.
+"""
 
 _READERS = 8
-"""Most threads that read assets: no town has more than forty batches of them."""
+"""Largest number of threads that read assets; no town has more than forty batches of them."""
 
 _CODE_SUFFIXES = (".py", ".pyc", ".so")
 
 
 def main(folder: str) -> None:
-    """Compiles the world whose key is on the first line of standard input.
+    """Compiles the world whose key is the first line of standard input, and saves it into the folder.
 
-    It saves the world into the folder, with a file `MAY_CACHE` if the key covers every file that was read, and writes
-    `DONE` to standard output. The key does not cover a town that refers to files outside of its assets, or a file that
-    somebody edited meanwhile.
+    When the world is saved, the worker writes `DONE` to standard output. It also creates the file `MAY_CACHE` if the
+    key covers every file that was read. It does not cover a town that refers to files outside its assets, or a file
+    that was edited in the meantime.
     """
     gc.disable()  # the half million objects of the MJCF all live to the end; collecting took a third of the time
     sys.setswitchinterval(_SWITCH_S)
@@ -61,9 +63,10 @@ def main(folder: str) -> None:
 
 
 def _lighting_in_process(weather: Weather) -> Callable[[], Lighting] | None:
-    """Computes a weather's light in a process of its own, and returns a function that waits for it.
+    """Starts to compute the light of a weather in another process, and returns a function that waits for the result.
 
-    In this process the interpreter would be shared with the composition. None where processes cannot be forked.
+    In this process the computation would compete with the composition for the interpreter. None if processes cannot be
+    forked.
     """
     if sys.platform != "linux":
         return None
@@ -88,14 +91,16 @@ def _lighting_in_process(weather: Weather) -> Callable[[], Lighting] | None:
 
 
 def _exit_with_parent() -> None:
-    """Ends this process when its parent is gone, for example killed: nobody else waits for the world."""
+    """Ends this process when its parent has ended, for example because it was killed; nobody would use the result."""
     while os.read(0, 1):
         pass
     os._exit(1)
 
 
 def _record_files_read() -> set[str]:
-    """Returns a set that grows by the real path of each file, code aside, that Python opens for reading from now on."""
+    """Returns a set to which the real path of each file that Python opens for reading is added from now on,
+    except code.
+    """
     files: set[str] = set()
 
     def record(event: str, details: tuple[Any, ...]) -> None:

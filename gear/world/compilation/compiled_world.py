@@ -34,14 +34,14 @@ _RENDER, _PLACEMENT, _FACTS = "render.mjb", "placement.mjb", "facts.json"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CompiledWorld:
-    """The two models of a world, and the facts about them that the models do not hold.
+    """The two MuJoCo models of a world, and facts that the models do not contain.
 
     Attributes:
         model: the render model: visible geoms, actors as mocap bodies.
         placement_model: the placement model: collision geoms, actors as free bodies on four feet.
         classes: labels of the render model's geoms.
         slots: the pool of actors.
-        faces: names of the faces that take patches, in patch order.
+        faces: names of the faces that show patches, in patch order.
     """
 
     model: mujoco.MjModel
@@ -53,10 +53,10 @@ class CompiledWorld:
     def save(self, folder: Path) -> None:
         """Writes both models and the facts into an empty folder.
 
-        The render model is saved without the bounding volumes of its meshes, which only rays need.
+        The bounding volumes of the render model's meshes are left out; only rays would need them.
 
         Raises:
-            OSError: there is no room for the files.
+            OSError: the disk is full.
         """
         with without_mesh_bvh(self.model):
             crc32 = {_RENDER: write_model(self.model, folder / _RENDER)}
@@ -75,12 +75,12 @@ class CompiledWorld:
         """Reads a world that `save` wrote.
 
         Args:
-            folder: that it was saved into.
-            slots: its pool of actors, decided anew from the same plan.
+            folder: folder into which it was saved.
+            slots: its pool of actors, computed again from the same plan.
 
         Raises:
             OSError: a file is missing or cannot be read.
-            ValueError, KeyError, GearError: the files are damaged, or are not those of a world.
+            ValueError, KeyError, GearError: the files are damaged, or do not describe a world.
         """
         facts = json.loads((folder / _FACTS).read_text(encoding="utf-8"))
         model, placement = (read_model(folder / name, facts["crc32"][name]) for name in (_RENDER, _PLACEMENT))
@@ -106,10 +106,10 @@ def compile_world(
     """Composes and compiles a planned world.
 
     Args:
-        plan: everything that the world holds.
-        lighting: as for `compose`.
-        readers: threads that read meshes and textures while the world is composed; 0 for none. With them it is done
-            sooner, and town10 takes 2.0 GB of memory instead of 1.4 GB.
+        plan: the contents of the world.
+        lighting: as for `gear.world.compilation.compose.compose`.
+        readers: number of threads that read meshes and textures while the world is composed; 0 for none. With threads
+            it is faster, and town10 needs 2.0 GB of memory instead of 1.4 GB.
 
     Raises:
         TownError: a file breaks the conventions, or MuJoCo cannot compile it.

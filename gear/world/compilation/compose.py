@@ -1,8 +1,8 @@
-"""Composes one MJCF out of many: a town, its boards, and a pool of actors.
+"""Composes one MJCF from many: a town, its boards, and a pool of actors.
 
 dm_control.mjcf keeps the names of different files apart. Each asset's file is attached once, for its meshes, textures
-and materials; each instance is a body whose geoms refer to those, so ten equal cars cost one mesh. Only faces that take
-a patch get a material and a texture of their own.
+and materials. Each instance is a body whose geoms refer to them, so ten equal cars need the memory of one mesh. Only
+faces that can show a patch get a material and a texture of their own.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ from gear.world.weather.presets import apply_weather
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Composition:
-    """A composed world, not yet compiled.
+    """A composed world that is not compiled yet.
 
     Attributes:
         tree: the whole world as MJCF.
-        assets: content of the files that the tree refers to, by name; for a mesh, the path of its file.
-        town: path of the town's MJCF.
-        files: every MJCF file that the world is composed of, the town's first.
+        assets: content of the files to which the tree refers, by name; for a mesh, the path of its file.
+        town: path of the town's MJCF file.
+        files: paths of all MJCF files of the world, the town's first.
         slots: the pool of actors.
-        faces: faces that take patches, in patch order.
-        folder: folder of the files that were written by `write_assets`; None before.
+        faces: names of the faces that can show patches, in patch order.
+        folder: folder of the files that `write_assets` wrote; None if it was not called yet.
     """
 
     tree: ET.Element
@@ -59,9 +59,9 @@ class Composition:
         return [str(path) for path in self.folder.glob("*.png")] if self.folder else []
 
     def write_assets(self, folder: Path) -> Composition:
-        """Writes the textures into a folder and returns the composition that refers to files alone.
+        """Writes the textures into a folder and returns the composition, which then refers only to files.
 
-        MuJoCo copies every asset that is given to it in memory, all of them at once. It reads files one by one.
+        MuJoCo copies all assets that it gets in memory at once, whereas it reads files one by one.
         """
         for name, content in self.assets.items():
             if not isinstance(content, MeshPath):
@@ -76,13 +76,13 @@ class Composition:
 
 
 def compose(plan: WorldPlan, files: SceneMjcf, lighting: Callable[[], Lighting] | None = None) -> Composition:
-    """Puts a town, its boards, its actors and its weather into one MJCF tree.
+    """Joins a town, its boards, its actors and its weather to one MJCF tree.
 
     Args:
-        plan: what the world holds.
-        files: the MJCF of the plan.
-        lighting: returns the light of the plan's weather, where something else computes it already; otherwise a thread
-            computes it meanwhile.
+        plan: the contents of the world.
+        files: the MJCF files of the plan.
+        lighting: function that returns the light of the plan's weather, if it is already being computed elsewhere; None
+            computes it in a thread.
 
     Raises:
         TownError: a file cannot be composed with the others.
@@ -107,13 +107,13 @@ def compose(plan: WorldPlan, files: SceneMjcf, lighting: Callable[[], Lighting] 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Filling:
-    """Puts boards and actors into the tree of a town.
+    """Adds boards and actors to the tree of a town.
 
     Attributes:
-        plan: names them.
+        plan: the contents of the world.
         root: the tree.
-        instances: makes their bodies.
-        town_bodies: names of the bodies of the town that are not in the tree.
+        instances: makes the bodies.
+        town_bodies: names of the town's bodies that are not in the tree.
     """
 
     plan: WorldPlan
@@ -122,7 +122,7 @@ class _Filling:
     town_bodies: frozenset[str]
 
     def fill(self) -> tuple[FaceNames, ...]:
-        """Adds a body for every board and every slot, and returns the faces that take patches."""
+        """Adds a body for every board and every slot, and returns the names of the faces that can show patches."""
         plan, instances = self.plan, self.instances
         faces: list[FaceNames] = []
         for index, (board, file) in enumerate(zip(plan.scene.boards, plan.assets.boards, strict=True)):
@@ -158,6 +158,6 @@ class _Filling:
 
 
 def _pose(board: BoardSpec) -> dict[str, Any]:
-    """MJCF attributes of a board's body: position in metres, and a quaternion (w, x, y, z) about z."""
+    """MJCF attributes of a board's body: position in metres and a quaternion (w, x, y, z) for the rotation about z."""
     half = math.radians(board.facing_deg) / 2
     return {"pos": board.position_m, "quat": (math.cos(half), 0.0, 0.0, math.sin(half))}

@@ -1,7 +1,7 @@
-"""Copies of an asset's first instance, made in the MJCF that dm_control wrote.
+"""Copies of an asset's first instance, made as text in the MJCF that dm_control wrote.
 
-Instances of one asset differ in names and number plates alone. dm_control takes nearly two milliseconds to make each,
-three quarters of a second for the crowd of a town.
+Instances of an asset differ only in names and number plates. dm_control needs nearly two milliseconds for each, which
+is three quarters of a second for the actors of a town.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ class Copy:
 
     Attributes:
         name: name of its body.
-        original: name of the body that it is a copy of. The names of all elements in that body begin with it.
-        plates: meshes of its number plates, by the names that the asset's file gives to their geoms.
+        original: name of the copied body; the names of all elements in that body start with it.
+        plates: meshes of its number plates, by the names of their geoms in the asset's file.
     """
 
     name: str
@@ -32,7 +32,7 @@ def put_copies_into(world: ET.Element, copies: Mapping[str, Sequence[Copy]]) -> 
 
     Args:
         world: the worldbody, changed in place.
-        copies: the copies to insert, by the name of the body that they follow.
+        copies: the copies, by the name of the body after which they are inserted.
     """
     bodies = {body.get("name", ""): body for body in world.iterfind("body")}
     for index, element in reversed(list(enumerate(world))):

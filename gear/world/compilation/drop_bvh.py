@@ -1,6 +1,6 @@
 """Saves models without the bounding volume hierarchies (BVH) of their meshes.
 
-They are half of a town's render model, and only rays use them.
+The BVH take half of a town's render model, and only rays use them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 _TREES = ("bvh_aabb", "bvh_child", "bvh_depth", "bvh_nodeid")
 _NBVH, _NBVHSTATIC, _NBUFFER = 7, 8, 97
-"""Indices of sizes in MuJoCo's `mjModel`, which begins with its sizes. They are checked each time."""
+"""Indices of three of the sizes at the start of MuJoCo's struct `mjModel`. They are checked at each use."""
 
 _ALIGNMENT_BYTES = 64
 """Alignment of the arrays of a model."""
@@ -23,10 +23,10 @@ _ALIGNMENT_BYTES = 64
 
 @contextlib.contextmanager
 def without_mesh_bvh(model: mujoco.MjModel) -> Iterator[None]:
-    """Within the context a model has the BVH of its bodies alone; a model that is saved then loads without the others.
+    """Context in which a model has only the BVH of its bodies; when it is saved, the file has no BVH of meshes.
 
-    All its meshes share one empty box in place of their BVH, so that rays miss them. A model with flexes is left as it
-    is, and so is one whose memory layout is not that of the MuJoCo release that this module knows.
+    In the loaded model all meshes share one empty box as BVH, so rays miss them. A model with flexes is not changed,
+    nor is one whose memory layout differs from that of the MuJoCo release that this module knows.
     """
     sizes, count = _sizes(model), int(np.max(model.body_bvhadr + model.body_bvhnum, initial=0))
     if sizes is None or count >= model.nbvh or model.nflex or not model.nmesh:
@@ -48,7 +48,7 @@ def without_mesh_bvh(model: mujoco.MjModel) -> Iterator[None]:
 
 
 def _sizes(model: mujoco.MjModel) -> npt.NDArray[np.int64] | None:
-    """(98,) int64 writable view of a model's sizes in memory; None where the layout is not the expected one."""
+    """(98,) int64 writable view of a model's sizes in memory; None if the memory layout is not the expected one."""
     address = getattr(model, "_address", None)
     if address is None:
         return None

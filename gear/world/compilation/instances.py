@@ -18,19 +18,19 @@ from gear.world.compilation.static_parts import UNNAMED, MeshPath, SplitAsset
 from gear.world.surfaces.face_texture import FACE_SIZE_PX
 
 _UNREAD = ("frame", "replicate", "attach")
-"""Elements of a body that MuJoCo knows and dm_control does not."""
+"""Elements of a body that MuJoCo supports and dm_control does not."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaceNames:
-    """A face that takes a patch, by the names of its elements in the composed MJCF.
+    """A face that can show a patch, described by the names of its elements in the composed MJCF.
 
     Attributes:
-        asset: name of the MJCF file that it comes from, without suffix.
-        owner: body of the board, or of the actor that carries the face.
+        asset: name of its MJCF file, without suffix.
+        owner: name of the body of the board, or of the actor that carries the face.
         is_carried: whether the owner is an actor.
-        geom, site: the geom of the face, and the site that gives its frame.
-        neutral_material: the asset's own material, which says what the face looks like without a patch.
+        geom, site: names of the geom of the face and of the site that defines its frame.
+        neutral_material: name of the asset's own material, which the face shows without a patch.
     """
 
     asset: str
@@ -44,16 +44,16 @@ class FaceNames:
 def load_mjcf(
     path: Path, text: str | None = None, mesh_paths: Mapping[str, MeshPath] | None = None, name: str | None = None
 ) -> mjcf.RootElement:
-    """Reads one MJCF file into dm_control, and gives every element a name.
+    """Reads one MJCF file into dm_control, and gives a name to every element.
 
     Args:
-        path: of the file.
-        text: an MJCF text that is read in place of the file's content.
-        mesh_paths: path of each mesh file, by the name that `text` gives it.
-        name: of the model; the file's stem if None.
+        path: path of the file.
+        text: MJCF text that is read instead of the file's content; None for the content.
+        mesh_paths: path of each mesh file, by its name in `text`.
+        name: name of the model; None for the file's name without suffix.
 
     Raises:
-        TownError: dm_control cannot read it.
+        TownError: dm_control cannot read the file.
     """
     try:
         if text is None:
@@ -83,30 +83,30 @@ def load_mjcf(
 
 
 def class_name(dclass: Any) -> str:
-    """Name of an element's default class; empty where it has none.
+    """Name of an element's default class; "" if it has none.
 
     Args:
-        dclass: as dm_control gives it: the class, its name where dm_control does not know the class, or None.
+        dclass: dm_control's value: the class, its name if dm_control does not know the class, or None.
     """
     return dclass if isinstance(dclass, str) else "" if dclass is None else str(dclass.dclass)
 
 
 def free_name(root: mjcf.RootElement, kind: str, name: str) -> str:
-    """Returns the name, with underscores added until no element of that kind in the tree has it."""
+    """A name that no element of this kind has in the tree: `name`, with as many underscores added as necessary."""
     while root.find(kind, name) is not None:
         name += "_"
     return name
 
 
 class AssetInstances:
-    """The assets of a composition: attaches each file once and makes its instances."""
+    """Makes instances of assets in a composition; the file of each asset is attached once."""
 
     def __init__(self, root: mjcf.RootElement, files: Mapping[AssetFile, SplitAsset]) -> None:
-        """Makes instances in the tree of a town.
+        """Prepares instances in the tree of a town.
 
         Args:
             root: the tree.
-            files: the assets' MJCF.
+            files: the MJCF of the assets.
         """
         self._root = root
         self._files = files
@@ -125,22 +125,24 @@ class AssetInstances:
         return tuple(file.path for file in self._models)
 
     def add_instance(self, file: AssetFile, body: Any) -> None:
-        """Fills a body with an instance of an asset that shares everything with the asset's other instances.
+        """Adds an instance of an asset to a body. It shares meshes and materials with the asset's other instances.
 
-        The number plates that the file holds go round among the instances.
+        The number plates in the asset's file are used in turn by its instances.
 
         Raises:
-            TownError: the file cannot be attached, or the instance would have the name of another element.
+            TownError: the file cannot be attached, or another element already has the name of the instance.
         """
         self._fill(file, body)
         self._originals.setdefault(file, body.name)
 
     def has_instance(self, file: AssetFile) -> bool:
-        """Whether `add_instance` has made an instance of the asset, which `copy_instance` can copy."""
+        """Whether `add_instance` has made an instance of the asset that `copy_instance` can copy."""
         return file in self._originals
 
     def copy_instance(self, file: AssetFile, name: str) -> None:
-        """Makes another instance, in a body of that name, without dm_control: `put_copies_into` writes it later."""
+        """Requests another instance, in a body with this name; `put_copies_into` writes it later, without
+        dm_control.
+        """
         plates = {geom: plate.full_identifier for geom, plate in self._next_plates(file).items()}
         frame = self._model(file).full_identifier  # of the empty body that dm_control puts behind the first instance
         self._copies[frame].append(Copy(name=name, original=self._originals[file], plates=plates))
@@ -157,16 +159,16 @@ class AssetInstances:
             self._root.find("geom", f"{body.name}_{geom}").mesh = plate
 
     def _next_plates(self, file: AssetFile) -> dict[str, Any]:
-        """Meshes of the next instance's number plates, by the name of the geom."""
+        """Meshes of the number plates of the next instance, by the name of the geom."""
         number = self._instances[file]
         self._instances[file] += 1
         return {geom: plates[number % len(plates)] for geom, plates in self._plates[file]}
 
     def add_surface_instance(self, file: AssetFile, body: Any, *, is_carried: bool) -> FaceNames:
-        """Fills a body with an instance whose face has a texture of its own, which can show a patch.
+        """Adds an instance to a body whose face has its own texture, so that it can show a patch.
 
         Raises:
-            TownError: the asset has not exactly one face, or the face has no material or no `surface` site.
+            TownError: the asset does not have exactly one face, or the face has no material or no site `surface`.
         """
         self._fill(file, body)
         model = self._model(file)
@@ -192,18 +194,20 @@ class AssetInstances:
         )
 
     def drop_templates(self) -> None:
-        """Removes the bodies of the attached files themselves; their meshes, textures and materials stay."""
+        """Removes the bodies of the attached files themselves; their meshes, textures and materials are kept."""
         for model in self._models.values():
             for child in list(model.worldbody.all_children()):
                 child.remove()
 
     def put_copies_into(self, tree: ET.Element) -> None:
-        """Adds the instances that `copy_instance` made to the MJCF that dm_control wrote."""
+        """Adds the instances that `copy_instance` requested to the MJCF that dm_control wrote."""
         for worldbody in tree.iterfind("worldbody"):
             put_copies_into(worldbody, self._copies)
 
     def put_defaults_into(self, xml: str) -> str:
-        """Returns the MJCF that dm_control wrote, with the default classes that went around it."""
+        """The MJCF that dm_control wrote, completed with the default classes that were not passed through
+        dm_control.
+        """
         for name, defaults in self._defaults.items():
             before, empty, after = xml.partition(f'<default class="{name}/"/>')
             assert empty  # dm_control writes an empty class for every file
@@ -211,7 +215,7 @@ class AssetInstances:
         return xml
 
     def _model(self, file: AssetFile) -> mjcf.RootElement:
-        """The asset's file, attached at the first call."""
+        """The dm_control model of an asset's file; it is attached at the first call."""
         if file not in self._models:
             for other in self._models:
                 if other.name == file.name:
@@ -234,7 +238,9 @@ class AssetInstances:
         return self._models[file]
 
     def _share_textures(self, model: mjcf.RootElement) -> None:
-        """Replaces textures of a file by equal ones that another file has brought: same image, same attributes."""
+        """Replaces textures of a file by equal ones (same image, same attributes) of a file that was attached
+        before.
+        """
         for texture in list(model.asset.texture):
             if texture.file is None:
                 continue
@@ -252,7 +258,7 @@ class AssetInstances:
             texture.remove()
 
     def _own_material(self, material: Any, name: str) -> Any:
-        """A copy of a material whose colour comes from a texture of its own, of the size of a face."""
+        """A copy of a material whose colour comes from a texture of its own, with the size of a face."""
         width, height = FACE_SIZE_PX
         texture = self._root.asset.add(
             "texture",
@@ -277,15 +283,15 @@ class AssetInstances:
 
 
 def _angle_settings(model: mjcf.RootElement) -> str:
-    """The compiler settings of a file that say how its angles are written.
+    """The compiler settings of a file that define how its angles are written.
 
-    A composed world has one setting for all of its files, so files that differ in it cannot be composed.
+    A composed world has one such setting, so files with different settings cannot be composed.
     """
     return f"angle={model.compiler.angle or 'degree'} eulerseq={model.compiler.eulerseq or 'xyz'}"
 
 
 def _plates_of(model: mjcf.RootElement) -> Iterator[tuple[str, list[Any]]]:
-    """Names of the geoms of a class ending in `.plate`, each with its meshes: its own, `m`, and `m_1`, `m_2` …"""
+    """Names of the geoms whose class ends in `.plate`, each with its meshes: its own mesh `m`, and `m_1`, `m_2` …"""
     for geom in model.find_all("geom"):
         if class_name(geom.dclass).endswith(".plate") and getattr(geom.mesh, "name", None):
             meshes = [geom.mesh]
@@ -295,7 +301,7 @@ def _plates_of(model: mjcf.RootElement) -> Iterator[tuple[str, list[Any]]]:
 
 
 def _attributes_outside(element: Any) -> dict[str, Any]:
-    """Attributes of an element as they must be written in the tree that the element's file is attached to."""
+    """Attributes of an element as they must be written in the tree to which the element's file is attached."""
     attributes: dict[str, Any] = element.get_attributes()
     for reference in ("dclass", "childclass"):
         if isinstance(attributes.get(reference), str):

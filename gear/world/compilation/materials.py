@@ -1,4 +1,4 @@
-"""Materials of a compiled model: the colours of geoms, and textures that would crash a renderer."""
+"""Materials of a compiled model: colours of geoms, and a check for textures that would crash a renderer."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ TEXTURE_KINDS = {
     mujoco.mjtTexture.mjTEXTURE_CUBE: "cube",
     mujoco.mjtTexture.mjTEXTURE_SKYBOX: "skybox",
 }
-"""Names of the types in messages."""
+"""Names of the texture types in error messages."""
 
 LARGEST_SIDE_PX = 16384
-"""Largest side of a texture that Mesa's Vulkan and OpenGL drivers accept."""
+"""Largest side of a texture that Mesa's Vulkan and OpenGL drivers accept, pixels."""
 
 
 def effective_rgba(model: mujoco.MjModel) -> Array:
-    """(ngeom, 4) float64 colour of each geom, 0..1: its own, or that of its material."""
+    """(ngeom, 4) float64 colour of each geom, 0..1: its own colour if it has one, otherwise that of its material."""
     rgba: Array = model.geom_rgba.astype(np.float64)
     plain = ~has_own_colour(model)
     rgba[plain] = model.mat_rgba[model.geom_matid[plain]]
@@ -32,7 +32,7 @@ def effective_rgba(model: mujoco.MjModel) -> Array:
 
 
 def visible_materials(model: mujoco.MjModel) -> dict[int, int]:
-    """The first visible geom that uses each material, by material id."""
+    """For each material in use, by material id: the id of the first visible geom that uses it."""
     first_geoms: dict[int, int] = {}
     for geom in np.flatnonzero((model.geom_group < FIRST_HIDDEN_GROUP) & (model.geom_matid >= 0)).tolist():
         first_geoms.setdefault(int(model.geom_matid[geom]), geom)
@@ -40,16 +40,16 @@ def visible_materials(model: mujoco.MjModel) -> dict[int, int]:
 
 
 def textures_of(model: mujoco.MjModel, material: int) -> list[tuple[int, int]]:
-    """(role, texture id) of each texture of a material; roles are those of `mujoco.mjtTextureRole`."""
+    """(role, texture id) for each texture of a material; roles are those of `mujoco.mjtTextureRole`."""
     return [(role, int(texture)) for role, texture in enumerate(model.mat_texid[material]) if texture >= 0]
 
 
 def reject_fatal_textures(model: mujoco.MjModel, path: Path) -> None:
-    """Refuses textures with which Filament would end the process without a message.
+    """Rejects textures with which Filament would end the process without a message.
 
     Args:
-        model: compiled.
-        path: the town's file, for errors.
+        model: compiled model.
+        path: the town's file, for error messages.
 
     Raises:
         TownError: a visible geom uses such a texture.
@@ -63,7 +63,7 @@ def reject_fatal_textures(model: mujoco.MjModel, path: Path) -> None:
 
 
 def _fatal_texture(model: mujoco.MjModel, material: int, texture: int) -> str:
-    """Says why Filament cannot draw a material's texture, and what to do; empty if it can."""
+    """The reason why Filament cannot draw a material's texture, and what to do; "" if it can."""
     name = _own(model.tex(texture).name)
     width, height = int(model.tex_width[texture]), int(model.tex_height[texture])
     if width > LARGEST_SIDE_PX or height > LARGEST_SIDE_PX:

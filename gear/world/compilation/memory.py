@@ -1,7 +1,7 @@
-"""Reduces the memory of a worker process, which compiles a world and then renders many samples.
+"""Reduces the memory of a worker process, which loads a world and then renders many samples.
 
-On town10, whose render model has 345 MB, these functions reduce the peak of a worker from 1.8 GB to 1.3 GB: MuJoCo's
-cache is closed, arrays that only the renderer needed are released, and large buffers return to the system.
+For town10, whose render model has 345 MB, these functions reduce a worker's peak from 1.8 GB to 1.3 GB: MuJoCo's cache
+is closed, arrays that only the renderer needed are released, and large buffers are returned to the operating system.
 """
 
 from __future__ import annotations
@@ -33,16 +33,17 @@ _KEPT_BYTES = 32 << 20
 
 
 def disable_asset_cache() -> None:
-    """Empties and closes MuJoCo's cache of decoded meshes and textures; a worker compiles once."""
+    """Empties and closes MuJoCo's cache of decoded meshes and textures, since a worker compiles only once."""
     mujoco.mj_setCacheCapacity(mujoco.mj_getCache(), 0)
 
 
 def map_large_buffers() -> None:
-    """Makes glibc map every buffer of a linear frame's size on its own, so that freeing it returns it to the system.
+    """Makes glibc allocate large buffers (from the size of a linear frame) separately, so that freeing them returns
+    them to the system.
 
-    By default glibc soon takes such buffers from its heap, where they leave holes: 130 MB with quality `film`. Its trim
-    threshold is raised as well: with the small one that comes with this setting it would return the end of its heap all
-    the time and fetch it again, which took a third of the time of measuring and encoding.
+    By default glibc takes such buffers from its heap, where they leave holes: 130 MB with quality `film`. The trim
+    threshold is raised as well. Otherwise glibc would return the end of its heap and fetch it again all the time, which
+    took a third of the time of measuring and encoding.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
@@ -51,7 +52,7 @@ def map_large_buffers() -> None:
 
 
 def release_memory() -> None:
-    """Collects garbage and returns freed pages to the system, where the C library is glibc."""
+    """Collects garbage and, with glibc, returns freed pages to the operating system."""
     gc.collect()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
@@ -61,16 +62,16 @@ def release_memory() -> None:
 def release_render_arrays(model: mujoco.MjModel) -> None:
     """Releases the texels and triangles of a model after a renderer has copied them.
 
-    No other renderer can be opened for the model afterwards.
+    Afterwards no other renderer can be opened for the model.
     """
     _give_back(getattr(model, name) for name in _SHOWN)
 
 
 def _give_back(arrays: Iterable[npt.NDArray[np.generic]]) -> None:
-    """Returns the whole pages of arrays to the system; they then read as zeros.
+    """Returns the whole pages of arrays to the operating system; they read as zeros afterwards.
 
-    A model is one block of memory, so parts of it cannot be freed otherwise. Only Linux promises the zeros; on other
-    systems nothing happens.
+    A model is one block of memory, so its parts cannot be freed in another way. Only Linux guarantees the zeros; on
+    other systems nothing is done.
     """
     if sys.platform != "linux":
         return

@@ -1,6 +1,6 @@
 """Writes and reads compiled models through memory-mapped files.
 
-MuJoCo's own functions copy the whole model once more, which takes half of the time for a large model.
+MuJoCo's own functions make another copy of the whole model, which takes half of the time for a large model.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def write_model(model: mujoco.MjModel, path: Path) -> int:
     """Writes a model into a new file and returns the CRC-32 of its content.
 
     Raises:
-        OSError: there is no room for it.
+        OSError: the disk is full.
     """
     size = mujoco.mj_sizeModel(model)
     with path.open("w+b") as file:
@@ -39,8 +39,8 @@ def read_model(path: Path, crc32: int) -> mujoco.MjModel:
     """Reads a model that `write_model` wrote.
 
     Args:
-        path: of the file.
-        crc32: of its content; after a power cut a file may have the right size and the wrong content.
+        path: path of the file.
+        crc32: CRC-32 of the content; after a power failure a file may have the right size and the wrong content.
 
     Raises:
         OSError: the file is missing or cannot be read.
@@ -54,15 +54,15 @@ def read_model(path: Path, crc32: int) -> mujoco.MjModel:
 
 
 def _view(mapped: mmap.mmap) -> Bytes:
-    """An array over a memory map, which keeps the map open for as long as the array exists.
+    """An array over a memory map, which keeps the map open as long as the array exists.
 
-    A map that is closed explicitly while an array uses it, as after Ctrl-C, raises an error that hides the first one.
+    Closing a map explicitly while an array uses it, as after Ctrl-C, would raise an error that hides the first one.
     """
     return np.frombuffer(mapped, np.uint8)
 
 
 def _model_in(content: Bytes) -> mujoco.MjModel | None:
-    """Loads a model from memory, which MuJoCo's Python bindings do not offer; None where that is impossible."""
+    """Loads a model from memory, for which MuJoCo's Python bindings have no function; None if this is impossible."""
     load = getattr(ctypes.CDLL(mujoco._structs.__file__), "mj_loadModelBuffer", None)
     adopt = getattr(mujoco.MjModel, "_from_model_ptr", None)
     if load is None or adopt is None:

@@ -22,21 +22,22 @@ COLLISION_CLASS = "collision"
 GROUND_PREFIX = "ground"
 
 GROUND_GROUP, OBSTACLE_GROUP, ACTOR_GROUP, FOOT_GROUP = 0, 1, 2, 3
-"""Geom groups of the placement model, by which rays choose what they hit."""
+"""Geom groups of the placement model; a ray can be limited to some of them."""
 
 _BODIES, _FEET = "1", "2"
-"""Contact bits: the bodies of actors touch each other and obstacles, their feet touch the ground."""
+"""Contact bits: bodies of actors collide with each other and with obstacles, feet of actors with the ground."""
 
 FOOT_RADIUS_M = 0.05
 _CORNERS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 
 _OPAQUE = "1 1 1 1"
-"""Colour of collision geoms: rays pass through geoms with alpha 0."""
+"""Colour of collision geoms. It is opaque, because rays pass through geoms with alpha 0."""
 
 _ASSET_REFERENCES = ("material", "mesh", "hfield")
 _PLACEMENT_SECTIONS = ("compiler", "size", "default", "worldbody", "custom")
-"""Sections of the MJCF that the placement model takes over. The town's `<option>` is left out: it could turn contacts
-or gravity off."""
+"""Sections of the MJCF that the placement model contains. The town's `<option>` is left out, because it could
+switch contacts or gravity off.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,8 +46,8 @@ class PlacementBody:
 
     Attributes:
         half_length_m, half_width_m: distances of its four feet from its middle.
-        height_m: its height.
-        mass_kg: its mass.
+        height_m: height.
+        mass_kg: mass.
     """
 
     half_length_m: float
@@ -56,7 +57,7 @@ class PlacementBody:
 
 
 def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]:
-    """Compiles the render model: no collision geoms, and actors are mocap bodies.
+    """Compiles the render model, which has no collision geoms; actors are mocap bodies.
 
     Returns:
         The model, and the labels of its geoms.
@@ -75,13 +76,13 @@ def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]
 
 
 def placement_spec(composition: Composition) -> mujoco.MjSpec:
-    """Reads the spec of the placement model: collision geoms alone, and every actor a free body on four feet.
+    """Reads the spec of the placement model, which has only collision geoms; every actor is a free body on four feet.
 
-    Sizes and masses of the actors are missing, since they are measured on the render model. `placement_model` sets
-    them, so this function can run while the render model is compiled.
+    Sizes and masses of the actors are still missing, since they are measured on the render model. `placement_model`
+    sets them; this function can therefore run while the render model is being compiled.
 
     Raises:
-        TownError: MuJoCo cannot read it, a collision geom is no primitive, or an actor has no collision geom.
+        TownError: MuJoCo cannot read it, a collision geom is not a primitive, or an actor has no collision geom.
     """
     tree = copy.deepcopy(composition.tree)
     for section in list(tree):
@@ -124,8 +125,8 @@ def placement_model(
     """Compiles the placement model.
 
     Args:
-        composition: the world.
-        spec: what `placement_spec` returned for it; changed in place.
+        composition: the composed world.
+        spec: result of `placement_spec` for that world; changed in place.
         placement_bodies: sizes and masses of the actors, by body name.
 
     Raises:
@@ -138,14 +139,14 @@ def placement_model(
 
 
 def _files_of_bodies(composition: Composition) -> dict[str, Path]:
-    """The MJCF file of each body that gear puts into the town, by the body's name."""
+    """The MJCF file of each body that gear adds to the town, by the body's name."""
     files = {file.stem: file for file in composition.files[1:]}
     boards = {face.owner: files[face.asset] for face in composition.faces}
     return boards | {slot.body: slot.actor.path for slot in composition.slots}
 
 
 def _geoms(tree: ET.Element, *, collision: bool) -> list[tuple[ET.Element, ET.Element]]:
-    """(parent, geom) of the collision geoms of the worldbody, or of all others."""
+    """(parent, geom) for the collision geoms of the worldbody, or for all other geoms."""
     found: list[tuple[ET.Element, ET.Element]] = []
 
     def walk(parent: ET.Element, inherited: str) -> None:
@@ -173,7 +174,7 @@ def _fix(geom: ET.Element) -> None:
 
 
 def _free(body: ET.Element) -> None:
-    """Makes an actor a free body, with the feet and the inertia that `_set_placement_body` sizes."""
+    """Makes an actor a free body with feet and inertia; `_set_placement_body` sets their sizes."""
     body.attrib.pop("mocap")
     name = body.get("name", "")
     for geom in body.iter("geom"):
@@ -198,7 +199,7 @@ def _free(body: ET.Element) -> None:
 def _set_placement_body(spec: mujoco.MjSpec, name: str, placement_body: PlacementBody) -> None:
     """Sets mass, inertia and feet of an actor.
 
-    Numbers are rounded, so that actors settle at the same poses if the last digits of the measured sizes change.
+    The numbers are rounded, so that actors settle at the same poses if the last digits of the measured sizes change.
     """
     body = spec.body(name)
     x, y, z = 2 * placement_body.half_length_m, 2 * placement_body.half_width_m, placement_body.height_m
@@ -226,7 +227,7 @@ def _read(composition: Composition, tree: ET.Element, assets: Mapping[str, bytes
 
 @contextlib.contextmanager
 def _naming_the_file(composition: Composition) -> Iterator[None]:
-    """Turns an error of MuJoCo into one that names the file."""
+    """Context that converts errors of MuJoCo to errors that name the file."""
     try:
         yield
     except ValueError as error:

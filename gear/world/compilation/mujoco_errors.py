@@ -1,6 +1,6 @@
-"""Finds the file and the line behind an error of MuJoCo.
+"""Finds the file and the line that cause an error of MuJoCo.
 
-A world is composed of many files. MuJoCo's error for the whole names neither the file nor a line of it.
+A world is composed of many files, and MuJoCo's error for the whole world names neither a file nor a line in it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def without_breaks(error: BaseException) -> str:
 
 
 def compile_problem(path: Path) -> str:
-    """MuJoCo's error for one file alone; empty if the file compiles."""
+    """MuJoCo's error for a single file; "" if the file compiles."""
     try:
         read_spec(path).compile()
     except ValueError as error:
@@ -34,7 +34,7 @@ def compile_error(error: ValueError, files: Sequence[Path]) -> TownError:
 
     Args:
         error: MuJoCo's error for the world.
-        files: the files of the world; the error names the first one if each of them compiles alone.
+        files: the files of the world. The error names the faulty one, or the first one if each file compiles alone.
     """
     for path in files:
         if problem := compile_problem(path):

@@ -1,14 +1,15 @@
 """Prepares normal maps for Filament, which computes tangents without texture coordinates.
 
-Filament, as MuJoCo 4.0 fills it, makes a mesh's tangents of its normals alone, in the frame that MuJoCo turns the mesh
-into for its inertia. For a unit normal (x, y, z) in that frame red tilts it along `T` and green along `B` (measured),
+Filament, as MuJoCo 4.0 uses it, computes a mesh's tangents from its normals alone, in the frame into which MuJoCo
+rotates the mesh for its inertia. For a unit normal (x, y, z) in that frame, red tilts it along `T` and green along `B`
+(measured),
 
     T = (-x z / (1 + y), -z, 1 - z^2 / (1 + y))        B = -(1 - x^2 / (1 + y), -x, -x z / (1 + y))
 
 which is Frisvad's basis about y, left-handed ("Building an Orthonormal Basis from a Unit Vector", 2012). On every
-upright wall red therefore points up and green to the right of a viewer. On level ground and on slopes the directions
-depend on the yaw of the mesh's frame. A usual map, with red to the right and green up, is right when its two channels
-are exchanged and the frame of the mesh is upright and has a suitable yaw.
+upright wall red therefore points up and green to the viewer's right. On level ground and on slopes the directions
+depend on the yaw of the mesh's frame. A usual normal map has red to the right and green up. It is shown correctly if
+its two channels are exchanged and the frame of the mesh is upright with a suitable yaw.
 """
 
 from __future__ import annotations
@@ -20,28 +21,28 @@ import numpy.typing as npt
 from gear.values.geometry import Array
 
 _YAWS = 16
-"""Number of yaws that are tried for a mesh, evenly spaced."""
+"""Number of evenly spaced yaws that are tried for a mesh."""
 
 _SAMPLED_TRIANGLES = 192
-"""Number of triangles of a mesh that choose its yaw, evenly spaced among all."""
+"""Number of triangles by which the yaw of a mesh is chosen, evenly spaced among all its triangles."""
 
 _NORMAL, _RGB_CHANNELS = int(mujoco.mjtTextureRole.mjTEXROLE_NORMAL), 3
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _SINGULAR = 1e-6
-"""Value of 1 + y below which the basis is undefined."""
+"""The basis is undefined if 1 + y is below this value."""
 
 _SLACK_M = 1e-4
-"""Margin of bounding boxes: those of flat meshes have no thickness, and turned vertices are rounded."""
+"""Margin of bounding boxes, metres: those of flat meshes have no thickness, and rotated vertices are rounded."""
 
 
 def align_normal_maps(model: mujoco.MjModel) -> None:
     """Changes normal maps, and the frames of the meshes that use them, so that Filament lights them correctly.
 
-    No triangle moves: only the frame between a geom and its mesh is turned. Primitives, meshes without texture
-    coordinates, and textures that a material also uses in another role are left as they are.
+    No triangle moves: only the frame between a geom and its mesh is rotated. Primitives, meshes without texture
+    coordinates, and textures that a material also uses in another role are not changed.
 
     Args:
-        model: compiled, changed in place. The files of its meshes have z up.
+        model: compiled model, changed in place. In the files of its meshes z is up.
     """
     wearers = np.flatnonzero((model.geom_type == _MESH) & (model.geom_matid >= 0))
     wearers = wearers[model.mesh_texcoordnum[model.geom_dataid[wearers]] > 0]
@@ -76,11 +77,12 @@ def tangents(normals: Array) -> tuple[Array, Array]:
 
 
 def best_yaws(sheets: list[tuple[Array, Array, Array]]) -> Array:
-    """Finds the yaws of meshes at which their normal maps are right.
+    """Finds the yaws of meshes at which their normal maps are shown correctly.
 
     Args:
         sheets: for each mesh, in an upright frame: (M, 3) unit normals of its triangles, (M, 3) directions to the right
-            in the texture, and (M, 3) directions up in it, the directions with twice the triangle's area as length.
+            in the texture, and (M, 3) directions up in the texture. The directions have twice the triangle's area as
+            length.
 
     Returns:
         (meshes,) yaw in radians at which red points up and green to the right over most of the mesh.
@@ -101,7 +103,7 @@ def best_yaws(sheets: list[tuple[Array, Array, Array]]) -> Array:
 
 
 def _sheet(model: mujoco.MjModel, mesh: int, upright_from_mesh: Array) -> tuple[Array, Array, Array]:
-    """Normals and texture directions of a mesh, as `best_yaws` takes them."""
+    """Normals and texture directions of a mesh, in the form that `best_yaws` expects."""
     count = int(model.mesh_facenum[mesh])
     chosen = model.mesh_faceadr[mesh] + np.unique(
         np.linspace(0, count - 1, min(count, _SAMPLED_TRIANGLES)).astype(np.int64)
@@ -124,7 +126,7 @@ def _sheet(model: mujoco.MjModel, mesh: int, upright_from_mesh: Array) -> tuple[
 
 
 def _turn(model: mujoco.MjModel, mesh: int, upright_from_mesh: Array, yaw: float) -> None:
-    """Turns the frame of a mesh about its origin, and its geoms the other way, so that nothing moves."""
+    """Rotates the frame of a mesh about its origin, and its geoms in the opposite direction, so that nothing moves."""
     new_from_mesh = _about_z(yaw).T @ upright_from_mesh
     upright_from_new = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
     mesh_from_new = np.empty(4)

@@ -1,4 +1,4 @@
-"""The MJCF files of a planned world, each read once, before dm_control composes them."""
+"""Reads the MJCF files of a planned world, each once, before dm_control composes them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gear.world.compilation.world_plan import WorldPlan
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneMjcf:
-    """The MJCF of a town, its boards and its actors, split into what dm_control reads and what goes around it.
+    """The MJCF of a town, its boards and its actors, split into parts for dm_control and parts that are copied as text.
 
     Attributes:
         town: the town's file.
@@ -29,11 +29,11 @@ def read_scene_mjcf(plan: WorldPlan, prefetcher: AssetPrefetcher) -> SceneMjcf:
     """Reads the MJCF files of a planned world.
 
     Args:
-        plan: names the files.
-        prefetcher: begins to read the meshes of a file as soon as that file is read.
+        plan: the contents of the world.
+        prefetcher: starts to read the meshes of a file as soon as that file is read.
 
     Raises:
-        TownError: a file is no XML or cannot be read, or one of its meshes cannot be read.
+        TownError: a file is not XML or cannot be read, or one of its meshes cannot be read.
     """
     town = split_town(plan.town)
     prefetcher.prefetch(map(os.fsdecode, town.mesh_paths.values()))

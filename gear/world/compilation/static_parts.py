@@ -1,8 +1,8 @@
-"""Parts of MJCF files that are copied into a world as they are, without passing through dm_control.
+"""Splits MJCF files into the part that dm_control must read and parts that are copied into the world unchanged.
 
-dm_control changes nothing in them, and it is slow: half a millisecond for each geom and body of a town, five for each
-default class of an asset. It would also read, hash and rewrite every mesh, so it gets the path of a mesh file in place
-of the file's content.
+dm_control changes nothing in the copied parts, and it is slow: half a millisecond for each geom and body of a town, and
+five for each default class of an asset. It would also read, hash and rewrite every mesh, so it gets the path of a mesh
+file instead of the file's content.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from gear.world.assets.scene_assets import AssetFile
 from gear.world.compilation.board_scaling import scale_board
 
 UNNAMED = "unnamed_"
-"""Prefix of the names that gear gives to elements without one."""
+"""Prefix of the names that gear gives to elements without a name."""
 
 _PLAIN = ("geom", "body")
 _PLAIN_DEFAULTS = ("default", "geom", "mesh")
@@ -34,18 +34,18 @@ _WORLD = "<worldbody>"
 
 
 class MeshPath(bytes):
-    """The path of a mesh file, handed to dm_control in place of the file's content."""
+    """The path of a mesh file, passed to dm_control instead of the file's content."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StaticParts:
-    """The geoms and bodies of a town's worldbody that go around dm_control, in the order of the file.
+    """The geoms and bodies of a town's worldbody that are not passed through dm_control, in the order of the file.
 
     Attributes:
         xml: the elements as MJCF; every geom has a name.
         body_names: names of all bodies among them.
-        geom_materials: default class and own material (None for none) of the geoms; each pair once, in the order of the
-            file.
+        geom_materials: distinct pairs of default class and own material (None for none) of the geoms, in the order of
+            the file.
     """
 
     xml: str = ""
@@ -53,7 +53,7 @@ class StaticParts:
     geom_materials: tuple[tuple[str, str | None], ...] = ()
 
     def insert_into(self, xml: str) -> str:
-        """Returns an MJCF text with these elements at the beginning of its worldbody."""
+        """An MJCF text with these elements inserted at the start of its worldbody."""
         before, world, after = xml.partition(_WORLD)
         return before + world + self.xml + after if self.xml else xml
 
@@ -63,10 +63,10 @@ class SplitTown:
     """A town's MJCF in two parts.
 
     Attributes:
-        path: of its file.
-        text: the MJCF that dm_control reads; None where it must read the file itself.
-        statics: what was taken out of the text.
-        mesh_paths: path of each mesh file, by the name that `text` gives the file.
+        path: path of its file.
+        text: the MJCF for dm_control; None if dm_control must read the file itself.
+        statics: the parts that were taken out of the text.
+        mesh_paths: path of each mesh file, by its name in `text`.
     """
 
     path: Path
@@ -78,12 +78,12 @@ class SplitTown:
 def split_town(path: Path) -> SplitTown:
     """Separates the plain geoms and bodies of a town from the rest of its MJCF.
 
-    Nothing is taken out of a town that has anything else in its worldbody (joints, cameras, sites, geoms without a
-    class) or that includes other files. dm_control then reads the file itself, unless the file names the class of all
-    defaults `main`: dm_control would make that a second class, so it gets a text without that name.
+    Nothing is taken out of a town that includes other files or has anything else in its worldbody (joints, cameras,
+    sites, geoms without a class); dm_control then reads the file itself. One exception: if such a file names the class
+    of all defaults `main`, dm_control would make a second class of it, so dm_control gets a text without that name.
 
     Raises:
-        TownError: the file is no XML, cannot be read, or holds a NaN.
+        TownError: the file is not XML, cannot be read, or contains a NaN.
     """
     root = read_numbers(path)
     named = [default for default in root.findall("default") if default.get("class") == _MAIN]
@@ -114,9 +114,9 @@ class SplitAsset:
     """An asset's MJCF in two parts.
 
     Attributes:
-        text: the MJCF without its default classes; None where dm_control must read the file itself.
-        defaults: the default classes as MJCF, named as dm_control names them in a composed world.
-        mesh_paths: path of each mesh file, by the name that `text` gives the file.
+        text: the MJCF without its default classes; None if dm_control must read the file itself.
+        defaults: the default classes as MJCF, with the names that dm_control gives them in a composed world.
+        mesh_paths: path of each mesh file, by its name in `text`.
     """
 
     text: str | None = None
@@ -125,13 +125,13 @@ class SplitAsset:
 
 
 def split_asset(file: AssetFile) -> SplitAsset:
-    """Separates the default classes of an asset from the rest of its MJCF, scaled to the size of its face.
+    """Separates the default classes of an asset from the rest of its MJCF, which is scaled to the size of its face.
 
-    A file stays whole if its default classes refer to anything, such as a material, or apply to more than geoms and
-    meshes, and if it includes other files.
+    A file is not split if it includes other files, or if its default classes refer to other elements (such as a
+    material) or apply to elements other than geoms and meshes.
 
     Raises:
-        TownError: the file is no XML, cannot be read, holds a NaN, or cannot be scaled.
+        TownError: the file is not XML, cannot be read, contains a NaN, or cannot be scaled.
     """
     path = file.path
     root = read_numbers(path)
@@ -158,7 +158,7 @@ def split_asset(file: AssetFile) -> SplitAsset:
 
 
 def _replace_mesh_names(root: ET.Element, path: Path) -> dict[str, MeshPath]:
-    """Renames each mesh file in a tree to its absolute path, and returns the paths by these names."""
+    """Replaces the name of each mesh file in a tree by its absolute path, and returns the paths by these new names."""
     folders = {name: folder for part in root.iter("compiler") for name, folder in part.items()}
     base = path.parent / folders.get("meshdir", folders.get("assetdir", ""))
     mesh_paths: dict[str, MeshPath] = {}
@@ -175,7 +175,7 @@ def _replace_mesh_names(root: ET.Element, path: Path) -> dict[str, MeshPath]:
 
 
 def _is_plain(element: ET.Element) -> bool:
-    """Whether an element and all below it are geoms with a class and bodies with a name."""
+    """Whether an element and its descendants are all geoms with a class and bodies with a name."""
     return all(
         part.tag in _PLAIN
         and part.get("childclass") is None

@@ -1,8 +1,8 @@
-"""A cache of compiled worlds on disk: a cached world loads in about a second, without the memory that compiling takes.
+"""A cache of compiled worlds on disk. Loading a cached world takes about a second and less memory than compiling it.
 
-A world that is not cached is compiled in a subprocess, which keeps the memory out of this one, and stored under a hash
-of everything that decides it: gear's code, versions, the content of every MJCF file, mesh and texture, scene and
-weather. A change to any of them makes another entry.
+A world that is not in the cache is compiled in a subprocess, so that the memory for compiling is freed when it ends.
+The world is stored under a hash of everything that determines it: gear's code, versions of packages, the content of
+every MJCF file, mesh and texture, scene and weather. A change to any of them gives a new entry.
 """
 
 from __future__ import annotations
@@ -33,16 +33,18 @@ from gear.world.scene_spec import SceneSpec
 from gear.world.world import World
 
 CACHE_BYTES = 3 << 30
-"""Size that the cache is kept below, about sixteen towns. The entries that were not used for longest are removed."""
+"""Largest size of the cache, about sixteen towns; the least recently used entries are removed."""
 
 NOT_CACHED_BELOW_BYTES = 4 << 20
-"""A town with fewer bytes of assets compiles in less time than a subprocess takes to start, so it is not cached."""
+"""Towns with fewer bytes of assets are not cached, because compiling them takes less time than starting a
+subprocess.
+"""
 
 MAY_CACHE = "may-cache"
 """Name of the file by which the subprocess reports that the key covers every file that it read."""
 
 DONE = b"done"
-"""What the subprocess writes to its standard output when the world is saved."""
+"""Text that the subprocess writes to its standard output when the world is saved."""
 
 _ROOMS = ("values", "contracts", "camera", "world")
 _SCRATCH = ".making-"
@@ -52,7 +54,7 @@ _ABANDONED_S = 3600.0
 def load_or_compile(
     *, town: str | Path, scene_name: str, scene: SceneSpec, weather: Weather, cache_dir: Path | None = None
 ) -> World:
-    """Returns a world as `World.build` does, out of the cache where it is there.
+    """Returns the same world as `World.build`, from the cache if it is there.
 
     Args:
         town, scene_name, scene, weather: as for `World.build`.
@@ -74,7 +76,7 @@ def load_or_compile(
 
 @contextlib.contextmanager
 def _folder(cache_dir: Path | None) -> Iterator[Path]:
-    """The cache's folder; a temporary one where the user's cache folder cannot be written."""
+    """The cache's folder; a temporary folder if the user's cache folder cannot be written."""
     try:
         folder = cache_dir or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gear" / "worlds"
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -112,7 +114,7 @@ def _from_cache(cache_dir: Path, plan: WorldPlan) -> CompiledWorld:
 
 
 def world_key(plan: WorldPlan) -> dict[str, Json]:
-    """Everything that decides a compiled world, as JSON."""
+    """Everything that determines a compiled world, as JSON."""
     return {
         "town": str(plan.town.resolve()),
         "scene": to_json(plan.scene),
@@ -124,7 +126,7 @@ def world_key(plan: WorldPlan) -> dict[str, Json]:
 
 
 def _code_digest() -> str:
-    """sha256 over the source files of the packages that decide how a world is made."""
+    """sha256 over the source files of the packages that determine how a world is made."""
     package = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
     for path in (path for room in _ROOMS for path in sorted((package / room).rglob("*.py"))):
@@ -135,7 +137,7 @@ def _code_digest() -> str:
 
 
 def _load(entry: Path, plan: WorldPlan) -> CompiledWorld | None:
-    """The world of an entry; None where there is none, or it is damaged."""
+    """The world of a cache entry; None if the entry does not exist or is damaged."""
     try:
         compiled = CompiledWorld.load(entry, plan.slots)
         os.utime(entry)
@@ -146,10 +148,10 @@ def _load(entry: Path, plan: WorldPlan) -> CompiledWorld | None:
 
 @contextlib.contextmanager
 def _compiled_in_subprocess(key: dict[str, Json], folder: Path) -> Iterator[bool]:
-    """Compiles the world of a key into a folder, in a subprocess, and yields whether that succeeded.
+    """Compiles the world for a key into a folder, in a subprocess, and yields whether that succeeded.
 
-    The subprocess reports before it ends: it gives back its memory for a tenth of a second, in which this process can
-    load the world.
+    The subprocess reports success before it ends, because freeing its memory takes a tenth of a second; in that time
+    this process can already load the world.
     """
     # os._exit leaves out the end of the interpreter, which would free half a million objects one by one.
     code = "import os, sys; from gear.world.compilation.compile_worker import main; main(sys.argv[1]); os._exit(0)"
@@ -175,7 +177,9 @@ def _compiled_in_subprocess(key: dict[str, Json], folder: Path) -> Iterator[bool
 
 @contextlib.contextmanager
 def _locked(entry: Path) -> Iterator[None]:
-    """Lets one process at a time compile an entry. Where files cannot be locked, each process compiles it."""
+    """Context in which no other process compiles the same entry. On systems where files cannot be locked, each
+    process compiles it.
+    """
     if sys.platform == "win32":
         yield
         return
@@ -188,7 +192,7 @@ def _locked(entry: Path) -> Iterator[None]:
 
 
 def _store(scratch: Path, entry: Path) -> None:
-    """Moves a compiled world into the cache and removes the entries that were not used for longest."""
+    """Moves a compiled world into the cache and removes the least recently used entries."""
     with contextlib.suppress(OSError):
         shutil.rmtree(entry, ignore_errors=True)
         scratch.rename(entry)

@@ -1,7 +1,7 @@
-"""Everything that decides a world, before anything is composed or compiled.
+"""The plan of a world: everything that determines it, decided before anything is composed or compiled.
 
-A world is made in one direction: its assets are read, its pool of actors is decided (both here), and then it is
-composed and compiled from this plan alone.
+A world is made in three steps: its assets are read, its pool of actors is decided (both in this module), and the world
+is composed and compiled from this plan alone.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from gear.world.scene_spec import SceneSpec
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldPlan:
-    """The decided contents of a world.
+    """The contents of a world.
 
     Attributes:
         assets: the assets of the scene.

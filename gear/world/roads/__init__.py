@@ -1,1 +1,1 @@
-"""Lanes, junctions and routes of a town, on the ground plan."""
+"""Lanes, junctions and routes of a town, seen from above."""

@@ -1,4 +1,4 @@
-"""Conflicts between the lanes of a junction: which of them cannot be driven at the same time."""
+"""Conflicts between lanes in a junction: pairs of lanes that vehicles cannot use at the same time."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from gear.world.roads.lanes import LaneGraph
 from gear.world.roads.routes import Route
 
 CLEARANCE_M = 2.4
-"""Centre lines that come nearer than this to each other are in conflict."""
+"""Lanes are in conflict if their centre lines come nearer to each other than this, metres."""
 
 
 class Junctions:
-    """Conflicts between the junction lanes of a town. Each pair of lanes is measured once, at the first question."""
+    """Conflicts between the junction lanes of a town. Each pair of lanes is measured at the first query and then
+    remembered.
+    """
 
     def __init__(self, graph: LaneGraph) -> None:
         """Takes the lane graph of the town."""
@@ -22,7 +24,9 @@ class Junctions:
         self._points: dict[str, Array] = {}
 
     def crossings(self, route: Route) -> list[tuple[str, float, float]]:
-        """The junction lanes of a route: name of each, and the arc lengths on the route where it starts and ends."""
+        """The junction lanes of a route: the name of each lane, and the arc lengths on the route where it starts
+        and ends.
+        """
         ends_m = (*route.starts_m[1:], route.line.length_m)
         return [
             (lane, start_m, end_m)
@@ -33,7 +37,7 @@ class Junctions:
     def conflict(self, first: str, second: str) -> bool:
         """Whether two lanes come nearer than `CLEARANCE_M` to each other.
 
-        Lanes that branch off the same lane are not in conflict: their vehicles follow each other.
+        Lanes that branch off the same lane are never in conflict, because their vehicles follow each other.
         """
         key = (min(first, second), max(first, second))
         if key not in self._conflicts:

@@ -1,4 +1,4 @@
-"""Lanes, sidewalks, crossings and parking bays of a town, from the custom fields of its MJCF."""
+"""Lanes, sidewalks, crosswalks and parking bays of a town, read from the custom fields of its MJCF."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from gear.world.roads.polyline import Polyline
 from gear.world.scene_spec import FARTHEST_M
 
 LEAST_SIDE_M = 1.0
-"""Least width and height of the area that a town covers; maps are drawn to its scale."""
+"""Smallest width and height of the area that a town covers, metres; maps are drawn to the scale of this area."""
 
 _KINDS = ("lane", "sidewalk", "crosswalk", "parking", "town")
-"""First part of the names of the custom fields that are read."""
+"""First parts of the names of custom fields that are read."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -28,12 +28,12 @@ class Lane:
 
     Attributes:
         name: name of its custom field, `lane.…`.
-        width_m: width of the lane.
-        speed_mps: usual speed on the lane.
+        width_m: width.
+        speed_mps: usual speed.
         line: centre line in the direction of travel.
-        next: names of the lanes that continue it; empty where the road ends.
+        next: names of the lanes that continue it; empty at the end of a road.
         left, right: name of the neighbouring lane in the same direction, or "".
-        is_junction: whether it lies inside a junction.
+        is_junction: whether the lane lies inside a junction.
     """
 
     name: str
@@ -48,13 +48,13 @@ class Lane:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Walk:
-    """A sidewalk or a crosswalk; people walk both ways.
+    """A sidewalk or a crosswalk, which people use in both directions.
 
     Attributes:
         name: name of its custom field, `sidewalk.…` or `crosswalk.…`.
-        width_m: width of the walk.
+        width_m: width.
         line: centre line.
-        is_crossing: whether it crosses a road.
+        is_crossing: whether it is a crosswalk.
     """
 
     name: str
@@ -65,13 +65,13 @@ class Walk:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParkingBay:
-    """One place to park.
+    """A parking place for one car.
 
     Attributes:
-        name: name of its row, and its number in the row.
-        length_m, width_m: size of the bay.
-        position_m: its middle on the ground, in the world.
-        yaw_rad: heading of a car that is parked in it, counter-clockwise from east.
+        name: name of its row of bays, and its number in the row.
+        length_m, width_m: size.
+        position_m: its middle on the ground, world coordinates.
+        yaw_rad: heading of a parked car, counter-clockwise from east.
     """
 
     name: str
@@ -83,7 +83,7 @@ class ParkingBay:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LanePoint:
-    """A place on a lane.
+    """A position on a lane.
 
     Attributes:
         lane: name of the lane.
@@ -101,11 +101,11 @@ class LaneGraph:
     """The lanes, walks and parking bays of a town.
 
     Attributes:
-        lanes: the lanes by name.
+        lanes: lanes by name.
         previous: names of the lanes that lead into a lane, by the name of that lane.
         walks: sidewalks and crosswalks by name.
         bays: parking bays.
-        bounds_m: xmin, ymin, xmax, ymax of the area that the town covers, in the world.
+        bounds_m: xmin, ymin, xmax, ymax of the area that the town covers, world coordinates.
     """
 
     lanes: Mapping[str, Lane]
@@ -119,8 +119,8 @@ class LaneGraph:
         """Reads the lane graph of a compiled town.
 
         Args:
-            model: compiled from the town's MJCF, alone or in a world.
-            path: the town's file, for errors.
+            model: compiled from the town's MJCF, alone or as part of a world.
+            path: the town's file, for error messages.
 
         Raises:
             TownError: a lane, a walk or a row of bays is malformed, or there are no lanes or no bounds.
@@ -169,9 +169,9 @@ class LaneGraph:
         return min(heights_m + [bay.position_m[2] for bay in self.bays])
 
     def project(self, position_m: Array) -> LanePoint:
-        """The point on a lane that is nearest to a position, (3,) in the world.
+        """The point on any lane that is nearest to a position (3,) in world coordinates.
 
-        Nearest means in space: a lane on a bridge is far from a car below it.
+        The distance is measured in 3D, so a lane on a bridge is far from a car below it.
         """
         best: tuple[float, LanePoint] | None = None
         for lane in self.lanes.values():

@@ -1,4 +1,4 @@
-"""Polylines in the world that are addressed by arc length."""
+"""Polylines in world coordinates on which positions are given by arc length."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from gear.values.geometry import Array, frozen
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polyline:
-    """A polyline whose arc length is measured in the ground plan, that is, without its climbs.
+    """A polyline with its arc length, which is measured horizontally (climbs do not count).
 
     Attributes:
-        points_m: (N, 3) its points in the world; no two neighbours are at the same place.
+        points_m: (N, 3) points in world coordinates; neighbouring points differ.
         s_m: (N,) arc length at each point, from 0.
     """
 
@@ -34,11 +34,11 @@ class Polyline:
         return float(self.s_m[-1])
 
     def segment(self, s_m: float) -> int:
-        """Index of the segment at an arc length; the first and the last one also hold all that lies beyond them."""
+        """Index of the segment at an arc length; beyond the ends, the index of the first or last segment."""
         return int(np.clip(np.searchsorted(self.s_m, s_m, side="right") - 1, 0, len(self.s_m) - 2))
 
     def at(self, s_m: float, lateral_m: float = 0.0) -> tuple[Array, float]:
-        """The point beside the line at an arc length, and the heading there.
+        """The point beside the line at an arc length, and the heading of the line there.
 
         Args:
             s_m: arc length; beyond its ends the line continues straight.
@@ -55,9 +55,9 @@ class Polyline:
         return point, math.atan2(step[1], step[0])
 
     def heading(self, s_m: float, reach_m: float) -> float:
-        """Mean heading in radians over `reach_m` metres before and after an arc length.
+        """Mean heading in radians from `reach_m` metres before an arc length to `reach_m` metres after it.
 
-        Unlike the heading of a segment it turns steadily round a corner.
+        It changes steadily around a corner, unlike the heading of a segment.
         """
         steps = np.diff(self.points_m[:, :2], axis=0)
         headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
@@ -75,10 +75,10 @@ class Polyline:
         return points, np.arctan2(steps[:, 1], steps[:, 0])
 
     def project(self, position_m: Array) -> tuple[float, float, float]:
-        """The place on the line that is nearest to a point, (3,) in the world.
+        """The position on the line that is nearest to a point (3,) in world coordinates.
 
         Returns:
-            Arc length, distance of the point to the left of the line, and distance in space, all in metres.
+            Arc length, distance of the point to the left of the line, and 3D distance; all in metres.
         """
         starts, steps = self.points_m[:-1], np.diff(self.points_m, axis=0)
         squared = np.einsum("ij,ij->i", steps[:, :2], steps[:, :2])

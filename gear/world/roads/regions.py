@@ -1,4 +1,4 @@
-"""The limits of a scene as regions of the ground plan, and the pieces of lanes and walks inside them."""
+"""The limits of a scene as regions of the ground, and the pieces of lanes and walks inside them."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ TABLE_STEP_M = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Region:
-    """A region around a board, around the ego car, or around both: then the intersection.
+    """A region relative to a board, relative to the ego car, or the intersection of both.
 
     Attributes:
-        board: the board whose frame `ahead_m` and `lateral_m` are in; None for no limits of that kind.
-        ahead_m: least and largest distance ahead of the board's face; None for no limit.
-        lateral_m: least and largest distance to the left of the board's facing direction; None for no limit.
-        radius_m: least and largest distance from `centre_m`; None for no limit.
-        centre_m: x and y of the ego car, in the world.
+        board: the board in whose frame `ahead_m` and `lateral_m` are given; None for no such limits.
+        ahead_m: smallest and largest distance in front of the board's face; None for no limit.
+        lateral_m: smallest and largest distance to the left of the direction in which the board faces; None for no
+            limit.
+        radius_m: smallest and largest distance from `centre_m`; None for no limit.
+        centre_m: x and y of the ego car, world coordinates.
     """
 
     board: BoardSpec | None = None
@@ -35,7 +36,7 @@ class Region:
     centre_m: tuple[float, float] = (0.0, 0.0)
 
     def holds(self, xy_m: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Which of (N, 2) points in the world are inside, as (N,) bool."""
+        """(N,) bool: which of (N, 2) points in world coordinates lie inside."""
         places = np.atleast_2d(np.asarray(xy_m, dtype=np.float64))
         inside = np.ones(len(places), bool)
         if self.board is not None:
@@ -53,14 +54,14 @@ class Region:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineTable:
-    """Lines cut into pieces of about a metre, from which places are drawn.
+    """Lines that are cut into pieces of about a metre, from which positions are drawn.
 
     Attributes:
-        names: (N,) name of the line that each piece belongs to.
+        names: (N,) name of the line to which each piece belongs.
         s_m: (N,) arc length of the middle of each piece.
         length_m: (N,) length of each piece.
-        points_m: (N, 3) middle of each piece, in the world.
-        weight: (N,) relative probability of a metre of each piece.
+        points_m: (N, 3) middle of each piece, world coordinates.
+        weight: (N,) relative probability per metre of each piece.
     """
 
     names: tuple[str, ...]
@@ -71,7 +72,7 @@ class LineTable:
 
     @staticmethod
     def of(lines: Iterable[tuple[str, Polyline, float]]) -> LineTable:
-        """Cuts lines, given as (name, line, weight)."""
+        """Cuts lines, given as tuples (name, line, weight), into pieces."""
         names: list[str] = []
         rows: list[tuple[float, float, float, float, float, float]] = []
         for name, line, weight in lines:
@@ -90,11 +91,11 @@ class LineTable:
         return np.flatnonzero(region.holds(self.points_m[:, :2])) if self.names else np.zeros(0, np.intp)
 
     def draw(self, pieces: npt.NDArray[np.intp], rng: np.random.Generator) -> tuple[str, float]:
-        """Draws a place on the given pieces, by their weights and lengths.
+        """Draws a position on the given pieces; probabilities follow from their weights and lengths.
 
         Args:
             pieces: (M,) indices of pieces; at least one.
-            rng: source of the draw.
+            rng: random generator.
 
         Returns:
             Name of the line, and arc length on it.

@@ -1,4 +1,4 @@
-"""Routes through the lane graph, and the poses of vehicles on them."""
+"""Routes through the lane graph, and poses of vehicles on them."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from gear.world.roads.lanes import LaneGraph
 from gear.world.roads.polyline import Polyline
 
 HALF_WHEELBASE_SHARE = 0.6
-"""Distance of an axle from the middle of a vehicle, as a share of half its length. A vehicle heads from its rear axle
-to its front axle."""
+"""Distance from a vehicle's middle to an axle, as a share of half its length. The heading is the direction from
+its rear axle to its front axle, which both lie on the line.
+"""
 
 PACE_M = 0.25
-"""Distance before and after a place over which the speed at that place is measured."""
+"""Distance before and after a position over which the speed at that position is measured, metres."""
 
 BRAKING_WAY_M = 15.0
-"""Drivers obey the speed limits of lanes this far ahead."""
+"""Distance ahead up to which drivers obey the speed limits of lanes, metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,9 +29,9 @@ class Route:
 
     Attributes:
         lanes: names of the lanes.
-        starts_m: arc length on the route at which each lane begins.
+        starts_m: arc length on the route at which each lane starts.
         speeds_mps: usual speed on each lane.
-        line: centre line of all lanes together.
+        line: joint centre line of all lanes.
         is_dead_end: whether no lane continues the last one.
     """
 
@@ -42,7 +43,7 @@ class Route:
 
     @staticmethod
     def along(graph: LaneGraph, lanes: tuple[str, ...]) -> Route:
-        """The route along given lanes, of which each continues the one before it."""
+        """The route along the given lanes; each lane must continue the previous one."""
         points: list[Array] = []
         firsts: list[int] = []
         for name in lanes:
@@ -69,9 +70,10 @@ class Route:
 
 
 def extend_route(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Generator) -> tuple[str, ...]:
-    """Names of lanes that begin with `lane` and together are at least `length_m` long, or end where the road ends.
+    """Names of the lanes of a route that starts with `lane`; it is at least `length_m` long unless the road ends
+    before.
 
-    At each branch the generator draws the lane that follows.
+    At each branch the next lane is drawn at random.
     """
     names = [lane]
     total_m = graph.lanes[lane].line.length_m
@@ -85,18 +87,18 @@ def extend_route(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Ge
 def trace_back(
     graph: LaneGraph, lane: str, s_m: float, distance_m: float, rng: np.random.Generator
 ) -> tuple[tuple[str, ...], float] | None:
-    """Goes back along the lanes from a place, and draws the lane at each junction.
+    """Goes back along the lanes from a position; at each junction the previous lane is drawn at random.
 
     Args:
-        graph: of the town.
-        lane: name of the lane of the place.
-        s_m: arc length of the place on that lane.
+        graph: lane graph of the town.
+        lane: name of the lane of the position.
+        s_m: arc length of the position on that lane.
         distance_m: how far to go back.
-        rng: source of the draws.
+        rng: random generator.
 
     Returns:
-        Names of the lanes from the new place to the old one, and the arc length of the new place on the first of them;
-        None where the road begins less than `distance_m` before.
+        Names of the lanes from the new position to the old one, and the arc length of the new position on the first of
+        them; None if the road starts less than `distance_m` before the position.
     """
     names = [lane]
     s_m -= distance_m
@@ -128,9 +130,9 @@ def vehicle_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: fl
 
 
 def offset_left(point_m: Array, yaw_rad: float, lateral_m: float) -> Array:
-    """Moves a (3,) point to the left of a heading.
+    """Moves a point (3,) to the left of a heading.
 
-    The heading is that of the road user, which turns steadily. With the heading of a segment of the line the point
+    The heading must be that of the road user, which changes steadily. With the heading of a line's segment the point
     would jump where two segments meet, and move backwards on the inside of a turn.
     """
     return point_m + lateral_m * np.array([-math.sin(yaw_rad), math.cos(yaw_rad), 0.0])
@@ -143,8 +145,8 @@ def moving_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: flo
         line, s_m, half_length_m, lateral_m: as for `vehicle_pose`.
 
     Returns:
-        Point and heading as `vehicle_pose` returns them, and the distance that its middle moves for each metre of the
-        line: less than 1 on the inside of a turn.
+        Point and heading as `vehicle_pose` returns them, and the distance that the vehicle's middle moves per metre of
+        the line: less than 1 on the inside of a turn.
     """
 
     def at(place_m: float) -> tuple[Array, float]:

@@ -1,1 +1,1 @@
-"""Patch surfaces: the faces that show patches, their textures and what carries them."""
+"""Patch surfaces: the faces that can show patches, their textures, and the boards and vehicles that carry them."""

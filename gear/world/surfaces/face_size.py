@@ -1,4 +1,4 @@
-"""The size of the face in a surface's MJCF file."""
+"""Reads the size of the face in a board's MJCF file."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from gear.world.assets.mjspec import read_spec
 
 
 def asset_face_size_m(path: Path) -> tuple[float, float]:
-    """Width and height in metres of the face of a board, as its file has it.
+    """Width and height in metres of a board's face, as given in its file.
 
     Raises:
-        TownError: the file cannot be compiled or has no face with a surface.
+        TownError: the file cannot be compiled, or has no face with a surface.
     """
     return _measured(path, path.stat().st_mtime_ns if path.is_file() else 0)
 

@@ -1,9 +1,9 @@
-"""The texture of a face: how a patch of any size is resampled to the one size that all face textures have.
+"""Resamples a patch of any size to the one size that all face textures have.
 
-Resampling averages areas in linear light. It is linear and separable, so two small matrices do it:
-`face = rows @ patch @ columns.T` for each channel, with `rows = box_matrix(h, 600)`, `columns = box_matrix(w, 1200)`.
-The compositors use the same two matrices in torch. Where the size of the texture is a multiple of the patch's size,
-every pixel of the patch becomes a block of equal texels, exactly.
+Resampling averages areas in linear light. It is linear and treats rows and columns separately, so two small matrices
+suffice: `face = rows @ patch @ columns.T` for each channel, with `rows = box_matrix(h, 600)` and `columns =
+box_matrix(w, 1200)`. The compositors use the same two matrices in torch. If the texture's size is a multiple of the
+patch's size, every pixel of the patch becomes a block of equal texels, exactly.
 """
 
 from __future__ import annotations
@@ -22,20 +22,22 @@ FACE_SIZE_PX = (1200, 600)
 """Width and height of the texture of every face."""
 
 SurfaceAlbedo = Literal["none", "white", "black"] | UInt8Image
-"""What a surface shows: "none" for its neutral texture, albedo 1, albedo 0, or a patch, (h, w, 3) uint8 sRGB."""
+"""What a surface shows: "none" for its neutral texture, albedo 1, albedo 0, or a patch as (h, w, 3) uint8 sRGB."""
 
 SurfaceAlbedos = Mapping[str, SurfaceAlbedo]
-"""What surfaces show, by surface name. A surface that is not named shows its neutral texture."""
+"""What each surface shows, by the surface's name. Surfaces that are missing here show their neutral texture."""
 
 
 @lru_cache(maxsize=64)
 def box_matrix(source_px: int, target_px: int) -> Array:
-    """The matrix of box (area) resampling along one axis.
+    """The matrix that resamples one axis by averaging areas.
 
-    Target pixel i covers [i, i + 1) * source / target of the source axis, and is the mean of what it covers.
+    Target pixel i covers the interval [i, i + 1) * source / target of the source axis; its value is the mean over that
+    interval.
 
     Args:
-        source_px, target_px: number of pixels before and after.
+        source_px: number of pixels before resampling.
+        target_px: number of pixels after resampling.
 
     Returns:
         (target_px, source_px) float64, rows sum to 1, read-only.
@@ -61,11 +63,19 @@ def srgb_from_linear(linear: npt.ArrayLike) -> Array:
 
 
 LINEAR_FROM_BYTE = linear_from_srgb(np.arange(256) / 255)
-"""(256,) float64 linear light, 0..1, of each sRGB byte."""
+"""(256,) float64: the linear light 0..1 of each sRGB byte."""
 
 
 def resample_linear(linear: npt.ArrayLike, size_px: tuple[int, int] = FACE_SIZE_PX) -> Array:
-    """Resamples an (h, w, 3) image in linear light to (size_px[1], size_px[0], 3) float64; linear in its input."""
+    """Resamples a picture in linear light by averaging areas.
+
+    Args:
+        linear: (h, w, 3) linear light.
+        size_px: width and height of the result.
+
+    Returns:
+        (size_px[1], size_px[0], 3) float64; a linear function of the input.
+    """
     image = np.asarray(linear, dtype=np.float64)
     rows, columns = box_matrix(image.shape[0], size_px[1]), box_matrix(image.shape[1], size_px[0])
     return np.asarray(np.einsum("ih,hwc,jw->ijc", rows, image, columns, optimize=True))
@@ -82,7 +92,7 @@ def face_from_patch(patch: UInt8Image, size_px: tuple[int, int] = FACE_SIZE_PX) 
         (size_px[1], size_px[0], 3) uint8 sRGB, read-only.
 
     Raises:
-        ValueError: the patch has another shape or dtype.
+        ValueError: the patch has a wrong shape or dtype.
     """
     if patch.ndim != 3 or patch.shape[2] != 3 or patch.dtype != np.uint8 or 0 in patch.shape:
         raise ValueError(f"a patch must be (h, w, 3) uint8, got {patch.shape} {patch.dtype}")
@@ -97,7 +107,7 @@ def face_from_patch(patch: UInt8Image, size_px: tuple[int, int] = FACE_SIZE_PX) 
 
 
 def uniform_face(value: int, size_px: tuple[int, int] = FACE_SIZE_PX) -> UInt8Image:
-    """A texture whose pixels all have one grey sRGB byte: (size_px[1], size_px[0], 3) uint8, read-only."""
+    """A texture of one grey: (size_px[1], size_px[0], 3) uint8, all equal to the sRGB byte `value`, read-only."""
     face = np.full((size_px[1], size_px[0], 3), value, np.uint8)
     face.setflags(write=False)
     return face

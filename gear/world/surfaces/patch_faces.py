@@ -1,4 +1,4 @@
-"""The faces that take patches: their frames and sizes in the compiled model, and their textures."""
+"""The faces that can show patches: their frames and sizes in the compiled model, and their textures."""
 
 from __future__ import annotations
 
@@ -20,21 +20,22 @@ from gear.world.surfaces.face_texture import SurfaceAlbedo, face_from_patch, srg
 from gear.world.surfaces.upright import texture_problem
 
 FLATNESS_M = 0.01
-"""Most thickness of a face, and most distance of its middle from the origin of its frame."""
+"""Largest thickness of a face, and largest distance of its middle from the origin of its frame, metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Face:
-    """One face that takes a patch.
+    """One face that can show a patch.
 
     Attributes:
         name: `surface_0`, `surface_1`, …, in patch order.
-        asset: name of the MJCF file that it comes from.
+        asset: name of the MJCF file from which it comes, without suffix.
         is_carried: whether an actor carries it.
         geom_id: its geom in the render model.
-        parent_from_surface: pose of its frame (origin in its middle, x right, y down, z into the board as a viewer sees
-            it) in the world, or in the frame of the actor that carries it.
-        width_m, height_m: its size.
+        parent_from_surface: pose of its surface frame in world coordinates, or in the frame of the actor that carries
+            it. The frame's origin is the middle of the face; as a viewer sees it, x points right, y down and z into the
+            board.
+        width_m, height_m: size.
         neutral: (H, W, 3) uint8 sRGB texture without a patch.
     """
 
@@ -48,7 +49,7 @@ class Face:
     neutral: UInt8Image
 
     def record(self, carrier_id: int | None) -> SurfaceRecord:
-        """The face as data; `carrier_id` is the id of the actor that carries it, if one does."""
+        """The face as a record; `carrier_id` is the id of the actor that carries it, None for a board."""
         return SurfaceRecord(
             name=self.name,
             asset=self.asset,
@@ -59,7 +60,7 @@ class Face:
         )
 
     def texture(self, albedo: SurfaceAlbedo) -> UInt8Image:
-        """The (H, W, 3) uint8 sRGB texture with which it shows an albedo."""
+        """The (H, W, 3) uint8 sRGB texture with which the face shows `albedo`."""
         if not isinstance(albedo, str):
             return face_from_patch(albedo)
         if albedo == "none":
@@ -72,9 +73,9 @@ def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceN
 
     Args:
         model: the render model.
-        data: with kinematics up to date.
+        data: MuJoCo data of the model with kinematics up to date.
         names: names of the faces' elements, in patch order.
-        path: the town's file, for errors.
+        path: the town's file, for error messages.
 
     Raises:
         TownError: a face is not flat in its `surface` frame, is smaller or larger than any board, or would not show a
@@ -130,7 +131,7 @@ def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNam
 
 
 def _neutral(model: mujoco.MjModel, material: str) -> UInt8Image:
-    """Texture of a face with the look of a material: (H, W, 3) uint8 sRGB, its image or its plain colour."""
+    """Texture of a face that looks like a material: (H, W, 3) uint8 sRGB from its image or its plain colour."""
     material_id = model.material(material).id
     roles = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
     textures = [int(model.mat_texid[material_id, role]) for role in roles]

@@ -8,16 +8,16 @@ from gear.world.scene_spec import SceneSpec
 
 
 def check_scene_assets(library: AssetLibrary, scene: SceneSpec, key: str) -> None:
-    """Checks that a town has the assets that carry the surfaces of a scene.
+    """Checks that a town has the boards or the truck of a scene.
 
     Args:
-        library: of the town.
-        scene: names the assets.
-        key: key of the scene in its file, such as `scenes.corner`.
+        library: library of the town.
+        scene: the scene, which names the assets.
+        key: key of the scene in its file, such as `scenes.corner`, for error messages.
 
     Raises:
         UnknownNameError: the town has no such board or truck.
-        ConfigError: the same, with the place in the file that names the asset.
+        ConfigError: the same; raised if the place in the file that names the asset is known.
     """
     for number, board in enumerate(scene.boards):
         with located_errors(board.places, "asset", f"{key}.boards[{number}]"):

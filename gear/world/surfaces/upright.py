@@ -1,4 +1,4 @@
-"""Checks that a face shows its texture as its `surface` frame says: upright, whole, and on the side of the viewer."""
+"""Checks that a face shows its texture upright, whole, and on the viewer's side, as its `surface` frame defines it."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ from gear.values.geometry import Array, RigidTransform
 from gear.world.assets.geom_triangles import geom_triangles
 
 UV_TOLERANCE = 0.01
-"""Most distance of a corner's texture coordinates from where they should be, as a share of the face's sides."""
+"""Largest difference between a corner's texture coordinates and the expected ones, as a share of the face's sides."""
 
 _BOX_TEXTURE = ((1, -2), (0, -2), (0, -1))
-"""Axes of the box along which u and v grow on the sides that face along x, y and z; a negative sign means against the
-axis. All renderers draw opposite sides with the same axes, so one side of each pair shows a mirrored texture."""
+"""Axes of the box along which u and v increase, on the sides that face along x, y and z; a minus sign means
+against the axis. All renderers use the same axes on opposite sides, so one side of each pair shows a mirrored
+texture.
+"""
 
 
 def texture_problem(model: mujoco.MjModel, geom_id: int, surface_from_geom: RigidTransform) -> str:
-    """Says what keeps a face from showing a patch; empty if nothing does.
+    """The reason why a face cannot show a patch; "" if it can.
 
     Args:
-        model: compiled.
+        model: compiled model.
         geom_id: the face, flat in the plane z = 0 of its surface frame, whose origin is its middle.
         surface_from_geom: transform into the surface frame, in which a viewer sees x to the right, y down and z into
             the face.

@@ -1,4 +1,4 @@
-"""The limits within which the reference camera must see the faces."""
+"""Checks that the reference camera sees the faces well enough."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from gear.world.placement import PlacementSpace
 from gear.world.surfaces.patch_faces import Face
 
 PICTURE_MARGIN = 0.06
-"""Least distance of a face's middle from the border of the picture, as a share of the picture's width and height."""
+"""Smallest distance of a face's middle from the border of the picture, as a share of the picture's width and height."""
 
 GRID = (5, 3)
-"""Columns and rows of the points of a face to which lines of sight are tested."""
+"""Numbers of columns and rows of points on a face to which lines of sight are tested."""
 STAND_OFF_M = 0.2
-"""Lines of sight end this far in front of a face, so that they do not hit its own board."""
+"""Lines of sight end this far in front of a face, metres, so that they do not hit its own board."""
 
 TRUCK_MAX_INCIDENCE_DEG = 75.0
 
@@ -30,12 +30,12 @@ Verdict = Literal["seen", "out of the picture", "too oblique", "hidden"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaceInWorld:
-    """A face in the world.
+    """A face in world coordinates.
 
     Attributes:
-        centre_m: (3,) its middle.
-        outward: (3,) unit normal, away from the board.
-        grid_m: (15, 3) points spread over it, `STAND_OFF_M` in front of it.
+        centre_m: (3,) middle of the face.
+        outward: (3,) unit normal that points away from the board.
+        grid_m: (15, 3) points spread over the face, `STAND_OFF_M` in front of it.
     """
 
     centre_m: Array
@@ -44,7 +44,7 @@ class FaceInWorld:
 
     @staticmethod
     def of(face: Face, world_from_surface: RigidTransform) -> FaceInWorld:
-        """The face at a pose of its frame."""
+        """The face in world coordinates for a pose of its surface frame."""
         u, v = np.meshgrid((np.arange(GRID[0]) + 0.5) / GRID[0] - 0.5, (np.arange(GRID[1]) + 0.5) / GRID[1] - 0.5)
         local_m = np.stack([u * face.width_m, v * face.height_m, np.full(u.shape, -STAND_OFF_M)], axis=-1)
         return FaceInWorld(
@@ -56,11 +56,11 @@ class FaceInWorld:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ViewLimits:
-    """What the reference camera must see of each face.
+    """How the reference camera must see each face.
 
     Attributes:
         max_incidence_deg: largest angle between the face's normal and the direction to the camera.
-        min_free: share of the face that the town and its boards must leave visible.
+        min_free: share of the face that the town and its boards must not hide.
     """
 
     max_incidence_deg: float = TRUCK_MAX_INCIDENCE_DEG
@@ -69,13 +69,16 @@ class ViewLimits:
     def judge(
         self, space: PlacementSpace, faces: Sequence[FaceInWorld], mount: CameraMount, camera: CameraRecord
     ) -> Verdict:
-        """Tests the limits, the cheap ones first, and returns the first one that a face breaks, or `seen`.
+        """Tests the limits, cheap ones first.
 
         Args:
             space: the placement model, for lines of sight.
-            faces: in the world.
+            faces: the faces in world coordinates.
             mount: the camera's intrinsics and picture size.
-            camera: the camera's pose in the world.
+            camera: the camera's pose in world coordinates.
+
+        Returns:
+            The first limit that a face breaks, or `seen`.
         """
         world_from_camera = camera.world_from_camera_transform
         eye_m = world_from_camera.translation_m
@@ -99,5 +102,5 @@ class ViewLimits:
 
 
 def reference_camera(rig: Rig, world_from_ego: RigidTransform) -> tuple[CameraMount, CameraRecord]:
-    """The first camera of a rig, and its pose for a pose of the ego car."""
+    """The first camera of a rig, and its world pose for a pose of the ego car."""
     return rig.cameras[0], rig.place(world_from_ego)[0]

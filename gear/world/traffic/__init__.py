@@ -1,1 +1,1 @@
-"""Road users: drawing them, placing them, and moving them through time."""
+"""Road users: drawing them at random, placing them on the ground, and moving them through time."""

@@ -1,4 +1,4 @@
-"""The road users of one sample: drawn, placed on the ground, and checked for overlaps."""
+"""The road users of one sample: drawn at random, placed on the ground, and checked for overlaps."""
 
 from __future__ import annotations
 
@@ -18,35 +18,37 @@ from gear.world.traffic.footprints import Footprint
 from gear.world.traffic.spawn import FreeSlots, Spawn, Spawner
 
 TRIES = 40
-"""Places that are drawn for one road user before it is left out of a round."""
+"""Number of places that are drawn for one road user in a round before it is left out."""
 
 ROUNDS = 5
-"""Rounds of drawing: after each one, road users that overlap are removed, and the next round replaces them."""
+"""Number of rounds of drawing. After each round, road users that overlap are removed; the next round replaces them."""
 
 VEHICLE_GAP_M = (1.5, 0.3)
 PERSON_GAP_M = (0.35, 0.35)
-"""Least gaps to all other road users: ahead and behind, and to the sides."""
+"""Smallest gaps between a person and all other road users, metres: in front and behind, and to the sides."""
 
 UPRIGHT = 0.9
-"""Least z component of an actor's z axis. With less it has fallen over, or its wheels are on different levels."""
+"""Smallest z component of an actor's z axis. If it is smaller, the actor has fallen over, or its wheels are on
+different levels.
+"""
 
 SLIP_M = 0.5
-"""An actor that moves further than this while it settles has slid off its place."""
+"""An actor that moves farther than this while it settles has slid off its place, metres."""
 
 
 @dataclass(eq=False, kw_only=True)
 class RoadUsers:
-    """The road users of one sample while it is drawn. Bodies are named as in the placement model.
+    """The road users of one sample while it is being drawn, by the names of their bodies in the placement model.
 
     Attributes:
         spawns: the road users by body: the ego car first, then the carrier if there is one, then the others in the
             order in which they were drawn.
-        poses: their poses in the world, by body.
+        poses: their poses in world coordinates, by body.
         keep_out: areas in which no other road user may be.
         free: the slots of the pool that are still free.
         protected: bodies of the ego car and the carrier, which are never removed.
         required_lanes: lanes that the ego car must follow from its start, by its body.
-        drive_m: distance from the ego car's start to the end of its limits; 0 where it stands or has no limits.
+        drive_m: distance from the ego car's start to the end of its limits; 0 if it stands or has no limits.
     """
 
     spawns: dict[str, Spawn]
@@ -64,7 +66,7 @@ class RoadUsers:
         self.free.release(spawn.actor_type.facts.name, body)
 
     def count(self, *, people: bool) -> int:
-        """Number of people, or of vehicles, without the ego car and the carrier."""
+        """Number of people, or of vehicles, not counting the ego car and the carrier."""
         return sum(
             (spawn.walk is not None) == people for body, spawn in self.spawns.items() if body not in self.protected
         )
@@ -72,7 +74,7 @@ class RoadUsers:
 
 @dataclass(frozen=True, slots=True)
 class _Draw:
-    """The keys that the random numbers of one round of drawing derive from."""
+    """Numbers from which the random generators of one round of drawing are seeded."""
 
     seed: int
     sequence: int
@@ -84,7 +86,7 @@ class Crowd:
     """Draws the road users around the ego car.
 
     Attributes:
-        scene_name, scene: give the limits.
+        scene_name, scene: the scene, which sets the limits, and its name.
         types: the assets of the pool by name.
         spawner: draws places.
         space: the placement model, for overlaps.
@@ -102,12 +104,13 @@ class Crowd:
         """Adds vehicles and people around the ego car.
 
         Args:
-            road_users: holds the ego car and the carrier, if there is one; changed in place.
-            seed, sequence: keys of the draws.
-            occlusion_test: finds road users that hide a face; None where the scene has no face.
+            road_users: contains the ego car and the carrier, if there is one; changed in place.
+            seed, sequence: numbers from which the random generators are seeded.
+            occlusion_test: finds road users that hide a face; None if the scene has no face.
 
         Raises:
-            PlacementError: fewer than the least count could be placed; the error names the limit that is too tight.
+            PlacementError: fewer road users than the smallest count could be placed; the message names the limit that
+                is too tight.
         """
         ego = next(iter(road_users.spawns.values()))
         wanted: dict[str, int] = {}
@@ -211,7 +214,9 @@ class Crowd:
         return len(road_users.spawns) < before
 
     def _drop_overlapping(self, road_users: RoadUsers, occlusion_test: OcclusionTest | None) -> bool:
-        """Removes actors that overlap another one or the town, or hide a face; returns whether one was removed."""
+        """Removes actors that overlap another actor or the town, or that hide a face; returns whether one was
+        removed.
+        """
         order = {body: number for number, body in enumerate(road_users.spawns)}
         overlapping = {
             max(pair, key=lambda body: order.get(body, -1)) for pair in self.space.overlaps(road_users.poses)
@@ -234,7 +239,7 @@ def _distance_m(first: RigidTransform, second: RigidTransform) -> float:
 
 
 def region_of(limits: NpcLimits, boards: Sequence[BoardSpec], centre_m: tuple[float, float]) -> Region:
-    """The region that limits describe, around the first board and around a centre (x, y) in the world."""
+    """The region that limits describe, relative to the first board and to a centre (x, y) in world coordinates."""
     return Region(
         board=boards[0] if boards and limits.needs_board else None,
         ahead_m=limits.ahead_m,
@@ -249,9 +254,9 @@ class OcclusionTest:
     """Finds the road users that hide a face from the reference camera.
 
     Attributes:
-        eye_m: (3,) position of the camera.
+        eye_m: (3,) position of the camera, world coordinates.
         grids_m: for each face, (N, 3) points spread over it.
-        min_free: share of each face that road users must leave visible.
+        min_free: share of each face that road users must not hide.
     """
 
     eye_m: Array
@@ -259,7 +264,7 @@ class OcclusionTest:
     min_free: float
 
     def occluders(self, space: PlacementSpace, poses: Mapping[str, RigidTransform]) -> set[str]:
-        """Bodies of the actors that together hide more of a face than they may."""
+        """Bodies of the actors that hide a face, if together they hide more of it than allowed."""
         found: set[str] = set()
         for grid_m in self.grids_m:
             occluders = space.occluders(self.eye_m, grid_m, poses)

@@ -1,4 +1,7 @@
-"""Draws the ego car of a sample, and the truck ahead of it where the scene has one. All else is placed around them."""
+"""Draws the ego car of a sample, and the truck in front of it if the scene has one.
+
+All other road users are placed around them afterwards (`gear.world.traffic.crowd`).
+"""
 
 from __future__ import annotations
 
@@ -31,16 +34,20 @@ from gear.world.traffic.spawn import FreeSlots, Spawn, Spawner
 EGO_TRIES = 60
 LONGEST_WAY_M = 40.0
 USUAL_MPS = 5.0
-"""A driving ego car starts at most `LONGEST_WAY_M` before its limits, and no further than it drives at `USUAL_MPS`."""
+"""Speed that limits how far before its limits a driving ego car starts: at most the distance that it drives at
+this speed, and at most `LONGEST_WAY_M`. m/s.
+"""
 
 CAMERA_ADVICE = (
     "a level camera with a field of view of 90 degrees would have it in view: change options.pitch_deg,"
     " options.roll_deg, options.hfov_deg, options.focal_px, options.principal_px or options.position_m"
 )
-"""What to do where the camera's options, and not the scene's limits, keep the faces out of the picture."""
+"""End of an error message: what to do if the camera's options, and not the scene's limits, keep the faces out of
+the picture.
+"""
 
 CORRIDOR_M = 1.3
-"""Half the width of the strip between the ego car and its truck in which no other road user may be."""
+"""Half the width of the strip between the ego car and its truck in which no other road user may be, metres."""
 
 
 @dataclass(eq=False, kw_only=True)
@@ -48,11 +55,11 @@ class EgoSampler:
     """Draws ego cars and carriers for one scene.
 
     Attributes:
-        scene_name, scene: give the limits.
+        scene_name, scene: the scene, which sets the limits, and its name.
         rig: the cameras on the ego car.
         types: the assets of the pool by name.
-        slots: the pool.
-        faces: the faces that take patches.
+        slots: the pool of actors.
+        faces: the faces that show patches.
         spawner: draws places.
         space: the placement model, for overlaps and lines of sight.
     """
@@ -70,12 +77,12 @@ class EgoSampler:
         """Draws the ego car, and the carrier if the scene has one.
 
         Args:
-            seed, sequence: keys of the draws.
-            duration_s: length of the sequence, 0 for a single picture. In a sequence the ego car starts at or before
-                the beginning of its limits, sees the boards from there, and drives to the end of its limits.
+            seed, sequence: numbers from which the random generators are seeded.
+            duration_s: length of the sequence in seconds, 0 for a single picture. In a sequence the ego car starts at
+                or before the start of its limits, sees the boards from there, and drives to the end of its limits.
 
         Raises:
-            PlacementError: no place keeps the limits; the error names the limit that is too tight.
+            PlacementError: no drawn place keeps the limits; the message names the limit that is too tight.
         """
         problems: Counter[str] = Counter()
         camera_is_cause = 0
@@ -94,11 +101,15 @@ class EgoSampler:
         raise PlacementError(self.scene_name, f"no place for the ego car in {EGO_TRIES} tries ({found}); {advice}")
 
     def empty(self) -> RoadUsers:
-        """No road users, and the whole pool free."""
+        """An object without road users, in which the whole pool is free."""
         return RoadUsers(spawns={}, poses={}, keep_out=[], free=FreeSlots.of(self.slots))
 
     def enter(self, road_users: RoadUsers, spawns: Sequence[Spawn]) -> str | None:
-        """Places the ego car and the carrier on the ground, and returns what is wrong with their places, or None."""
+        """Places the ego car and the carrier on the ground.
+
+        Returns:
+            What is wrong with their places; None if nothing is.
+        """
         for spawn in spawns:
             grounded = self.space.ground_pose(spawn.actor_type, spawn.x_m, spawn.y_m, spawn.near_z_m, spawn.yaw_rad)
             if grounded is None:
@@ -116,7 +127,12 @@ class EgoSampler:
         return None
 
     def judge(self, road_users: RoadUsers, rig: Rig | None = None) -> Verdict:
-        """Whether the reference camera of the ego car sees every face; with another rig than its own, where given."""
+        """The verdict of `ViewLimits.judge` for the reference camera of the ego car.
+
+        Args:
+            road_users: contains the ego car, and the carrier if there is one.
+            rig: cameras to use instead of the sampler's own; None for its own.
+        """
         ego = next(iter(road_users.spawns))
         mount, camera = reference_camera(
             rig or self.rig, Pose.from_transform(road_users.poses[ego]).transform("world", "ego")
@@ -124,7 +140,7 @@ class EgoSampler:
         return self.limits.judge(self.space, self.faces_in_world(road_users), mount, camera)
 
     def faces_in_world(self, road_users: RoadUsers) -> list[FaceInWorld]:
-        """Every face at its pose in the world: on its board, or on the carrier."""
+        """Every face in world coordinates: on its board, or on the carrier at its pose."""
         placed = []
         for face in self.faces:
             frame = face.parent_from_surface
@@ -136,7 +152,7 @@ class EgoSampler:
 
     @property
     def ego_type(self) -> ActorType:
-        """The asset of the ego car, measured."""
+        """The measured asset of the ego car."""
         return self.types[EGO_ASSET]
 
     @cached_property
@@ -182,7 +198,9 @@ class EgoSampler:
         return [ego]
 
     def _run(self, lane: str, s_m: float) -> tuple[float, float]:
-        """Arc lengths of the first and last piece of the unbroken run of allowed pieces around a place on a lane."""
+        """Arc lengths of the first and the last piece of the unbroken run of allowed pieces around a position on
+        a lane.
+        """
         table = self.spawner.lane_table
         pieces = np.array([piece for piece in self.places if table.names[piece] == lane])
         here = int(pieces[np.argmin(np.abs(table.s_m[pieces] - s_m))])
@@ -195,7 +213,7 @@ class EgoSampler:
         return float(table.s_m[first]), float(table.s_m[last])
 
     def ego_on_lane(self, road_users: RoadUsers, lane: str, s_m: float, rng: np.random.Generator) -> Spawn:
-        """The ego car on a lane, in a slot of the pool."""
+        """The ego car at arc length `s_m` on a lane, with a slot of the pool."""
         return self.spawner.on_lane(self.ego_type, road_users.free.take(EGO_ASSET), "ego", lane, s_m, rng)
 
     def _draw_behind_truck(self, road_users: RoadUsers, rng: np.random.Generator) -> list[Spawn] | str:
@@ -219,7 +237,7 @@ class EgoSampler:
         """(N,) indices of the pieces of lanes on which the ego car, or the truck, may be.
 
         Raises:
-            PlacementError: there are none; the error says why the pieces within the limits are excluded.
+            PlacementError: there are no such pieces; the message says why the pieces within the limits are excluded.
         """
         table = self.spawner.lane_table
         ego = self.scene.ego
@@ -242,7 +260,7 @@ class EgoSampler:
 
     @cached_property
     def _level_rig(self) -> Rig:
-        """A usual camera in the place of the reference camera: level, with a field of view of 90 degrees."""
+        """An ordinary camera in the position of the reference camera: level, with a field of view of 90 degrees."""
         mount = self.rig.cameras[0]
         return Rig(cameras=(CameraMount(name=mount.name, width_px=mount.width_px, height_px=mount.height_px),))
 

@@ -1,4 +1,4 @@
-"""Footprints of road users on the ground plan, for the gaps between them."""
+"""Footprints of road users on the ground, by which gaps between them are tested."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass
 
 LEVEL_M = 3.0
-"""Objects with a larger difference in height are on different levels of the town, as on a bridge and below it."""
+"""Objects whose heights differ by more than this are on different levels of the town (a bridge and the road
+below it), metres.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +16,7 @@ class Footprint:
     """An oriented rectangle on the ground.
 
     Attributes:
-        x_m, y_m, z_m: its middle, in the world.
+        x_m, y_m, z_m: its middle, world coordinates.
         yaw_rad: direction of its length, counter-clockwise from east.
         half_length_m, half_width_m: half of its sides.
     """
@@ -27,18 +29,18 @@ class Footprint:
     half_width_m: float
 
     def grown(self, length_m: float, width_m: float) -> Footprint:
-        """The rectangle with `length_m` more at each end and `width_m` more at each side."""
+        """The rectangle extended by `length_m` at both ends and by `width_m` at both sides."""
         return Footprint(
             self.x_m, self.y_m, self.z_m, self.yaw_rad, self.half_length_m + length_m, self.half_width_m + width_m
         )
 
     @property
     def radius_m(self) -> float:
-        """Radius of the circle around its middle that contains it."""
+        """Radius of the smallest circle around its middle that contains it."""
         return math.hypot(self.half_length_m, self.half_width_m)
 
     def overlaps(self, other: Footprint) -> bool:
-        """Whether two rectangles on one level share a point, by the separating axis theorem."""
+        """Whether two rectangles on the same level have a common point (separating axis theorem)."""
         dx, dy = other.x_m - self.x_m, other.y_m - self.y_m
         if math.hypot(dx, dy) > self.radius_m + other.radius_m or abs(other.z_m - self.z_m) > LEVEL_M:
             return False

@@ -1,4 +1,4 @@
-"""Driving sequences: the road users of a sample in motion, frame by frame, without overlaps."""
+"""Driving sequences: moves the road users of a sample from frame to frame, without overlaps."""
 
 from __future__ import annotations
 
@@ -19,13 +19,15 @@ from gear.world.traffic.simulation import MovingPedestrian, MovingVehicle, Traff
 from gear.world.traffic.spawn import Spawn
 
 ROOM_M = 80.0
-"""Length of a route beyond what its vehicle can drive in the sequence."""
+"""Length of a vehicle's route beyond the longest distance that it can drive in the sequence, metres."""
 
 SLOWEST_MPS = 1.5
-"""Least cruising speed of the ego car through its limits."""
+"""Smallest cruising speed of the ego car while it is within its limits, m/s."""
 
 OFF_THE_ROAD_M = 1.2
-"""People who leave a crossing walk this far onto the sidewalk. On a sidewalk they stop this far before its end."""
+"""People who leave a crosswalk walk this far onto the sidewalk; on a sidewalk they stop this far before its end.
+Metres.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -34,7 +36,7 @@ class FrameState:
 
     Attributes:
         spawns: the road users by body, with their places and speeds in this frame.
-        poses: their poses in the world, by body.
+        poses: their poses in world coordinates, by body.
     """
 
     spawns: Mapping[str, Spawn]
@@ -42,10 +44,16 @@ class FrameState:
 
 
 class SequenceSimulator:
-    """Simulates the road users of samples through the frames of a sequence."""
+    """Simulates the road users of a sample through all frames of a sequence."""
 
     def __init__(self, scene_name: str, lanes: LaneGraph, space: PlacementSpace) -> None:
-        """Simulates on the lanes of a town; the placement model finds overlaps."""
+        """Prepares simulations in a town.
+
+        Args:
+            scene_name: name of the scene, for error messages.
+            lanes: lane graph of the town.
+            space: the placement model, which finds overlaps.
+        """
         self._scene_name = scene_name
         self._lanes = lanes
         self._space = space
@@ -56,15 +64,15 @@ class SequenceSimulator:
     ) -> list[FrameState]:
         """Simulates all frames of a sequence.
 
-        After a simulation in which an actor overlaps another one, that actor is removed and the sequence is simulated
-        again, until there is no overlap. The frames may therefore show fewer road users than the least count of the
-        scene, which holds when they are placed.
+        If an actor overlaps another one during the simulation, it is removed and the sequence is simulated again, until
+        there is no overlap. The frames may therefore show fewer road users than the scene's smallest count, which only
+        holds for the start.
 
         Args:
-            road_users: at the start; actors that are removed are removed there.
-            seed, sequence: keys of the draws.
+            road_users: the road users at the start; removed actors are removed from this object as well.
+            seed, sequence: numbers from which the random generators are seeded.
             frames: number of frames.
-            interval_s: time between two frames.
+            interval_s: time between two frames, seconds.
 
         Raises:
             PlacementError: the ego car cannot drive without an overlap.
@@ -83,7 +91,11 @@ class SequenceSimulator:
     def _simulate_once(
         self, road_users: RoadUsers, seed: int, sequence: int, frames: int, interval_s: float
     ) -> tuple[list[FrameState], str | None]:
-        """Simulates until the end or until an actor overlaps: the frames, and that actor's body or None."""
+        """Simulates until the end or until an actor overlaps.
+
+        Returns:
+            The frames, and the body of the actor that overlaps, or None.
+        """
         duration_s = frames * interval_s
         vehicles = {
             body: self._moving_vehicle(road_users, spawn, seed, sequence, duration_s)
@@ -123,10 +135,10 @@ class SequenceSimulator:
         *,
         is_still: bool,
     ) -> tuple[FrameState, list[str]]:
-        """The road users at this moment, and the bodies of those that have no ground below.
+        """The road users at the current time, and the bodies of those that have no ground below them.
 
-        In a single picture vehicles and people head along their piece of the lane or walk; in motion they turn
-        steadily from piece to piece.
+        In a single picture (`is_still`) vehicles and people head along their segment of the lane or walk; in motion
+        their heading changes steadily from segment to segment.
         """
         spawns: dict[str, Spawn] = {}
         poses: dict[str, RigidTransform] = {}

@@ -1,8 +1,8 @@
 """Simulates traffic: vehicles follow their routes by the intelligent driver model, people walk.
 
 The model is that of Treiber, Hennecke and Helbing, "Congested traffic states in empirical observations and microscopic
-simulations" (2000). Vehicles keep their distance to whatever stands or moves in the strip of road ahead of them, give
-way where lanes of a junction conflict, and stop where the road ends. Nothing is random: the same start gives the same
+simulations" (2000). Vehicles keep their distance to everything in the strip of road in front of them, give way where
+lanes of a junction are in conflict, and stop at the end of a road. Nothing is random: the same start gives the same
 traffic.
 """
 
@@ -26,23 +26,23 @@ STRIP_STEP_M = 1.0
 SIDE_MARGIN_M = 0.25
 PERSON_RADIUS_M = 0.35
 PERSON_REACH_M = 0.9
-"""A person takes a step if nothing is within this distance ahead."""
+"""A person takes a step if nothing is within this distance in front, metres."""
 
 TURNING_M = 1.5
-"""People turn at a corner of their line over this distance before and after it, times their distance from the line (at
-least 1 m). Over a shorter distance, people on the inside of the corner would move backwards.
+"""People turn at a corner of their line over this distance before and after it, multiplied by their distance
+from the line (at least 1 m). Over a shorter distance, people on the inside of the corner would move backwards.
 """
 
 PERSON_FORESIGHT_S = (0.0, 0.7, 1.4)
-"""Vehicles keep clear of people where these are now and where they will be after these times, in seconds."""
+"""Vehicles stay clear of people's current positions and of their positions after these times, seconds."""
 
 HARDEST_SLOWING = 2.5
-"""Upper bound of the model's term for speed: a vehicle that is only too fast does not brake hard."""
+"""Upper bound of the model's speed term, so that a vehicle that is only too fast does not brake hard."""
 
 ACCELERATION_MPS2, BRAKING_MPS2, HARDEST_MPS2 = 1.6, 2.0, 8.0
 STANDSTILL_GAP_M, HEADWAY_S = 2.0, 1.2
 GIVE_WAY_M = 25.0
-"""A vehicle that is this near to a junction claims its lane through it."""
+"""A vehicle that is nearer to a junction than this reserves its lane through it, metres."""
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
@@ -51,9 +51,9 @@ class MovingVehicle:
 
     Attributes:
         route: the lanes that it follows.
-        s_m, lateral_m: arc length of its middle on the route, and distance to the left of it.
-        speed_mps: its speed.
-        cruise_mps: the speed that it drives on a free road.
+        s_m, lateral_m: arc length of its middle on the route, and its distance to the left of the route.
+        speed_mps: current speed.
+        cruise_mps: speed on a free road.
         front_m, rear_m, half_width_m: distances of its front, rear and sides from its middle.
     """
 
@@ -75,9 +75,9 @@ class MovingPedestrian:
         line: centre line of the sidewalk or crosswalk.
         s_m, lateral_m: arc length on the line, and distance to the left of it.
         direction: 1 for walking along the line, -1 for walking against it.
-        pace_mps: the speed at which the person walks where nothing is in the way.
-        speed_mps: the speed now.
-        beyond_m: how far the person walks past the end of the line; negative for stopping before the end.
+        pace_mps: walking speed if nothing is in the way.
+        speed_mps: current speed.
+        beyond_m: how far the person walks past the end of the line; negative to stop before the end.
     """
 
     line: Polyline
@@ -95,26 +95,28 @@ class MovingPedestrian:
         return left_m < -self.beyond_m
 
     def place(self) -> tuple[Array, float]:
-        """(3,) point on the ground, and heading in radians, in motion."""
+        """(3,) point on the ground and heading in radians, for a person in motion."""
         heading_rad = self.line.heading(self.s_m, TURNING_M * max(1.0, abs(self.lateral_m)))
         point = offset_left(self.line.at(self.s_m)[0], heading_rad, self.lateral_m)
         return point, heading_rad if self.direction > 0 else heading_rad + math.pi
 
     def first_place(self) -> tuple[Array, float]:
-        """The same for a single picture: the heading is that of the segment of the line."""
+        """(3,) point on the ground and heading in radians, for a single picture: the heading is that of the
+        line's segment.
+        """
         point, heading_rad = self.line.at(self.s_m, self.lateral_m)
         return point, heading_rad if self.direction > 0 else heading_rad + math.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Discs:
-    """Obstacles of the traffic, each covered by discs on the ground.
+    """Obstacles for the traffic, each covered by discs on the ground.
 
     Attributes:
-        centres_m: (N, 3) middles of the discs.
-        radii_m: (N,) their radii.
-        velocities_mps: (N, 2) their velocities.
-        owners: (N,) index of the vehicle that a disc belongs to; -1 for objects that stand still, -2 for people.
+        centres_m: (N, 3) middles of the discs, world coordinates.
+        radii_m: (N,) radii.
+        velocities_mps: (N, 2) velocities, m/s.
+        owners: (N,) index of the vehicle to which a disc belongs; -1 for objects that stand still, -2 for people.
     """
 
     centres_m: Array
@@ -130,7 +132,7 @@ def vehicle_discs(
 
     Args:
         point_m: (3,) point under its middle.
-        heading_rad: its heading.
+        heading_rad: its heading, counter-clockwise from east.
         front_m, rear_m, half_width_m: distances of its front, rear and sides from its middle.
 
     Returns:
@@ -148,7 +150,7 @@ def vehicle_discs(
 
 
 class TrafficSimulation:
-    """Vehicles and people in motion among obstacles that stand still."""
+    """Vehicles and people that move among obstacles."""
 
     def __init__(
         self,
@@ -157,7 +159,7 @@ class TrafficSimulation:
         obstacles: Sequence[tuple[float, float, float, float]],
         junctions: Junctions,
     ) -> None:
-        """Prepares a simulation; no vehicle is faster than it can brake for what is ahead.
+        """Prepares a simulation. Vehicles that are too fast to brake for what is in front of them are slowed down.
 
         Args:
             vehicles, people: the road users, changed in place.
@@ -192,7 +194,9 @@ class TrafficSimulation:
             person.s_m += person.direction * person.speed_mps * step_s
 
     def _acceleration(self, index: int, discs: Discs, stop_m: float) -> float:
-        """Acceleration of a vehicle in m/s², by the intelligent driver model; `stop_m` is the way to its stop line."""
+        """Acceleration of a vehicle in m/s², by the intelligent driver model; `stop_m` is the distance to its
+        stop line.
+        """
         vehicle = self.vehicles[index]
         gap_m, leader_mps = self._gap(index, discs)
         if stop_m < gap_m:
@@ -206,7 +210,7 @@ class TrafficSimulation:
         return max(-HARDEST_MPS2, acceleration)
 
     def _gap(self, index: int, discs: Discs) -> tuple[float, float]:
-        """Free distance ahead of a vehicle's front, and the speed in m/s of the object at its end."""
+        """Free distance in front of a vehicle, and the speed in m/s of the object at its end."""
         vehicle = self.vehicles[index]
         front_s_m = vehicle.s_m + vehicle.front_m
         gap_m = vehicle.route.line.length_m - front_s_m if vehicle.route.is_dead_end else math.inf
@@ -233,7 +237,7 @@ class TrafficSimulation:
         return float(ahead_m[first]), max(0.0, float(speeds.min()))
 
     def _stop_lines(self) -> list[float]:
-        """Distance ahead at which each vehicle must stop to give way; infinite where it need not stop."""
+        """For each vehicle: the distance ahead at which it must stop to give way; infinite if it need not stop."""
         claims: list[tuple[float, int, str]] = []
         for index, vehicle in enumerate(self.vehicles):
             rear_m, front_m = vehicle.s_m - vehicle.rear_m, vehicle.s_m + vehicle.front_m
@@ -253,7 +257,7 @@ class TrafficSimulation:
         return stops
 
     def _free_to_step(self, discs: Discs) -> list[bool]:
-        """For each person, whether nothing is in the way and the end of the walk is not reached."""
+        """For each person: True if nothing is in the way and the end of the walk is not reached."""
         if not self.people:
             return []
         places = [person.place() for person in self.people]

@@ -1,4 +1,7 @@
-"""Draws road users: asset, place on the ground plan, speed and colour. Placement then puts them on the ground."""
+"""Draws road users at random: asset, position on a lane, walk or parking bay, speed and colour.
+
+`gear.world.placement` puts them on the ground afterwards.
+"""
 
 from __future__ import annotations
 
@@ -18,24 +21,24 @@ from gear.world.roads.routes import vehicle_pose
 from gear.world.traffic.footprints import Footprint
 
 JUNCTION_WEIGHT = 0.4
-"""How often a metre of a junction lane is drawn, relative to other lanes."""
+"""Probability per metre of a junction lane, relative to other lanes."""
 
 CROSSING_WEIGHT = 2.5
-"""How often a metre of a crosswalk is drawn, relative to sidewalks."""
+"""Probability per metre of a crosswalk, relative to sidewalks."""
 
 STANDING_SHARE = 0.2
-"""Share of the vehicles on lanes, outside of junctions, that stand still as in a queue."""
+"""Share of the vehicles on lanes outside junctions that stand still, as in a queue."""
 
 MOTORWAY_MPS = 20.0
-"""Vehicles that are slower than this keep off lanes with at least this speed."""
+"""Vehicles that cannot drive this fast are not placed on lanes whose speed is at least this, m/s."""
 
 SIDE_CLEARANCE_M = 0.35
-"""Least distance of people from the edge of a sidewalk."""
+"""Smallest distance of people from the edge of a sidewalk, metres."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WalkPlace:
-    """The place of a person on a sidewalk or crosswalk.
+    """The position of a person on a sidewalk or crosswalk.
 
     Attributes:
         walk: name of the sidewalk or crosswalk.
@@ -56,16 +59,16 @@ class Spawn:
 
     Attributes:
         role: its role in the record.
-        actor_type: its asset, measured.
-        body: its body in the placement model.
-        x_m, y_m: its place in the world.
-        near_z_m: height near which the ground is looked for.
-        yaw_rad: its heading, counter-clockwise from east.
-        speed_mps: its speed along the heading.
+        actor_type: its measured asset.
+        body: name of its body in the placement model.
+        x_m, y_m: position in world coordinates.
+        near_z_m: height near which the ground is searched.
+        yaw_rad: heading, counter-clockwise from east.
+        speed_mps: speed along the heading.
         paint_rgb: linear albedo of its paint, 0..1; None for an asset without a palette.
-        lane: name of the lane that it drives on; "" for people and parked vehicles.
-        s_m, lateral_m: arc length on that lane, and distance to its left.
-        walk: its place on a sidewalk or crosswalk; None for vehicles.
+        lane: name of the lane on which it drives; "" for people and parked vehicles.
+        s_m, lateral_m: arc length on that lane, and distance to the left of it.
+        walk: its position on a sidewalk or crosswalk; None for vehicles.
     """
 
     role: Role
@@ -84,7 +87,7 @@ class Spawn:
 
     @property
     def footprint(self) -> Footprint:
-        """The rectangle of ground that it covers."""
+        """The rectangle on the ground that it covers."""
         actor_type = self.actor_type
         return Footprint(
             self.x_m, self.y_m, self.near_z_m, self.yaw_rad, actor_type.half_length_m, actor_type.half_width_m
@@ -93,7 +96,7 @@ class Spawn:
 
 @dataclass(slots=True, eq=False)
 class FreeSlots:
-    """The slots of the pool that are still free while a sample is drawn.
+    """The slots of the pool that are still free while a sample is being drawn.
 
     Attributes:
         bodies: bodies of the free slots, by the name of their asset.
@@ -103,7 +106,7 @@ class FreeSlots:
 
     @staticmethod
     def of(slots: Sequence[Slot]) -> FreeSlots:
-        """All slots but that of the carrier."""
+        """All slots of the pool except that of the carrier."""
         free = FreeSlots()
         for slot in slots:
             if not slot.carries_surface:
@@ -115,11 +118,11 @@ class FreeSlots:
         return self.bodies[asset].pop(0)
 
     def release(self, asset: str, body: str) -> None:
-        """Frees the slot of a body again."""
+        """Makes the slot of a body free again."""
         self.bodies[asset].append(body)
 
     def draw(self, types: Mapping[str, ActorType], rng: np.random.Generator, *, people: bool) -> ActorType | None:
-        """Draws an asset with a free slot, by the weights of the assets; None where no slot is free."""
+        """Draws an asset that has a free slot, by the weights of the assets; None if no slot is free."""
         kinds = [
             actor_type
             for name, actor_type in types.items()
@@ -132,7 +135,7 @@ class FreeSlots:
 
 
 def draw_paint(actor_type: ActorType, rng: np.random.Generator) -> Vec3 | None:
-    """Draws a colour of an asset's palette by its weights, as linear albedo; None for an asset without a palette."""
+    """Draws a colour from an asset's palette by its weights, as linear albedo; None for an asset without a palette."""
     palette = actor_type.facts.palette
     total = sum(weight for _, weight in palette)
     if total <= 0:
@@ -142,7 +145,7 @@ def draw_paint(actor_type: ActorType, rng: np.random.Generator) -> Vec3 | None:
 
 
 class Spawner:
-    """Draws places on the lanes, walks and bays of one town."""
+    """Draws positions on the lanes, walks and parking bays of one town."""
 
     def __init__(self, lanes: LaneGraph) -> None:
         """Cuts the lanes and walks of a town into pieces that can be drawn."""
@@ -162,7 +165,7 @@ class Spawner:
         )
 
     def is_allowed_on(self, actor_type: ActorType, lane: str) -> bool:
-        """Whether such a vehicle uses a lane: slow ones keep off lanes with the speed of a motorway."""
+        """Whether a vehicle may use a lane: slow vehicles may not use lanes with the speed of a motorway."""
         vehicle = actor_type.vehicle
         is_slow = vehicle is not None and vehicle.max_speed_mps < MOTORWAY_MPS
         return not is_slow or self.lanes.lanes[lane].speed_mps < MOTORWAY_MPS
@@ -176,16 +179,16 @@ class Spawner:
         s_m: float,
         rng: np.random.Generator,
     ) -> Spawn:
-        """Draws a vehicle at a place on a lane.
+        """Draws a vehicle at a position on a lane.
 
-        It is a little beside the centre line and turned a little; two-wheelers keep to the right edge.
+        It is shifted a little from the centre line and turned a little, at random; two-wheelers keep to the right edge.
 
         Args:
-            actor_type: its asset.
-            body: its body in the placement model.
+            actor_type: asset of the vehicle.
+            body: name of its body in the placement model.
             role: its role in the record.
-            lane, s_m: the lane, and the arc length on it.
-            rng: source of the draws.
+            lane, s_m: name of the lane, and arc length on it.
+            rng: random generator.
         """
         road = self.lanes.lanes[lane]
         room_m = max(0.0, road.width_m / 2 - actor_type.half_width_m - 0.2)
@@ -214,7 +217,7 @@ class Spawner:
         )
 
     def in_bay(self, actor_type: ActorType, body: str, bay: ParkingBay, rng: np.random.Generator) -> Spawn | None:
-        """Draws a parked vehicle in a bay; None where the bay is too small for it."""
+        """Draws a parked vehicle in a bay; None if the bay is too small for it."""
         spare_m = bay.length_m / 2 - actor_type.half_length_m, bay.width_m / 2 - actor_type.half_width_m
         if min(spare_m) < 0:
             return None
@@ -237,16 +240,16 @@ class Spawner:
     ) -> Spawn | None:
         """Draws a person on a sidewalk or crosswalk.
 
-        People who walk keep to the right half; people who stand face any direction.
+        People who walk keep to the right half; people who stand look in any direction.
 
         Args:
-            actor_type: the asset of the person.
-            body: its body in the placement model.
-            pieces: (N,) indices of the pieces of walks to draw from.
-            rng: source of the draws.
+            actor_type: asset of the person.
+            body: name of its body in the placement model.
+            pieces: (N,) indices of the pieces of walks from which the position is drawn.
+            rng: random generator.
 
         Returns:
-            The person; None where a person who stands was drawn on a crosswalk.
+            The person; None if a standing person was drawn on a crosswalk.
         """
         name, s_m = self.walk_table.draw(pieces, rng)
         walk = self.lanes.walks[name]

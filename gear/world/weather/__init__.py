@@ -1,1 +1,1 @@
-"""Weather: presets, sun and sky, air, wet ground, and lamps at night."""
+"""Weather: presets, sun and sky, fog and rain, wet ground, and lamps at night."""

@@ -1,4 +1,4 @@
-"""The camera pipeline of a weather: fog and haze, rain, water on the ground, and shade below road users."""
+"""Builds the camera pipeline of a weather: fog and haze, rain, water on the ground, and contact shadows."""
 
 from __future__ import annotations
 
@@ -30,32 +30,36 @@ from gear.world.weather.light import (
 from gear.world.weather.presets import wetness
 
 DENSEST_FOG_PER_M = 0.05
-"""Extinction of CARLA's fog density of 100 percent: objects at 60 m can no longer be recognised."""
+"""Extinction coefficient for CARLA's fog density of 100 percent, 1/m: objects at 60 m can no longer be recognised."""
 
 RAIN_PER_M = 0.0035
-"""Extinction of rain of 100 percent."""
+"""Extinction coefficient of the veil of rain for 100 percent precipitation, 1/m."""
 
 RAIN_FROM_M, RAIN_FALLOFF = 0.75, 0.1
-"""Distance and falloff of the veil of rain, in the terms of CARLA's fog; those of CARLA's presets for rain."""
+"""Start distance (metres) and falloff of the veil of rain, as in the fog of CARLA's presets for rain."""
 
 AEROSOL_PER_M = 1.6e-4
-"""Extinction of clear air by aerosol: a visibility of 24 km."""
+"""Extinction coefficient of clear air by aerosol, 1/m: a visibility of 24 km."""
 
 MOLECULES_PER_M = (7.6e-6, 1.16e-5, 2.3e-5)
-"""Extinction by Rayleigh scattering at 610, 550 and 465 nm, at sea level."""
+"""Extinction coefficients by Rayleigh scattering at 610, 550 and 465 nm (red, green, blue), at sea level, 1/m."""
 
 FALLOFF_PER_M = 0.0693
-"""Rate at which fog thins with height at a falloff of 1: it halves every ten metres, as in Unreal Engine."""
+"""Rate at which fog gets thinner with height for a falloff of 1, 1/m: it halves every ten metres, as in Unreal
+Engine.
+"""
 
 
 FULL_PUDDLES = 0.32
-"""Share of open ground under water at 100 percent of `precipitation_deposits`."""
+"""Share of open ground under water for `precipitation_deposits` of 100 percent."""
 
 DROP_LIGHT = 1.25
-"""Radiance of a drop relative to the horizon: it refracts light of a large, brighter part of the sky."""
+"""Radiance of a rain drop relative to the horizon; it is brighter, because it refracts light of a large part of
+the sky.
+"""
 
 SHADE_SKY_FACE_PX = 8
-"""Size of the sky's faces where only the light is needed, not the picture."""
+"""Side of the sky's cube faces in pixels if only the light is needed and not the picture of the sky."""
 
 _MIRROR_ROWS, _MIRROR_COLUMNS = 128, 512
 
@@ -73,10 +77,10 @@ def camera_pipeline(
     Args:
         weather: light and air.
         renderer_name: name of the renderer.
-        town: name of the town, which decides where its puddles are.
+        town: name of the town, which determines where its puddles are.
         effects: camera effects; None for none.
         night: lamps of the town at night; None by day.
-        shapes: shapes of the assets, which shade the ground around them; None for no such shade.
+        shapes: triangles of the assets, which cast contact shadows; None for no contact shadows.
     """
     left = night.sky_level if night else 1.0
     mirrored = left * mirrored_radiance(weather, _MIRROR_ROWS, _MIRROR_COLUMNS)
@@ -104,25 +108,27 @@ def camera_pipeline(
 
 
 def contact_shadows_of(weather: Weather, renderer_name: str, shapes: Mapping[str, Shape]) -> ContactShadows:
-    """The shade that assets cast on the ground around them in the light of a weather."""
+    """The contact shadows that assets cast on the ground in the light of a weather."""
     light = lighting_of(weather, sky_face_px=SHADE_SKY_FACE_PX)
     return ContactShadows(shapes=shapes, even_share=even_share(weather, light), is_display=renderer_name == "classic")
 
 
 def even_share(weather: Weather, light: Lighting) -> float:
-    """Share of the light on open level ground that is not the sun's, 0..1."""
+    """Share of the light on open level ground that does not come from the sun directly, 0..1."""
     even = ambient_radiance(weather)[0].mean()
     sun = light.sun.mean() * max(light.towards_sun[2], 0) / math.pi
     return float(even / (even + sun))
 
 
 def _shown(light: Floats, renderer_name: str) -> Floats:
-    """Converts linear light to the units of a renderer's frames; those of classic hold display values."""
+    """Converts linear light to the units of a renderer's frames; the classic renderer's frames hold display values."""
     return encode_srgb(light) if renderer_name == "classic" else light
 
 
 def air_of(weather: Weather, renderer_name: str, left: float = 1.0) -> Air:
-    """The air of a weather, in the units of a renderer's frames; `left` is the share of its light at night."""
+    """The air of a weather, in the units of a renderer's frames; `left` is the share of its light that is left
+    at night.
+    """
     aerosol = AEROSOL_PER_M * weather.mie_scattering_scale / 0.03
     molecules = np.array(MOLECULES_PER_M) * weather.rayleigh_scattering_scale / 0.0331
     return Air(
@@ -133,10 +139,11 @@ def air_of(weather: Weather, renderer_name: str, left: float = 1.0) -> Air:
 
 
 def fogs_of(weather: Weather) -> tuple[Fog, ...]:
-    """The fog and the veil of rain of a weather; empty in clear air.
+    """The fog and the veil of rain of a weather; empty for clear air.
 
-    CARLA's percent run from clear air to a thick fog. The fog begins and thins as the weather says; the veil of rain
-    begins and thins as the fog of CARLA's presets does. Where both agree they become one fog.
+    CARLA's fog density in percent runs from clear air to a thick fog. Start distance and falloff of the fog are those
+    of the weather; those of the veil of rain are as in CARLA's presets. If both have the same start and falloff, they
+    become one fog.
     """
     fog = DENSEST_FOG_PER_M * (weather.fog_density / 100) ** 1.5
     rain = RAIN_PER_M * math.pow(weather.precipitation / 100, 1.5)

@@ -16,34 +16,37 @@ from gear.values.geometry import Array
 from gear.world.assets.geom_triangles import static_geoms, world_triangles
 
 PALETTE, LAMP_GLASS = "palette", (0.5, 0.5, 0.625, 0.625)
-"""Material of gear's street furniture, and the part of its texture that is the glass of lamps: least u and v, largest u
-and v, with v from the top."""
+"""Name of the material of gear's street furniture, and the part of its texture that is the glass of lamps:
+smallest u and v, largest u and v, with v from the top.
+"""
 
 LAMP_MATERIAL = "lamp_glass"
-"""A material of this name is the glass of lamps as a whole."""
+"""Name of a material that is entirely the glass of lamps."""
 
 STREET_INTENSITY, GLOBE_INTENSITY = 24.0, 2.2
 STREET_COLOUR, GLOBE_COLOUR = (1.0, 0.80, 0.55), (1.0, 0.70, 0.38)
 STREET_REACH_M, GLOBE_REACH_M = 32.0, 18.0
 ONE_LAMP_M = 0.9
-"""Triangles of glass that are closer together than this belong to one lamp."""
+"""Triangles of glass that are nearer to each other than this belong to one lamp, metres."""
 
 DOWNWARD = 0.7
-"""Length of the mean normal of a lamp's glass above which the lamp shines in one direction, as street lamps do."""
+"""If the mean normal of a lamp's glass is longer than this, the lamp shines in one direction, as street lamps do."""
 
 STANDARD_AREA_M2 = 0.15
-"""Area of glass of a street lamp with the usual intensity; intensity grows with the area, up to twice."""
+"""Area of glass of a street lamp with the usual intensity, m². Intensity grows with the area, up to twice the
+usual one.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Glazing:
-    """The panes in the texture of a material, and their look when they are lit.
+    """The window panes in the texture of a material, and how they look when they are lit.
 
     Attributes:
         columns: number of panes in one unit of u; None for one pane in each quad.
-        u, v: least and largest texture coordinate of the glass inside of a pane's cell, with v from the top.
+        u, v: smallest and largest texture coordinates of the glass within a pane's cell, with v from the top.
         lit: share of the panes that are lit.
-        gain: factor of the frame's own light on a lit pane.
+        gain: factor on the frame's own light on a lit pane.
         light: light that a lit pane adds, as a share of full scale.
     """
 
@@ -64,13 +67,13 @@ GLAZINGS = {
         for name in ("far_facades", "far_facades_warm", "far_facades_dark")
     },
 }
-"""Panes by the name of the material."""
+"""Window panes by the name of the material."""
 
 WARM, COOL = np.array([1.0, 0.78, 0.50]), np.array([0.80, 0.92, 1.0])
 
 
 def _standing(model: mujoco.MjModel, names: Collection[str]) -> Iterator[tuple[str, int]]:
-    """Yields (name, geom id) for the geoms of the town whose material has one of the names."""
+    """Yields (material's name, geom id) for the geoms of the town whose material has one of the names."""
     for geom in np.flatnonzero(static_geoms(model) & (model.geom_matid >= 0)).tolist():
         name = model.mat(int(model.geom_matid[geom])).name
         if name in names:
@@ -91,8 +94,8 @@ def find_lamps(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, Lamps]:
     """Finds the street lamps of a town.
 
     Args:
-        model: compiled; its meshes must not have been released.
-        data: with kinematics up to date.
+        model: compiled model; its meshes must not have been released.
+        data: MuJoCo data of the model with kinematics up to date.
 
     Returns:
         The lamps by kind: `street` shines down, `globe` in all directions.
@@ -156,12 +159,12 @@ def _placed(found: Sequence[tuple[Array, Array, float]], intensity: float) -> di
 
 
 def find_windows(model: mujoco.MjModel, data: mujoco.MjData, rng: np.random.Generator) -> LitWindows:
-    """Finds the windows of a town and draws which of them are lit.
+    """Finds the windows of a town and draws at random which of them are lit.
 
     Args:
-        model: compiled; its meshes must not have been released.
-        data: with kinematics up to date.
-        rng: draws the lit panes, their brightness and their colour.
+        model: compiled model; its meshes must not have been released.
+        data: MuJoCo data of the model with kinematics up to date.
+        rng: random generator for the lit panes, their brightness and their colour.
     """
     panes: list[Array] = []
     geoms: list[npt.NDArray[np.int32]] = []
@@ -199,7 +202,7 @@ def _quads(corners: Array, uv: Array) -> tuple[Array, Array]:
 
     Args:
         corners: (T, 3, 3) corners of the triangles.
-        uv: (T, 3, 2) their texture coordinates.
+        uv: (T, 3, 2) texture coordinates of the corners.
 
     Returns:
         (N, 4, 3) corners and (N, 4, 2) texture coordinates of the quads.

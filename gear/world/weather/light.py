@@ -1,7 +1,7 @@
-"""The light of a weather in the units of a linear frame, at an exposure that is fixed for each weather.
+"""The light of a weather in the units of a linear frame. The exposure is fixed for each weather.
 
-The exposure gives a white wall (albedo `WHITE_ALBEDO`) that faces the brightest direction `WHITE_LEVEL` of the frame's
-full scale.
+It is chosen so that a white wall (albedo `WHITE_ALBEDO`) that faces the brightest direction gets `WHITE_LEVEL` of the
+frame's full scale.
 """
 
 from __future__ import annotations
@@ -22,25 +22,27 @@ Floats = npt.NDArray[np.float64]
 WHITE_ALBEDO = 0.7
 WHITE_LEVEL = 0.85
 SKY_LEVEL = 0.9
-"""Most that the exposure may give to the bright parts of the sky (their 90 % quantile)."""
+"""Largest level of the bright parts of the sky (their 90 % quantile) in the frame; it limits the exposure."""
 
 SKY_FACE_PX = 512
 STREET_FACE_PX = 128
 STREET_ALBEDO = np.array([0.30, 0.27, 0.23])
 STREET_TOP = 0.72
-"""Sine of the elevation up to which the houses along a street reach."""
+"""Sine of the elevation up to which houses along a street reach."""
 
 STREET_SHARE = 0.65
 """Share of the sky below that elevation that houses hide."""
 
 STREET_SUNLIT = 0.45
-"""Share of the visible surfaces of a street that the sun reaches."""
+"""Share of the visible surfaces in a street that the sun reaches."""
 
 BOUNCE_GAIN = 1.25
-"""Factor for the light that streets and houses reflect to each other, which the renderers do not compute."""
+"""Factor that stands for the light that streets and houses reflect to each other, which the renderers do not
+compute.
+"""
 
 NIGHT_SKY_SHARE = 0.2
-"""Brightness of the night sky, as a share of the light on the streets, which mostly comes from the town itself."""
+"""Brightness of the night sky, as a share of the light in the streets, which mostly comes from the town itself."""
 
 LAMPLIT_HOUSES = np.array([0.10, 0.075, 0.05])
 """Radiance of house fronts in the light of street lamps, as a share of the frame's full scale."""
@@ -54,11 +56,12 @@ class Lighting:
     """Sun and sky in units of the frame, where a radiance of 1.0 is full scale.
 
     Attributes:
-        towards_sun: (3,) unit vector towards the sun, in the world.
-        sun: (3,) irradiance of a surface that faces the sun, per linear sRGB channel.
+        towards_sun: (3,) unit vector towards the sun, world axes.
+        sun: (3,) irradiance of a surface that faces the sun, for each linear sRGB channel.
         ambient: (3,) irradiance of a level surface by the sky, divided by pi.
-        sky_faces: (6 * size, size, 3) uint8 sRGB picture of the sky, the faces of a cube in `FACE_ORDER`.
-        street_faces: as `sky_faces`, smaller: the light that falls into a street from the sky and from its houses.
+        sky_faces: (6 * size, size, 3) uint8 sRGB picture of the sky: the faces of a cube in `FACE_ORDER`.
+        street_faces: a smaller picture in the same form: the light that reaches a street from the sky and from its
+            houses.
     """
 
     towards_sun: Floats
@@ -69,7 +72,7 @@ class Lighting:
 
 
 HORIZON_AZIMUTHS = 64
-"""Number of azimuths for which `airlight` gives the light of distant air."""
+"""Number of azimuths for which `airlight` computes the light of distant air."""
 
 
 def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting:
@@ -90,11 +93,11 @@ def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting
 
 
 def mirrored_radiance(weather: Weather, rows: int, columns: int) -> Floats:
-    """The radiance that still water in a street mirrors.
+    """The radiance that still water in a street reflects.
 
     Args:
         weather: sun and sky.
-        rows: number of elevations, with evenly spaced sines from the horizon to the zenith.
+        rows: number of elevations, whose sines are evenly spaced from the horizon to the zenith.
         columns: number of azimuths, evenly spaced counter-clockwise from east.
 
     Returns:
@@ -110,7 +113,8 @@ def mirrored_radiance(weather: Weather, rows: int, columns: int) -> Floats:
 
 
 def lamplit_houses(rows: int) -> Floats:
-    """(rows, 1, 3) radiance in units of the frame that still water mirrors of houses in the light of lamps at night.
+    """(rows, 1, 3) radiance, in units of the frame, of houses in the light of lamps at night, as still water reflects
+    it.
 
     Rows are those of `mirrored_radiance`.
     """
@@ -118,7 +122,9 @@ def lamplit_houses(rows: int) -> Floats:
 
 
 def _in_street(sky: Sky, directions: Floats) -> Floats:
-    """(..., 3) kcd/m² in a street: houses hide the lower sky and reflect their share of the light of sun and sky."""
+    """(..., 3) radiance in kcd/m² seen from a street: houses hide the lower sky and reflect part of the light of
+    sun and sky.
+    """
     radiance = sky.radiance(directions)
     _, from_above = _exposure(sky)
     sunlit = STREET_SUNLIT * sky.sun_klx * max(float(np.hypot(*sky.towards_sun[:2])), 0.3)
@@ -127,15 +133,16 @@ def _in_street(sky: Sky, directions: Floats) -> Floats:
 
 
 def _house_share(height: Floats) -> Floats:
-    """Share of the sky that houses hide, by the sine of the elevation."""
+    """Share of the sky that houses hide, as a function of the sine of the elevation."""
     t = np.clip((height / STREET_TOP - 0.35) / 0.65, 0.0, 1.0)
     return np.where(height > -0.02, STREET_SHARE * (1 - t * t * (3 - 2 * t)), 0.0)
 
 
 def ambient_radiance(weather: Weather) -> Floats:
-    """(3, 3) radiance, in units of the frame, of a white surface without the sun's light.
+    """(3, 3) radiance, in units of the frame, of a white surface that gets all light except the sun's.
 
-    Rows: a surface that faces up, one that faces sideways (mean over all azimuths), one that faces down.
+    The rows are for surfaces that face up, sideways (mean over all azimuths) and down; the columns are red, green and
+    blue.
     """
     sky = Sky.of(weather)
     coarse, solid_angle = face_directions(_INTEGRATION_PX), _solid_angles(_INTEGRATION_PX)
@@ -149,8 +156,8 @@ def ambient_radiance(weather: Weather) -> Floats:
 def airlight(weather: Weather) -> Floats:
     """(`HORIZON_AZIMUTHS`, 3) radiance of distant air by azimuth, counter-clockwise from east, in units of the frame.
 
-    After sunset the sun no longer reaches the air of the street, which then has the colour of the light from the whole
-    sky: the glow in the west does not colour a fog.
+    After sunset the sun no longer reaches the air in a street. The air then has the colour of the light from the whole
+    sky, so that the glow in the west does not colour a fog.
     """
     sky = Sky.of(weather)
     exposure, roof_klx = _exposure(sky)
@@ -162,12 +169,12 @@ def airlight(weather: Weather) -> Floats:
 
 
 def _looks(sky: Sky) -> float:
-    """Factor of the radiance of the sky, as it is seen, for the light that it gives."""
+    """Factor between the radiance of the sky as a camera sees it and the radiance by which it lights surfaces."""
     return float(NIGHT_SKY_SHARE**sky.night)
 
 
 def _exposure(sky: Sky) -> tuple[float, Floats]:
-    """The exposure, in units of the frame per kcd/m², and the (3,) illuminance in klx of a roof by the sky."""
+    """The exposure in units of the frame per kcd/m², and the (3,) illuminance in klx of a roof by the sky."""
     coarse = face_directions(_INTEGRATION_PX)
     radiance, solid_angle = sky.radiance(coarse, with_disc=False), _solid_angles(_INTEGRATION_PX)
     flat_sun = np.array([*sky.towards_sun[:2], 0.0])
@@ -182,15 +189,16 @@ def _exposure(sky: Sky) -> tuple[float, Floats]:
 
 
 def face_directions(size: int) -> Floats:
-    """(6, size, size, 3) unit vectors in the world through the texels of MuJoCo's skybox, with faces in `FACE_ORDER`.
+    """(6, size, size, 3) world unit vectors through the texels of MuJoCo's skybox, with faces in `FACE_ORDER`.
 
-    The cube is OpenGL's, turned so that its y points up in the world: the face `right` is east, `back` is north.
+    The cube is that of OpenGL, rotated so that its y axis points up in the world: the face `right` is east, `back` is
+    north.
     """
     return np.stack(list(_faces(size)))
 
 
 def _faces(size: int) -> Iterator[Floats]:
-    """The faces of `face_directions` one by one, which takes a sixth of the memory."""
+    """The faces of `face_directions`, one at a time, which needs a sixth of the memory."""
     ticks = (np.arange(size) + 0.5) / size * 2 - 1
     column, row = np.meshgrid(ticks, ticks)
     one = np.ones_like(column)

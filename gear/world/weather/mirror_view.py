@@ -1,4 +1,4 @@
-"""Renders what wet ground mirrors: the placed scene seen from below, without its ground and with neutral surfaces."""
+"""Renders what wet ground reflects: the placed scene seen from below, without the ground and with neutral surfaces."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from gear.world.world import PlacedStage, World
 def render_mirror_view(
     world: World, renderer: Renderer, placed: PlacedStage, record: SceneRecord, pipeline: CameraPipeline
 ) -> tuple[MirrorView | None, ...]:
-    """Renders the mirrored view of each camera of a sample.
+    """Renders the mirrored view for each camera of a sample.
 
-    Surfaces are neutral, so that a patch changes no pixel outside of its own surface.
+    Surfaces are neutral, so that a patch changes no pixels outside its own surface.
 
     Args:
-        world: that the scene was placed in.
-        renderer: of that world.
-        placed: the sample, placed last.
+        world: the world in which the scene was placed.
+        renderer: renderer of that world.
+        placed: result of the last `World.place`.
         record: the scene, with its cameras.
-        pipeline: the camera pipeline of this weather; it says which cameras need a mirror view.
+        pipeline: camera pipeline of the weather, which determines the mirrored cameras.
 
     Returns:
-        One view for each camera; None for a camera that needs none, such as in dry weather.
+        One view for each camera; None for cameras that need none, such as in dry weather.
     """
     cameras = [pipeline.mirror_camera(camera, record) for camera in record.cameras]
     looking = [camera for camera in cameras if camera is not None]

@@ -1,4 +1,4 @@
-"""A town at night: its lamps and windows, and the share of the ambient light that is left."""
+"""A town at night: its lamps and lit windows, and the share of the ambient light that is left."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ LEVEL, SKY_LEVEL = 0.03, 0.14
 """Shares of the ambient light that are left on the ground and in the sky when the sun's light is gone."""
 
 GAUGE_SHARE = 0.72
-"""Distance between two headlamps as a share of the vehicle's width."""
+"""Distance between the two headlamps as a share of the vehicle's width."""
 
 
 def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None:
     """The light sources of a world at night; None while the sun is up.
 
     Args:
-        world: its meshes must not have been released.
-        weather: its `night` decides how far the lamps outshine the sky.
-        renderer_name: name of the renderer, since classic frames hold display values.
+        world: the world; its meshes must not have been released.
+        weather: its `night` determines how much brighter lamps are than the sky.
+        renderer_name: name of the renderer; frames of the classic renderer hold display values.
 
     Raises:
         TownError: the glass of a lamp has no finite surface.
@@ -76,19 +76,16 @@ def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None
 
 
 def materials_of(model: mujoco.MjModel) -> list[str]:
-    """The name of each geom's material in the file that it came with; empty where it has none."""
+    """The name of each geom's material, as in the file from which it comes; "" if the geom has none."""
     return [model.mat(index).name.rsplit("/", 1)[-1] if index >= 0 else "" for index in model.geom_matid]
 
 
 def lit_panes(material: list[str], label_code: npt.NDArray[np.uint8]) -> npt.NDArray[np.bool_]:
-    """Which geoms are the windows of vehicles with a lit interior, such as buses.
+    """(ngeom,) bool: which geoms are windows of vehicles with a lit interior, such as buses.
 
     Args:
-        material: name of each geom's material, as `materials_of` gives it.
-        label_code: (ngeom,) labels of the geoms.
-
-    Returns:
-        (ngeom,) bool.
+        material: name of each geom's material, from `materials_of`.
+        label_code: (ngeom,) uint8 label codes of the geoms.
     """
     codes = [kind.code for kind in VEHICLES.values() if kind.has_lit_interior]
     return np.asarray((np.array(material) == "glass") & np.isin(label_code, codes))

@@ -23,7 +23,7 @@ _CLASSIC_WHITE = 1.1
 _CLASSIC_SKY_SHARE = (0.48, 0.95)
 _CLASSIC_TINT = 0.2
 _CLASSIC_LEAST_SUN = 1e-3
-"""Least strength of the sun in OpenGL: Filament's intensity is divided by it."""
+"""Smallest strength of the sun in OpenGL; Filament's intensity is divided by this strength."""
 
 
 def _read_presets() -> dict[str, Weather]:
@@ -51,15 +51,15 @@ def apply_weather(
 ) -> None:
     """Replaces the light of a composed world by that of a weather, and makes its ground wet.
 
-    The world gets a light `sun`, a skybox texture `sky`, and a cube texture as an image light for Filament. Materials
-    of open ground are darker and smoother the wetter the weather is. A custom field makes Filament read the colours of
-    materials and geoms as linear albedo.
+    The world gets a light `sun`, a skybox texture `sky`, and a cube texture as image-based light for Filament. The
+    wetter the weather is, the darker and smoother are the materials of open ground. A custom field makes Filament
+    interpret colours of materials and geoms as linear albedo.
 
     Args:
-        root: the MJCF of the world, changed in place.
+        root: MJCF of the world, changed in place.
         weather: the weather.
-        lighting: its light; computed here if None.
-        geom_materials: default class and own material (None for none) of the geoms that are not in the tree.
+        lighting: its light; None computes it.
+        geom_materials: default class and own material (None for none) of geoms that are not in the tree.
     """
     lighting = lighting or lighting_of(weather)
     _remove_old_light(root)
@@ -74,7 +74,7 @@ def apply_weather(
 
 
 def wetness(weather: Weather) -> float:
-    """Wetness of open ground, 0..1: the largest of the weather's wetness, its puddles and its rain."""
+    """Wetness of open ground, 0..1: the largest of the weather's wetness, puddles and rain."""
     return float(min(1.0, max(weather.wetness, 1.4 * weather.precipitation_deposits, weather.precipitation) / 100))
 
 
@@ -90,7 +90,7 @@ def _remove_old_light(root: mjcf.RootElement) -> None:
 
 
 def _add_sky(root: mjcf.RootElement, lighting: Lighting) -> None:
-    """Adds the picture of the sky, and the light of a street as an image light."""
+    """Adds the picture of the sky, and the light in a street as image-based light."""
     _add_cube(root, "sky", "skybox", lighting.sky_faces)
     street = _add_cube(root, "street_light", "cube", lighting.street_faces)
     root.worldbody.add("light", name="sky", type="image", texture=street, intensity=FULL_SCALE_LUX, diffuse=(0, 0, 0))
@@ -112,10 +112,10 @@ def _add_cube(root: mjcf.RootElement, name: str, kind: str, faces: UInt8Image) -
 def _add_sun(root: mjcf.RootElement, lighting: Lighting, night: float) -> None:
     """Adds the sun for both renderers, and the ambient light of the sky for the classic OpenGL renderer.
 
-    Filament multiplies `intensity` and `diffuse`; OpenGL knows `diffuse` alone. OpenGL adds light up as display values,
-    so its shares of sun and sky are those of display values. Its ambient light belongs to the headlight, since shadows
-    would remove the ambient light of the sun. At night neither renderer has a sun: the camera pipeline adds the night
-    to frames of ambient light, in which a brighter white would clip.
+    Filament multiplies `intensity` and `diffuse`; OpenGL uses only `diffuse`. OpenGL adds lights as display values, so
+    its shares of sun and sky are shares of display values. Its ambient light is that of the headlight, because shadows
+    would also remove the sun's ambient light. At night neither renderer has a sun: the camera pipeline converts frames
+    of ambient light to night, and a brighter white would clip in them.
     """
     sunlit = lighting.ambient + lighting.sun
     sky_share = float(np.clip((_display(lighting.ambient) / _display(sunlit)).mean(), *_CLASSIC_SKY_SHARE))

@@ -19,12 +19,12 @@ def find_shadow_casters(
     """The visible triangles of a town and its boards, without the ground.
 
     Args:
-        model: compiled; its meshes must not have been released.
-        data: with kinematics up to date.
-        label_code: (ngeom,) uint8 labels of all geoms.
+        model: compiled model; its meshes must not have been released.
+        data: MuJoCo data of the model with kinematics up to date.
+        label_code: (ngeom,) uint8 label codes of all geoms.
 
     Returns:
-        (N, 3, 3) float32 corners of the triangles in the world, in metres.
+        (N, 3, 3) float32 corners of the triangles in world coordinates, metres.
     """
     chosen = static_geoms(model) & (model.geom_group < FIRST_HIDDEN_GROUP) & ~np.isin(label_code, GROUND_CODES)
     found = [np.zeros((0, 3, 3), np.float32)]

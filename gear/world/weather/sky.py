@@ -1,7 +1,7 @@
 """The radiance of the sky by direction: the analytic daylight of Preetham, Shirley and Smits (1999), with clouds.
 
-Directions are unit vectors in the world (x east, y north, z up). Radiance is in kcd/m² per linear sRGB channel, so
-that a white surface under it and a sun in klx can be compared.
+Directions are unit vectors in world axes (x east, y north, z up). Radiance is in kcd/m² for each linear sRGB channel,
+so that it can be compared with the light of a sun in klx on a white surface.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from gear.values.scene import Weather
 Floats = npt.NDArray[np.float64]
 
 _MIN_ALTITUDE_RAD = math.radians(1.5)
-"""The formulas hold for a sun above the horizon. A lower sun lights the sky as one at this altitude, but less."""
+"""The formulas hold for a sun above the horizon. A lower sun gives the sky of a sun at this altitude, but darker."""
 
 _NIGHT_TINT = np.array([0.72, 0.84, 1.0])
 _NIGHT_CLOUDS = np.array([1.25, 1.12, 1.0])
@@ -30,8 +30,9 @@ _WAVELENGTHS_UM = np.array([0.610, 0.550, 0.465])
 _RGB_FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 _D65 = (0.3127, 0.3290)
 _SATURATION = 0.7
-"""Factor of the model's saturation. At 1 the light of a clear sky on a level surface would have 2.5 times as much blue
-as red, more than skylight of 10 000 to 12 000 K."""
+"""Factor on the model's saturation. With 1, the light of a clear sky on a level surface would have 2.5 times as
+much blue as red, more than skylight of 10 000 to 12 000 K.
+"""
 
 _HORIZON_BLUR = 0.035
 _DISC_COSINE = math.cos(math.radians(0.5))
@@ -62,12 +63,13 @@ class Sky:
     """Sun and sky of one weather.
 
     Attributes:
-        towards_sun: (3,) unit vector towards the sun, in the world.
-        sun_klx: (3,) illuminance in klx, per linear sRGB channel, of a surface that faces the sun, below the clouds.
+        towards_sun: (3,) unit vector towards the sun, world axes.
+        sun_klx: (3,) illuminance in klx, for each linear sRGB channel, of a surface that faces the sun, below the
+            clouds.
         cloud_cover: share of the sky that clouds cover, 0..1.
         turbidity: haziness of the clear air; 2 is very clear.
-        blueness: how saturated the clear sky is; 1 is that of clear air.
-        night: 0 while the sun is up, 1 once its light is gone from the sky.
+        blueness: how saturated the clear sky is; 1 for clear air.
+        night: 0 while the sun is up, 1 when its light has left the sky.
     """
 
     towards_sun: Floats
@@ -79,7 +81,7 @@ class Sky:
 
     @staticmethod
     def of(weather: Weather) -> Sky:
-        """The sky of CARLA's weather parameters."""
+        """The sky for CARLA's weather parameters."""
         altitude = math.radians(weather.sun_altitude_deg)
         azimuth = math.radians(weather.sun_azimuth_deg)
         shown_altitude = max(altitude, _MIN_ALTITUDE_RAD)
@@ -108,12 +110,13 @@ class Sky:
         """Radiance by direction: sky and clouds above the horizon, sunlit ground below it.
 
         Args:
-            directions: (..., 3) unit vectors in the world.
-            with_disc: whether the disc of the sun is included, as for a picture of the sky. It must be left out where
-                light is integrated over a few directions: one that meets the small disc would count for thirty suns.
+            directions: (..., 3) unit vectors, world axes.
+            with_disc: whether the disc of the sun is included, as for a picture of the sky. It must be left out when
+                light is integrated over a few directions: a direction that hits the small disc would count for thirty
+                suns.
 
         Returns:
-            (..., 3) kcd/m² per linear sRGB channel.
+            (..., 3) kcd/m² for each linear sRGB channel.
         """
         flat = directions.reshape(-1, 3)
         ground = self._ground()
@@ -130,8 +133,8 @@ class Sky:
     def horizon_radiance(self, azimuths: int) -> Floats:
         """Radiance of distant air around the horizon.
 
-        Light from there has been scattered several times, so it is the mean of the direction's own radiance and of the
-        mean over all directions; the glare around the sun is bounded.
+        That light has been scattered several times. It is therefore the mean of the radiance in that direction and of
+        the mean over all directions, and the glare around the sun is bounded.
 
         Args:
             azimuths: number of directions, evenly spaced counter-clockwise from east.
@@ -151,7 +154,7 @@ class Sky:
         return np.asarray(_GROUND_ALBEDO * (self.sun_klx * self.towards_sun[2] / math.pi + zenith))
 
     def _above(self, directions: Floats, *, with_disc: bool) -> Floats:
-        """(N, 3) kcd/m² of sky and clouds, also for directions below the horizon."""
+        """(N, 3) radiance of sky and clouds in kcd/m²; also defined for directions below the horizon."""
         clear = self._clear(directions)
         towards_sun = directions @ self.towards_sun
         if with_disc:
@@ -186,7 +189,7 @@ class Sky:
         return np.asarray(day + self.night * (_NIGHT_TINT * zeniths["Y"] - day))
 
     def _cloud_base(self) -> Floats:
-        """(3,) mean radiance of clouds in kcd/m²; those of an overcast sky have half the radiance of few ones."""
+        """(3,) mean radiance of clouds in kcd/m². Clouds of an overcast sky have half the radiance of single clouds."""
         beam = _beam_klx(math.asin(self.towards_sun[2]), self.turbidity)
         global_klx = beam * self.towards_sun[2] + 0.18 * beam.mean()
         tint = 0.4 - 0.3 * self.cloud_cover
@@ -199,14 +202,18 @@ class Sky:
         return np.asarray(day + self.night * (_NIGHT_CLOUDS * zenith - day))
 
     def _clouds(self, noise: Floats, height: Floats, towards_sun: Floats) -> Floats:
-        """(N, 3) kcd/m² of clouds: bright where thin and near the sun; an overcast sky is that of the CIE."""
+        """(N, 3) radiance of clouds in kcd/m²: bright where they are thin and near the sun; an overcast sky
+        follows the CIE's formula.
+        """
         overcast = (1 + 2 * np.maximum(height, 0)) * (3 / 7)
         shade = (1.2 - 0.45 * noise) * (1 + self.cloud_cover**2 * (overcast - 1))
         glow = 0.8 * (1 - self.cloud_cover) * np.exp((towards_sun - 1) / 0.08)
         return np.asarray((shade + glow)[:, None] * self._cloud_base())
 
     def _opacity(self, noise: Floats, height: Floats) -> Floats:
-        """(N,) opacity of the clouds, 0..1. The noise is uniform, so the share above the threshold is the cover."""
+        """(N,) opacity of the clouds, 0..1. The noise is uniformly distributed, so the share above the threshold
+        equals the cloud cover.
+        """
         edge = 1 - 1.15 * self.cloud_cover
         opacity = _smooth_step(edge - 0.05, edge + 0.18, noise)
         # Distant clouds fade into the haze of the horizon.
@@ -254,11 +261,13 @@ _OCTAVES = (4, 8, 16, 32, 64, 128, 256)
 
 @cache
 def _cloud_tile() -> npt.NDArray[np.float32]:
-    """(`TILE_PX`, `TILE_PX`) float32 noise of the clouds, the same in every process."""
+    """(`TILE_PX`, `TILE_PX`) float32 fractal texture of the clouds, the same in every process."""
     return periodic_noise(derive_rng(0, "sky", "clouds"), _OCTAVES, 0.85)
 
 
 def _cloud_noise(directions: Floats) -> Floats:
-    """(N,) noise at (N, 3) directions, on a layer of clouds that meets the horizon as the curved Earth makes it."""
+    """(N,) values of the clouds' texture in (N, 3) directions, on a layer that meets the horizon as on the
+    curved Earth.
+    """
     reach = 0.16 * TILE_PX / (np.maximum(directions[:, 2], 0.0) + 0.1)
     return sampled(_cloud_tile(), directions[:, 0] * reach, directions[:, 1] * reach).astype(np.float64)

@@ -1,7 +1,6 @@
 """Makes open ground wet: its materials become darker and smoother.
 
-Water fills the pores, so that less light is reflected from inside of the material and the surface reflects more
-sharply.
+Water fills the pores, so that the material reflects less light from its inside and its surface reflects more sharply.
 """
 
 from __future__ import annotations
@@ -32,9 +31,9 @@ def wet_materials(root: mjcf.RootElement, amount: float, geom_materials: Sequenc
     """Makes the materials of open ground wet.
 
     Args:
-        root: the MJCF of a world, changed in place.
-        amount: wetness, 0 is dry, 1 is as wet as possible.
-        geom_materials: default class and own material of the geoms that are not in the tree.
+        root: MJCF of a world, changed in place.
+        amount: wetness, 0 for dry to 1 for as wet as possible.
+        geom_materials: default class and own material of geoms that are not in the tree.
     """
     for material in _open_materials(root, geom_materials):
         rgba = np.array(material.rgba if material.rgba is not None else (1.0, 1.0, 1.0, 1.0))
@@ -48,9 +47,9 @@ def wet_own_colours(model: mujoco.MjModel, label_code: npt.NDArray[np.uint8], am
     """Darkens the geoms of open ground that have a colour of their own instead of a material.
 
     Args:
-        model: compiled; the colours of its geoms are changed in place.
-        label_code: (ngeom,) uint8 labels of the geoms.
-        amount: wetness, 0 is dry, 1 is as wet as possible.
+        model: compiled model; the colours of its geoms are changed in place.
+        label_code: (ngeom,) uint8 label codes of the geoms.
+        amount: wetness, 0 for dry to 1 for as wet as possible.
     """
     is_open = np.isin(label_code, [LABEL_BY_NAME[name].code for name in WET_LABELS])
     model.geom_rgba[is_open & has_own_colour(model), :3] *= np.float32(1 - _DARKENING * amount)
@@ -73,7 +72,7 @@ def _is_open(class_name: str) -> bool:
 
 
 def _inherited_material(default: Any) -> Any:
-    """The material that a default class, or a class around it, gives to geoms."""
+    """The material that a default class, or a class around it, assigns to geoms."""
     # A class that went around dm_control is known by name alone; such classes name no material.
     while default is not None and not isinstance(default, str) and default.tag == "default":
         if default.geom is not None and default.geom.material is not None:
