@@ -29,6 +29,7 @@ from gear.reporting.display import displayed
 from gear.values.errors import DatasetError
 from gear.values.progress import Callbacks, Progress, Warn
 from gear.values.serial import Json
+from gear.verbs.evaluate.alarm_notes import alarm_notes
 from gear.verbs.evaluate.compare import Measured, compared, drive_note, row_report, streets_of, together
 from gear.verbs.evaluate.pools import Pools, check_pools, pooled
 from gear.verbs.evaluate.report import EvaluateReport
@@ -146,6 +147,10 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
         _begin(root, facts)
         rows = _measured(request, datasets, names, guarded, callbacks)
         learnt_facts = _fit_facts(root, guarded, request, callbacks.on_warning)
+        reports = tuple(row_report(row) for row in rows)
+        alarms = alarm_notes(reports, learnt_facts)
+        for line in alarms:
+            callbacks.on_warning(line)
         said = [note for one in datasets for note in (size_note(chosen, one), drive_note(one), learnt.note(one))]
         more = {
             "reports": list(request.reports),
@@ -156,12 +161,12 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
             "timing": {"parallel_batches": guarded.lanes},
             **({} if learnt_facts is None else {"fit": learnt_facts}),
             "versions": _versions(guarded),
-            "notes": [*_problems(learnt_facts), *grouped([*learnt.doubts(), *said])],
+            "notes": [*_problems(learnt_facts), *alarms, *grouped([*learnt.doubts(), *said])],
         }
         found = EvaluateReport(
             out=root,
             facts=facts | more,
-            rows=tuple(row_report(row) for row in rows),
+            rows=reports,
             together=tuple(together(rows)),
             differences=tuple(compared(rows, request.seed)),
             pools=tuple(pooled(rows, request.pools, request.seed)),
