@@ -1,4 +1,4 @@
-"""Renderers: linear colour, metric depth and geom ids for one camera. No other package touches graphics drivers."""
+"""Renderers: linear colour, metric depth and geom ids for a camera. No other package uses graphics drivers."""
 
 from gear.render.probing import ProbeResult, probe
 from gear.render.registry import RENDERERS, describe, open_renderer

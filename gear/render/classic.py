@@ -1,10 +1,11 @@
 """MuJoCo's own OpenGL renderer, through EGL or OSMesa.
 
-It computes light with display values, without tone curve and gamma. So that the same MJCF looks right, the renderer's
-copy of the model holds display colours: textures marked sRGB are not decoded, linear albedos of materials and geoms are
-encoded. Its frames are linear in a face's 8-bit values; Filament's are linear in the albedo that these encode.
+It computes light with display values, without tone curve and gamma. To show the same MJCF correctly, it uses a copy of
+the model with display colours: textures marked sRGB are not decoded, and linear albedos of materials and geoms are
+encoded. Its frames are linear in the 8-bit values of a patch; Filament's frames are linear in the albedo that these
+values encode.
 
-A face's texture is filtered as in `gear.render.filament`, but as bytes, without decoding.
+A patch's texture is filtered as in `gear.render.filament`, but as bytes, without decoding.
 """
 
 from __future__ import annotations
@@ -38,10 +39,10 @@ _FLAGS = mujoco.mjtRndFlag
 
 
 class ClassicRenderer:
-    """One OpenGL context with one model in it. Not for use from several threads."""
+    """An OpenGL context with one model in it. Not thread-safe."""
 
     def __init__(self, model: mujoco.MjModel, *, quality: Quality = "film") -> None:
-        """Starts the context.
+        """Opens the OpenGL context.
 
         Raises:
             BackendError: there is no OpenGL driver.
@@ -83,10 +84,10 @@ class ClassicRenderer:
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """One raw view per camera; see `gear.contracts.rendering.Renderer`.
+        """Renders one raw view for each camera; `gear.contracts.rendering.Renderer` documents the arguments.
 
         Raises:
-            ValueError: the stage belongs to another model, or a face does not fit its texture.
+            ValueError: the stage belongs to another model, or a patch does not have the size of its texture.
         """
         if stage.model is not self._shared_model:
             raise ValueError("the stage was compiled as another model than the renderer was opened for")
@@ -98,7 +99,7 @@ class ClassicRenderer:
         )
 
     def close(self) -> None:
-        """Frees the context; safe to call twice."""
+        """Frees the context; may be called twice."""
         if self._closed:
             return
         self._closed = True
@@ -107,12 +108,12 @@ class ClassicRenderer:
         self._gl.free()
 
     def _set_faces(self, faces: dict[int, UInt8Image]) -> None:
-        """Uploads faces by texture id, and restores the textures of faces that only the last stage had."""
+        """Uploads patches by texture id, and restores the textures of faces that only the last stage had changed."""
         for texture in sorted(self._replaced.keys() | faces.keys()):
             self._upload(texture, faces.get(texture))
 
     def _upload(self, texture: int, srgb: UInt8Image | None) -> None:
-        """Uploads new texels of a texture of the model's copy, or its original ones for None."""
+        """Uploads new texels of a texture in the model's copy; None restores the original ones."""
         model = self._model
         begin = int(model.tex_adr[texture])
         texels = model.tex_data[begin : begin + 3 * int(model.tex_height[texture]) * int(model.tex_width[texture])]
@@ -150,7 +151,7 @@ class ClassicRenderer:
         return RawView(linear_rgb=linear_rgb, depth_m=depth_m, geom_id=geom_id)
 
     def _fill_scene(self, stage: Stage, frustum: Frustum, needed: Mask) -> None:
-        """Fills the MuJoCo scene with the needed geoms, for a view volume."""
+        """Fills the MuJoCo scene with the geoms in `needed`, for a view volume."""
         self._model.geom_group[:] = np.where(needed, self._shared_model.geom_group, _HIDDEN_GROUP)
         mujoco.mjv_updateScene(
             self._model, stage.data, self._option, None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, self._scene
@@ -171,7 +172,7 @@ class ClassicRenderer:
                 light.pos[:] = _shadow_centre(frustum) - _SHADOW_HEIGHT_M * light.dir
 
     def _shadow_casters(self, stage: Stage, frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
-        """(ngeom,) bool, geoms in the beams of the suns' squares; all geoms where another light casts shadows."""
+        """(ngeom,) bool: geoms in the squares that the suns light; all geoms if another kind of light casts shadows."""
         casts = np.zeros(len(radii_m), np.bool_)
         model = self._model
         for light in np.flatnonzero(model.light_castshadow & model.light_active):
@@ -182,7 +183,9 @@ class ClassicRenderer:
         return casts
 
     def _set_paint(self, stage: Stage, casts: Mask) -> None:
-        """Sets paint, and switches shadows off for geoms that need none. The scene is filled again for each view."""
+        """Sets the paint colours, and switches shadows off for geoms that need none. The scene is filled again
+        for each view.
+        """
         for geom in self._scene.geoms[: self._scene.ngeom]:
             if geom.objtype != mujoco.mjtObj.mjOBJ_GEOM:
                 continue
@@ -200,7 +203,7 @@ class ClassicRenderer:
         return pixels[::-1]
 
     def _ids_and_depth(self, camera: CameraRecord) -> tuple[IdImage, FloatImage]:
-        """Geom ids and depth in metres from one pass."""
+        """Geom ids, and depth in metres, from one pass."""
         pixels = np.empty((camera.height_px, camera.width_px, 3), np.uint8)
         depth = np.empty((camera.height_px, camera.width_px), np.float32)
         self._render_and_read(camera, pixels, depth, seen=(_FLAGS.mjRND_SEGMENT, _FLAGS.mjRND_IDCOLOR))
@@ -221,7 +224,7 @@ class ClassicRenderer:
         *,
         seen: tuple[mujoco.mjtRndFlag, ...],
     ) -> None:
-        """One pass with only these flags set; pixels and depth are written into the given arrays."""
+        """Runs one pass with only the flags in `seen` set, and writes pixels and depth into the given arrays."""
         self._scene.flags[:] = 0
         for flag in (*seen, _FLAGS.mjRND_CULL_FACE):
             self._scene.flags[flag] = 1

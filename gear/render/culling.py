@@ -1,4 +1,6 @@
-"""Which geoms a view needs: OpenGL draws all that a scene holds, up to three times where there are shadows."""
+"""Finds the geoms that a view needs, because OpenGL draws everything in a scene, up to three times if there are
+shadows.
+"""
 
 from __future__ import annotations
 
@@ -14,22 +16,24 @@ Mask = npt.NDArray[np.bool_]
 
 
 def bounding_spheres(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:
-    """Bounding spheres of geoms: (ngeom, 3) centres in the world and (ngeom,) radii, metres; infinite for planes."""
+    """Bounding spheres of geoms: (ngeom, 3) centres in world coordinates and (ngeom,) radii, metres; planes have
+    infinite radii.
+    """
     return data.geom_xpos, bounding_radii(model)
 
 
 def bounding_radii(model: mujoco.MjModel) -> Array:
-    """(ngeom,) radii of bounding spheres in metres; infinite for geoms without bounds, such as planes."""
+    """(ngeom,) radii of bounding spheres, metres; infinite for geoms without bounds, such as planes."""
     return np.asarray(np.where(model.geom_rbound > 0, model.geom_rbound, np.inf))
 
 
 def in_frustum(frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
-    """(ngeom,) bool, whether a sphere may reach into the view volume: never False for one that does.
+    """(ngeom,) bool: False only for spheres that are certainly outside the view volume.
 
     Args:
         frustum: the camera's view volume.
-        centres_m: (ngeom, 3) in the world.
-        radii_m: (ngeom,).
+        centres_m: (ngeom, 3) centres of the spheres, world coordinates.
+        radii_m: (ngeom,) radii of the spheres.
     """
     right = np.cross(frustum.forward_world, frustum.up_world)
     towards = centres_m - frustum.position_world_m
@@ -47,16 +51,16 @@ def in_frustum(frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
 
 
 def in_beam(centre_m: Array, direction: Array, half_side_m: float, centres_m: Array, radii_m: Array) -> Mask:
-    """(ngeom,) bool, whether a sphere may reach into a square beam of light around a line.
+    """(ngeom,) bool: False only for spheres that are certainly outside a square beam of light.
 
-    The square may be rotated about the line, so a round beam around it is tested.
+    The square may be rotated about the beam's axis, so the round beam around it is tested.
 
     Args:
-        centre_m: (3,) a point of the line.
-        direction: (3,) of the light, of any length.
+        centre_m: (3,) a point on the beam's axis, world coordinates.
+        direction: (3,) direction of the light, of any length.
         half_side_m: half the side of the square.
-        centres_m: (ngeom, 3) in the world.
-        radii_m: (ngeom,).
+        centres_m: (ngeom, 3) centres of the spheres, world coordinates.
+        radii_m: (ngeom,) radii of the spheres.
     """
     unit = direction / np.linalg.norm(direction)
     towards = centres_m - centre_m
@@ -65,14 +69,14 @@ def in_beam(centre_m: Array, direction: Array, half_side_m: float, centres_m: Ar
 
 
 def may_shadow(receivers_m: Array, axes: Array, margin_m: float, centres_m: Array, radii_m: Array) -> Mask:
-    """(ngeom,) bool, whether a sphere may shadow a convex part of the world: never False for one that does.
+    """(ngeom,) bool: False only for spheres that certainly cast no shadow on a convex part of the world.
 
     Args:
         receivers_m: (N, 3) corners of that part.
         axes: (3, 3) rows: two unit vectors across the light's rays, and one towards the light.
         margin_m: distance by which the part is enlarged.
-        centres_m: (ngeom, 3) in the world.
-        radii_m: (ngeom,).
+        centres_m: (ngeom, 3) centres of the spheres, world coordinates.
+        radii_m: (ngeom,) radii of the spheres.
     """
     middle_m = receivers_m.mean(axis=0)
     corners, spheres = (receivers_m - middle_m) @ axes.T, (centres_m - middle_m) @ axes.T
@@ -89,11 +93,11 @@ def may_shadow(receivers_m: Array, axes: Array, margin_m: float, centres_m: Arra
 
 
 def near_to_far(chosen: Mask, depth_m: Array) -> npt.NDArray[np.intp]:
-    """Indices of the chosen geoms by growing depth; equal depths keep their order.
+    """Indices of the chosen geoms, smallest depth first; geoms with equal depths keep their order.
 
     Args:
         chosen: (ngeom,) bool.
-        depth_m: (ngeom,).
+        depth_m: (ngeom,) depth of each geom.
     """
     selection = np.flatnonzero(chosen)
     return np.asarray(selection[np.argsort(depth_m[selection], kind="stable")])

@@ -1,4 +1,4 @@
-"""Display colours for the classic renderer, which knows neither sRGB nor a tone curve."""
+"""Display colours for the classic renderer, which supports neither sRGB nor a tone curve."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from gear.camera.response import encode_srgb
 from gear.contracts.rendering import has_own_colour
 
 SHADOW_REACH_M = 50.0
-"""Half the side in metres of the square in front of the camera on which the sun casts shadows."""
+"""Half the side of the square in front of the camera in which the sun casts shadows, metres."""
 
 SHADOW_MAP_PX = 2048
-"""Side of the shadow map: five centimetres per texel. Twice as many take a tenth of a frame's time more."""
+"""Side of the shadow map in texels, five centimetres each. Twice as many would make a frame a tenth slower."""
 
 LIFT = 2.4
-"""Factor by which the darkest colours are lifted, as the tone curve does with Filament's frames.
+"""Factor by which the darkest colours are brightened, like the tone curve does with Filament's frames.
 
-More light would clip white, such as that of a patch, so colours of the town are lifted instead; faces are not.
+The colours of the town are brightened instead of its light, because more light would clip white, such as that of a
+patch. Patches are not brightened.
 """
 
 
@@ -36,9 +37,10 @@ def has_linear_colours(model: mujoco.MjModel) -> bool:
 def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
     """A copy of a model whose colours are display values.
 
-    OpenGL would decode a texture that is marked sRGB and show the linear result unencoded, far too dark. In the copy
-    such textures are not marked, linear colours of geoms and materials are encoded, and both are lifted. Lights of type
-    `image`, which MuJoCo's OpenGL lacks, are off; of the headlight only the ambient light stays.
+    OpenGL would decode a texture that is marked sRGB and show the linear result without encoding it, far too dark. In
+    the copy such textures are not marked, linear colours of geoms and materials are encoded, and both are brightened.
+    Lights of type `image`, which MuJoCo's OpenGL does not support, are off; of the headlight only the ambient light is
+    kept.
     """
     shown = copy.copy(model)
     shown.tex_colorspace[:] = mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
@@ -61,7 +63,7 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def displayed_colour(albedo: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Display values 0..1 of linear albedo 0..1 in full light, elementwise."""
+    """Display values 0..1 for linear albedo 0..1 in full light, elementwise."""
     return _lifted(encode_srgb(albedo))
 
 

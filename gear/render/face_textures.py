@@ -1,4 +1,4 @@
-"""The textures through which surfaces' faces show patches."""
+"""The textures by which the faces of surfaces show patches."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ def texture_of_face(model: mujoco.MjModel, geom_id: int) -> int:
 
 
 def checked_faces(model: mujoco.MjModel, faces: Mapping[int, UInt8Image]) -> dict[int, tuple[int, UInt8Image]]:
-    """Checks the faces of a stage.
+    """Checks the patches of a stage.
 
     Args:
         model: the compiled world.
         faces: (H, W, 3) uint8 sRGB by geom id.
 
     Returns:
-        By geom id: the id of the texture that the face replaces, and the face.
+        For each geom id: the id of the texture that is replaced, and the patch.
 
     Raises:
-        ValueError: a face is not uint8 or not of its texture's size.
+        ValueError: a patch is not uint8, or does not have the size of its texture.
     """
     checked = {}
     for geom_id, srgb in faces.items():

@@ -1,13 +1,13 @@
-"""The physically based renderer: Filament on Vulkan, through MuJoCo's `mjrf`.
+"""The physically based renderer Filament on Vulkan, through MuJoCo's module `mjrf`.
 
-Filament's post-processing is off: it dithers by frame number and detects edges by contrast, so a frame would depend on
-earlier frames, and a patch could change pixels that do not show it. Without it frames are linear and repeatable;
-supersampling and gear's camera pipeline replace it.
+Filament's post-processing is off. It dithers by frame number and detects edges by contrast, so a frame would depend on
+earlier frames, and a patch could change pixels that do not show it. Without it, frames are linear and repeatable;
+supersampling and gear's camera pipeline take its place.
 
-Filtering of a face's texture (measured): texels are decoded from sRGB, then filtered trilinearly over mip levels of
-2 x 2 averages, in linear light; the texture repeats. The level is isotropic, log2 of the longer of a pixel's two edges
-in texels, so a slanted face is blurred more than its longer direction needs. The classic renderer does the same with
-undecoded bytes.
+A patch's texture is filtered as follows (measured). Texels are decoded from sRGB and then filtered trilinearly in
+linear light, over mip levels of 2 x 2 averages; the texture repeats. The level is isotropic: log2 of the longer of a
+pixel's two edges in texels. A slanted patch is therefore blurred more than necessary along its shorter direction on the
+texture. The classic renderer does the same with bytes that are not decoded.
 """
 
 from __future__ import annotations
@@ -44,17 +44,17 @@ _FACE_TEXTURES_KEPT = 16
 _M_ARENA_MAX = -8
 _WHITE = np.ones(4, np.float32)
 _FRAMES_TO_SETTLE = 24
-"""Frames after which Filament frees its upload buffers: a quarter of the memory that a town takes."""
+"""Number of frames after which Filament frees its upload buffers, a quarter of the memory for a town."""
 
 _FIRST_LOOK = CameraRecord(
     name="first", width_px=16, height_px=16, focal_px=8.0, world_from_camera=Pose(position_m=(0.0, 0.0, -1e5))
 )
-"""A camera so far away that nothing is drawn: even at this size, drawing a town takes two cores 0.15 s."""
+"""A camera so far away that nothing is drawn. Drawing a town, even at this small size, would take two cores 0.15 s."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Target:
-    """A render target and the buffer into which its pixels are read."""
+    """A render target, and the buffer into which its pixels are read."""
 
     handle: Any
     read: Any
@@ -62,13 +62,13 @@ class _Target:
 
 
 class FilamentRenderer:
-    """One Vulkan context with one model in it. Not for use from several threads."""
+    """A Vulkan context with one model in it. Not thread-safe."""
 
     def __init__(self, model: mujoco.MjModel, *, quality: Quality = "film") -> None:
-        """Starts the context.
+        """Opens the Vulkan context.
 
         Raises:
-            BackendError: there is no Vulkan driver, or this MuJoCo has no Filament.
+            BackendError: there is no Vulkan driver, or this build of MuJoCo has no Filament.
         """
         self._closed = True
         self._model = model
@@ -107,10 +107,10 @@ class FilamentRenderer:
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """One raw view per camera; see `gear.contracts.rendering.Renderer`.
+        """Renders one raw view for each camera; `gear.contracts.rendering.Renderer` documents the arguments.
 
         Raises:
-            ValueError: the stage belongs to another model, or a face does not fit its texture.
+            ValueError: the stage belongs to another model, or a patch does not have the size of its texture.
         """
         if stage.model is not self._model:
             raise ValueError("the stage was compiled as another model than the renderer was opened for")
@@ -121,7 +121,7 @@ class FilamentRenderer:
         return tuple(self._view(camera, shape, colour=colour) for camera, shape in zip(cameras, known, strict=True))
 
     def close(self) -> None:
-        """Frees the context; safe to call twice."""
+        """Frees the context; may be called twice."""
         if self._closed:
             return
         self._closed = True
@@ -133,7 +133,7 @@ class FilamentRenderer:
         del self._resources, self._context
 
     def _set_paint_and_faces(self, stage: Stage) -> None:
-        """Sets paint and faces. `ModelRenderables.update` has just reset those of the last stage."""
+        """Sets paint colours and patches. `ModelRenderables.update` has just reset those of the last stage."""
         for geom_id, rgb in stage.paint_rgb.items():
             renderable = self._renderable(geom_id)
             material = renderable.get_material()
@@ -197,7 +197,7 @@ class FilamentRenderer:
         return ids_from_rgb(self._pixels(camera, "SEGMENTATION_BY_ID", "RGB8"))
 
     def _pixels(self, camera: CameraRecord, mode: str, pixel_format: str, *, scale: int = 1) -> npt.NDArray[Any]:
-        """One pass. The returned buffer is overwritten by the next pass of its size and format."""
+        """Runs one pass. The next pass with the same size and format overwrites the returned buffer."""
         width, height = camera.width_px * scale, camera.height_px * scale
         target = self._target(width, height, pixel_format)
         request = self._mjrf.RenderRequest()
@@ -248,10 +248,13 @@ class FilamentRenderer:
 
 
 def _start() -> tuple[Any, list[str], dict[str, bool]]:
-    """MuJoCo's Filament module, messages so far, and whether each device is software, by name.
+    """Loads Filament.
+
+    Returns:
+        MuJoCo's Filament module, the messages so far, and for each device by name whether it is a software renderer.
 
     Raises:
-        BackendError: Filament cannot start here.
+        BackendError: Filament cannot start on this machine.
     """
     _share_one_heap()
     with native_output() as chatter:
@@ -270,7 +273,7 @@ def _start() -> tuple[Any, list[str], dict[str, bool]]:
 
 
 def _share_one_heap() -> None:
-    """Makes the driver's threads share one heap: separate heaps would each keep the most that they ever needed.
+    """Makes the driver's threads share one heap. With separate heaps, each would keep as much memory as it ever needed.
 
     Only glibc has separate heaps.
     """
@@ -280,7 +283,7 @@ def _share_one_heap() -> None:
 
 
 def _info(chatter: list[str], software_by_device: dict[str, bool]) -> RendererInfo:
-    """Driver and device from Filament's messages; without messages, the first device."""
+    """Driver and device, from Filament's messages; without messages, the first device."""
     text = "\n".join(chatter)
     driver = re.search(r"Vulkan device driver: (.+)", text)
     chosen = re.search(r"Selected physical device '(.+)' from", text)

@@ -1,6 +1,6 @@
-"""An OpenGL context without a window: through EGL where it works, else through OSMesa.
+"""Opens an OpenGL context without a window: through EGL if it works, otherwise through OSMesa.
 
-Where none starts, errors name the cause: a setting of the environment, or the package that is missing.
+If none can be opened, the error names the cause: an environment variable, or a missing package.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ _SETTINGS = ("MUJOCO_GL", "PYOPENGL_PLATFORM")
 
 
 def backend_setting() -> str | None:
-    """The environment variable that chooses between EGL and OSMesa in this process; None where none does.
+    """Name of the environment variable that selects EGL or OSMesa in this process; None if no variable does.
 
-    PyOpenGL binds a process to one platform for good, and writes `PYOPENGL_PLATFORM` when it does.
+    PyOpenGL binds a process to one platform for its whole life, and sets `PYOPENGL_PLATFORM` when it does.
     """
     for name in _SETTINGS:
         if os.environ.get(name, "").strip().lower() in ("egl", "osmesa"):
@@ -34,13 +34,13 @@ def backend_setting() -> str | None:
 
 
 def choose_backend(renderer: str) -> str:
-    """`egl` or `osmesa`: what the environment asks for, else what works on this machine, EGL first.
+    """`egl` or `osmesa`: the one that the environment selects, otherwise the first one that works on this machine.
 
     Args:
-        renderer: name of the renderer that needs a context, for the error.
+        renderer: name of the renderer that needs a context, for error messages.
 
     Raises:
-        BackendError: neither works; says what to install.
+        BackendError: neither works; the message says what to install.
     """
     setting = backend_setting()
     if setting is not None:
@@ -54,14 +54,14 @@ def choose_backend(renderer: str) -> str:
 
 
 def open_context(backend: str, renderer: str) -> Any:
-    """A current OpenGL context: MuJoCo's own `GLContext`.
+    """Opens an OpenGL context (MuJoCo's own `GLContext`) and makes it current.
 
     Args:
         backend: `egl` or `osmesa`.
-        renderer: name of the renderer that needs it, for the error.
+        renderer: name of the renderer that needs it, for error messages.
 
     Raises:
-        BackendError: the driver is missing, or `MUJOCO_EGL_DEVICE_ID` names no device.
+        BackendError: the driver is missing, or `MUJOCO_EGL_DEVICE_ID` is not the number of a device.
     """
     try:
         if backend == "egl":
@@ -78,7 +78,7 @@ def open_context(backend: str, renderer: str) -> Any:
 
 
 def _cause(backend: str, error: Exception) -> tuple[str, str]:
-    """Why a context did not start, and what to do."""
+    """Why a context could not be opened, and what to do."""
     text = str(error).splitlines()[0] if str(error) else type(error).__name__
     if backend != "egl":
         return f"OSMesa does not start ({text})", _OSMESA
@@ -96,7 +96,7 @@ def _cause(backend: str, error: Exception) -> tuple[str, str]:
 
 
 def egl_problem() -> tuple[str, str] | None:
-    """What is missing for EGL without a display, and what to install; None where a device initialises."""
+    """What is missing for EGL without a display, and what to install; None if a device initialises."""
     if not _loads("libEGL.so.1"):
         return "the EGL library libEGL.so.1 is not installed", _NO_LIBRARY
     devices = _egl_devices()
@@ -108,13 +108,15 @@ def egl_problem() -> tuple[str, str] | None:
 
 
 def _remedy(install: str, *settings: str) -> str:
-    """What to install; first, which settings of the environment to unset where they hide what is installed."""
+    """What to install. If settings of the environment hide what is installed, the text first says which ones to
+    unset.
+    """
     found = [name for name in settings if os.environ.get(name)]
     return f"unset {' and '.join(found)}, or {install}" if found else install
 
 
 def driver_and_device() -> tuple[str, str]:
-    """Names that the current context's driver (with its version) and device report."""
+    """Name of the current context's driver (with version) and of its device."""
     from OpenGL import GL  # type: ignore[import-untyped]
 
     version, device = GL.glGetString(GL.GL_VERSION), GL.glGetString(GL.GL_RENDERER)
@@ -122,7 +124,7 @@ def driver_and_device() -> tuple[str, str]:
 
 
 def is_software(device: str) -> bool:
-    """Whether a device's name is that of one of Mesa's CPU drivers."""
+    """Whether a device's name is that of a CPU driver of Mesa."""
     return any(word in device.casefold() for word in ("llvmpipe", "softpipe", "swrast", "software"))
 
 
@@ -136,7 +138,7 @@ def _loads(library: str) -> bool:
 
 
 def _egl_devices() -> list[int]:
-    """Handles of EGL's devices; empty where EGL cannot list any."""
+    """Handles of EGL's devices; empty if EGL cannot list devices."""
     library = ctypes.CDLL("libEGL.so.1")
     library.eglGetProcAddress.restype = ctypes.c_void_p
     query = library.eglGetProcAddress(b"eglQueryDevicesEXT")

@@ -1,4 +1,4 @@
-"""Linear frames, 0..`LINEAR_FULL_SCALE`, from a renderer's 8-bit samples."""
+"""Combines a renderer's 8-bit samples to linear frames in 0..`LINEAR_FULL_SCALE`."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from gear.values.frames import FloatImage, IdImage, UInt8Image, UInt16Image
 _BAND_ROWS = 64
 
 EDGE_DEPTH_STEP = 0.02
-"""A pixel is on an edge where the second difference of inverse depth exceeds this share of its inverse depth."""
+"""A pixel lies on an edge if the second difference of inverse depth exceeds this share of its inverse depth."""
 
 
 def sum_2x2(samples: UInt8Image) -> UInt16Image:
-    """(2H, 2W, 3) uint8 samples to (H, W, 3) uint16: the sum of each block of four."""
+    """Sums each block of 2 x 2 samples: (2H, 2W, 3) uint8 to (H, W, 3) uint16."""
     height, width = samples.shape[0] // 2, samples.shape[1] // 2
     sums = np.empty((height, width, 3), np.uint16)
     # In bands: the intermediate array of a whole frame would be as large as the samples.
@@ -27,20 +27,21 @@ def sum_2x2(samples: UInt8Image) -> UInt16Image:
 
 
 def four_times(samples: UInt8Image) -> UInt16Image:
-    """(H, W, 3) uint8 to uint16 with the same full scale as the sum of four samples."""
+    """Multiplies (H, W, 3) uint8 by four, to uint16: the same full scale as the sum of four samples."""
     return np.left_shift(samples, 2, dtype=np.uint16)
 
 
 def smooth_edges(linear_rgb: UInt16Image, geom_id: IdImage, depth_m: FloatImage) -> UInt16Image:
-    """The edge filter of `fast`: a 3 x 3 tent (1 2 1) where ids change or depth bends, nothing elsewhere.
+    """The edge filter of quality `fast`: a 3 x 3 tent filter (1 2 1) where ids change or depth bends; other pixels are
+    unchanged.
 
-    Edges come from ids and depth alone and the filter is linear, so frames stay linear in every albedo: unlike a filter
-    that detects contrast, it cannot be influenced by a patch.
+    Edges are found by ids and depth alone and the filter is linear, so frames stay linear in every albedo. A patch
+    cannot influence it, unlike a filter that detects contrast.
 
     Args:
         linear_rgb: (H, W, 3) uint16.
-        geom_id: (H, W) int32, -1 where nothing is.
-        depth_m: (H, W) float32, NaN where nothing is.
+        geom_id: (H, W) int32, -1 where nothing was hit.
+        depth_m: (H, W) float32, NaN where nothing was hit.
 
     Returns:
         (H, W, 3) uint16, a new array.
@@ -51,9 +52,11 @@ def smooth_edges(linear_rgb: UInt16Image, geom_id: IdImage, depth_m: FloatImage)
 
 
 def edge_mask(geom_id: IdImage, depth_m: FloatImage) -> npt.NDArray[np.uint8]:
-    """(H, W) uint8, 255 where the 4-neighbourhood holds another geom, or a silhouette or crease of the same one.
+    """(H, W) uint8: 255 where one of the four neighbours shows another geom, or a silhouette or crease of the same
+    geom; 0 elsewhere.
 
-    On every plane 1/z is linear over the picture: a second difference that is not zero is no plane.
+    On a plane 1/z is linear over the picture, so a second difference of 1/z other than zero means that the surface is
+    not a plane.
     """
     edges = np.zeros(geom_id.shape, np.bool_)
     across, down = geom_id[:, 1:] != geom_id[:, :-1], geom_id[1:] != geom_id[:-1]
@@ -72,7 +75,7 @@ def ids_from_rgb(pixels: UInt8Image) -> IdImage:
     """Decodes ids from colours.
 
     Args:
-        pixels: (H, W, 3) uint8 that count r + 256 g + 65536 b = id + 1.
+        pixels: (H, W, 3) uint8 with r + 256 g + 65536 b = id + 1.
 
     Returns:
         (H, W) int32, -1 where the picture is black.

@@ -24,8 +24,8 @@ def native_output(descriptors: tuple[int, ...] = (1, 2)) -> Iterator[list[str]]:
     """Catches what native code prints to stdout and stderr, at the level of file descriptors.
 
     Yields:
-        A list that holds the lines of known chatter afterwards; every other line is passed on to where it was meant
-        for.
+        A list. When the context ends, it contains the known informational lines; all other lines are written to their
+        original stream.
     """
     chatter: list[str] = []
     _flush()
@@ -50,7 +50,7 @@ def native_output(descriptors: tuple[int, ...] = (1, 2)) -> Iterator[list[str]]:
 
 
 def _flush() -> None:
-    """Empties Python's buffers and C's, which holds what is printed back wherever stdout is no terminal."""
+    """Flushes Python's buffers and C's buffers; C holds printed text back if stdout is not a terminal."""
     sys.stdout.flush()
     sys.stderr.flush()
     ctypes.CDLL(None).fflush(None)

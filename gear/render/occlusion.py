@@ -1,7 +1,7 @@
-"""Ambient occlusion from depth: corners, kerbs and the ground under cars are darker than open surfaces.
+"""Ambient occlusion from depth: corners, kerbs and the ground under cars become darker than open surfaces.
 
-Filament's ambient occlusion is off in gear's worlds: with Mesa's software Vulkan (22.3) it leaks about a megabyte per
-frame. This one serves all renderers. It depends on depth alone, so frames stay linear in every albedo.
+Filament's own ambient occlusion is off, because with Mesa's software Vulkan (22.3) it leaks about a megabyte per frame.
+This one works for all renderers. It depends on depth alone, so frames stay linear in every albedo.
 """
 
 from __future__ import annotations
@@ -20,22 +20,23 @@ _DIRECTIONS = 6
 _COARSE_WIDTH_PX = 700
 _BAND_ROWS = 64
 _MAX_REACH = 0.06
-"""Samples are taken no farther away than this share of the picture's width."""
+"""Largest distance of samples from their pixel, as a share of the picture's width."""
 
 
 def openness(depth_m: FloatImage, focal_px: float) -> FloatImage:
-    """Ambient visibility of each pixel.
+    """Ambient visibility of each pixel: the factor by which occlusion reduces light.
 
-    Around a pixel, pairs of opposite neighbours are compared with it. On a plane 1/z is linear over the picture, so
-    the mean of a pair lies on the plane, whatever its slant; where the mean is nearer, the surface is concave. Pairs
-    that reach something more than a radius away are ignored: an object does not darken a distant wall behind it.
+    Each pixel is compared with pairs of opposite neighbours. On a plane 1/z is linear over the picture, so the mean of
+    a pair lies on the plane, whatever its slant. If the mean is nearer than the pixel, the surface is concave there.
+    Pairs with a neighbour that is more than a radius away are ignored: an object does not darken a distant wall behind
+    it.
 
     Args:
-        depth_m: (H, W) float32 planar z, NaN where nothing is.
-        focal_px: horizontal focal length.
+        depth_m: (H, W) float32 planar z, NaN where nothing was hit.
+        focal_px: horizontal focal length, pixels.
 
     Returns:
-        (H, W) float32 in 1 - `STRENGTH`..1, by which light is multiplied.
+        (H, W) float32 in 1 - `STRENGTH`..1.
     """
     height, width = depth_m.shape
     step = max(1, math.ceil(width / _COARSE_WIDTH_PX))
@@ -60,7 +61,9 @@ def openness(depth_m: FloatImage, focal_px: float) -> FloatImage:
 def _pair(
     inverse: FloatImage, columns: FloatImage, rows: FloatImage, across: FloatImage, down: FloatImage, limit: FloatImage
 ) -> FloatImage:
-    """(h, w) 0..1: how far the mean of two opposite neighbours is in front of the pixel, in halves of a radius."""
+    """(h, w) 0..1: how far the mean of two opposite neighbours lies in front of the pixel, in units of half a
+    radius.
+    """
     one, other = (
         cv2.remap(inverse, columns + s * across, rows + s * down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         for s in (np.float32(1), np.float32(-1))
@@ -73,7 +76,7 @@ def _pair(
 
 
 def shade(linear_rgb: UInt16Image, share: npt.NDArray[np.float32]) -> UInt16Image:
-    """(H, W, 3) uint16 light times (H, W) float32 shares, rounded; a new array."""
+    """Multiplies (H, W, 3) uint16 light by (H, W) float32 factors and rounds; a new array."""
     shaded = np.empty_like(linear_rgb)
     # In bands, since the shares of a whole picture, once for each colour, take more memory than the picture.
     for top in range(0, len(share), _BAND_ROWS):

@@ -1,4 +1,4 @@
-"""View volumes of pinhole cameras, and depth buffers in metres."""
+"""View volumes of pinhole cameras, and conversion of depth buffers to metres."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ from gear.values.scene import CameraRecord
 
 NEAR_M = 0.1
 FAR_M = 2000.0
-"""Limits of what is rendered, in metres. Reversed depth in 32-bit floats keeps its precision over this range."""
+"""Farthest distance that is rendered, metres. Reversed depth in 32-bit floats keeps its precision over this range."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frustum:
-    """The view volume of a pinhole in the world.
+    """The view volume of a pinhole camera, in world coordinates.
 
     Attributes:
-        position_world_m: (3,) the camera's centre.
+        position_world_m: (3,) centre of the camera.
         forward_world, up_world: (3,) unit vectors.
-        half_width_m, half_height_m: half the size of the picture on the near plane, `NEAR_M` ahead.
-        centre_right_m, centre_up_m: the picture's middle on the near plane, to the right of and above the optical
-            axis; 0 where the principal point is the middle of the picture.
+        half_width_m, half_height_m: half the size of the picture on the near plane, which is `NEAR_M` in front of the
+            camera.
+        centre_right_m, centre_up_m: position of the picture's middle on the near plane, to the right of and above the
+            optical axis; 0 if the principal point is the middle of the picture.
     """
 
     position_world_m: Array
@@ -38,7 +39,7 @@ class Frustum:
 
     @staticmethod
     def of(camera: CameraRecord) -> Frustum:
-        """The frustum of a camera's pinhole; the centre of the picture's first pixel is at index (0, 0)."""
+        """The view volume of a camera's pinhole; index (0, 0) is the centre of the picture's first pixel."""
         world_from_camera, pinhole = camera.world_from_camera_transform, camera.intrinsics
         return Frustum(
             position_world_m=world_from_camera.translation_m,
@@ -51,7 +52,7 @@ class Frustum:
         )
 
     def slice_corners(self, begin_m: float, end_m: float) -> Array:
-        """(8, 3) corners in the world of the part of the view between two distances along the optical axis."""
+        """(8, 3) corners, world coordinates, of the part of the view between two distances along the optical axis."""
         right = np.cross(self.forward_world, self.up_world)
         rays = [
             self.forward_world
@@ -64,13 +65,13 @@ class Frustum:
 
 
 def depth_from_reversed(reversed_depth: npt.NDArray[np.float32]) -> FloatImage:
-    """Planar z in metres from a reversed depth buffer (1 at `NEAR_M`, 0 at `FAR_M` and where nothing was drawn).
+    """Converts a reversed depth buffer (1 at `NEAR_M`, 0 at `FAR_M` and where nothing was drawn) to planar z in metres.
 
     Args:
-        reversed_depth: (H, W) float32; overwritten.
+        reversed_depth: (H, W) float32 depth d; it is overwritten.
 
     Returns:
-        The same array: z = n f / (n + d (f - n)), NaN where d is 0.
+        The same array with z = n f / (n + d (f - n)), where n is `NEAR_M` and f is `FAR_M`; NaN where d is 0.
     """
     depth_m = reversed_depth
     nothing = depth_m <= 0

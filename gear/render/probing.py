@@ -1,4 +1,4 @@
-"""Tests whether a renderer works on this machine, by one small reference frame."""
+"""Tests whether a renderer works on this machine, with a small reference frame."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ _REFERENCE_MJCF = """
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProbeResult:
-    """The outcome of rendering the reference frame.
+    """The result of rendering the reference frame.
 
     Attributes:
         info: name, driver and device of the renderer.
         sha256: hash of the linear picture, the depth and the ids, little-endian, in this order.
-        start_s: seconds to start the context.
-        frame_s: seconds for the second frame; the first one compiles shaders.
+        start_s: time to start the renderer, seconds.
+        frame_s: time for the second frame, seconds; the first one also compiles shaders.
     """
 
     info: RendererInfo
@@ -59,8 +59,8 @@ def probe(name: str, *, quality: Quality = "film") -> ProbeResult:
     """Renders the reference frame twice.
 
     Raises:
-        UnknownNameError: there is no such renderer.
-        BackendError: it cannot start here; says what to install.
+        UnknownNameError: there is no renderer with this name.
+        BackendError: it cannot start on this machine; the message says what to install.
     """
     model = mujoco.MjModel.from_xml_string(_REFERENCE_MJCF)
     data = mujoco.MjData(model)
@@ -101,11 +101,12 @@ _CAMERA = CameraRecord(
 
 @cache
 def renderer_info(name: str) -> RendererInfo:
-    """Name, driver and device of a renderer, without a frame; cached, since a renderer has to be started for it.
+    """Name, driver and device of a renderer, without rendering a frame. The renderer must be started for it, so the
+    result is cached.
 
     Raises:
-        UnknownNameError: there is no such renderer.
-        BackendError: it cannot start here; says what to install.
+        UnknownNameError: there is no renderer with this name.
+        BackendError: it cannot start on this machine; the message says what to install.
     """
     renderer = open_renderer(name, mujoco.MjModel.from_xml_string(_REFERENCE_MJCF))
     try:

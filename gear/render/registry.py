@@ -1,4 +1,4 @@
-"""Renderers by name."""
+"""Finds renderers by name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import mujoco
 
 RENDERERS = ("raster", "filament", "classic")
-"""Names of renderers, the default first."""
+"""Names of all renderers; the first one is the default."""
 
 _SUMMARIES = {
     "filament": "physically based, MuJoCo's, through Vulkan: a GPU, or the CPU with Mesa's llvmpipe",
@@ -21,16 +21,16 @@ _SUMMARIES = {
 
 
 def open_renderer(name: str, model: mujoco.MjModel, *, quality: Quality = "film") -> Renderer:
-    """A renderer for one compiled model; close it when done.
+    """Makes a renderer for one compiled model. The caller closes it.
 
     Args:
         name: one of `RENDERERS`.
         model: the compiled world; every stage must be of this model, which is never changed.
-        quality: `film` takes several samples per pixel, `fast` takes one and smooths edges.
+        quality: `film` takes several samples per pixel; `fast` takes one and smooths edges.
 
     Raises:
-        UnknownNameError: there is no such renderer.
-        BackendError: it cannot start here; says what to install.
+        UnknownNameError: there is no renderer with this name.
+        BackendError: it cannot start on this machine; the message says what to install.
     """
     if name == "filament":
         from gear.render.filament import FilamentRenderer
@@ -48,10 +48,10 @@ def open_renderer(name: str, model: mujoco.MjModel, *, quality: Quality = "film"
 
 
 def describe(name: str) -> str:
-    """A description of a renderer in one line.
+    """A one-line description of a renderer.
 
     Raises:
-        UnknownNameError: there is no such renderer.
+        UnknownNameError: there is no renderer with this name.
     """
     if name not in _SUMMARIES:
         raise UnknownNameError("renderer", name, RENDERERS)

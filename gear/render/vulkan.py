@@ -1,4 +1,4 @@
-"""Lists Vulkan devices. Filament ends the process where there is none, so gear checks first."""
+"""Lists Vulkan devices. gear checks first that there is one, because Filament ends the process otherwise."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 _CPU_DEVICE = 4
 _SUCCESS = 0
 _PROPERTIES_BYTES = 4096
-"""More than sizeof(VkPhysicalDeviceProperties); only its first fields are read."""
+"""Size of a buffer for `VkPhysicalDeviceProperties`, larger than the struct; only its first fields are read."""
 
 
 class _InstanceCreateInfo(ctypes.Structure):
@@ -41,7 +41,7 @@ class VulkanDevice:
 
     Attributes:
         name: name that the driver reports.
-        is_software: whether it is a CPU.
+        is_software: whether the device is a CPU.
     """
 
     name: str

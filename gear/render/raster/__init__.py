@@ -1,8 +1,9 @@
-"""gear's physically based OpenGL renderer: it shows a street as Filament does, in a fraction of the time.
+"""gear's own physically based OpenGL renderer: its pictures of streets look like Filament's and take a fraction of the
+time.
 
 Filament shades every sample with one general shader that is compiled into MuJoCo. This renderer has a shader for each
-kind of material, draws ids and depth first so that hidden surfaces are not shaded, draws the shadows of static objects
-once, and sums light in 16 bits instead of eight.
+kind of material. It draws ids and depth first, so that hidden surfaces are not shaded, draws the shadows of static
+objects only once, and sums light in 16 bits instead of eight.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ _OTHERS = "use --renderer filament or classic"
 
 
 def open_raster(model: mujoco.MjModel, *, quality: Quality = "film") -> RasterRenderer:
-    """The renderer for one model, in its own OpenGL context.
+    """Makes a renderer for one model, in an OpenGL context of its own.
 
     Args:
         model: the compiled world; it is not changed.
         quality: see `gear.contracts.rendering.Quality`.
 
     Raises:
-        BackendError: there is no driver of OpenGL 4.5 for EGL; says which setting or package is the reason.
+        BackendError: EGL has no driver for OpenGL 4.5; the message names the setting or the missing package.
     """
     backend = choose_backend("raster")
     if backend != "egl":

@@ -1,4 +1,4 @@
-"""Mip levels of cube maps: rough surfaces reflect the coarser ones.
+"""Mip levels of cube maps, of which rough surfaces reflect the coarser ones.
 
 Faces are in OpenGL's and MuJoCo's order: +x, -x, +y, -y, +z, -z of a cube whose y axis points up in the world and whose
 z axis points south.
@@ -10,10 +10,10 @@ from gear.values.geometry import Array
 
 
 def mip_chain(radiance: Array) -> tuple[Array, ...]:
-    """The mip levels of a cube map by means of 2 x 2 texels.
+    """The mip levels of a cube map; each texel is the mean of 2 x 2 texels of the previous level.
 
     Args:
-        radiance: (6, n, n, 3) float64.
+        radiance: (6, n, n, 3) float64, the finest level.
 
     Returns:
         (6, n, n, 3), (6, n // 2, n // 2, 3), ..., (6, 1, 1, 3).

@@ -1,4 +1,4 @@
-"""Triangles of a model's geoms in the form that OpenGL draws: one vertex buffer, one index buffer, draw commands."""
+"""Triangles of a model's geoms in the form that OpenGL draws: one vertex buffer, one index buffer and draw commands."""
 
 from __future__ import annotations
 
@@ -13,32 +13,34 @@ from gear.render.raster.primitives import Triangles, height_field, primitive
 from gear.values.geometry import Array
 
 VERTEX = np.dtype([("position_m", "<f4", 3), ("normal", "<i2", 4), ("texcoord", "<f4", 2)])
-"""Memory layout of a vertex; normals are scaled to 32767."""
+"""Memory layout of a vertex; components of normals are multiplied by 32767."""
 
 DRAW_COMMAND = np.dtype([(name, "<u4") for name in ("count", "instances", "first", "base", "piece")])
-"""Memory layout of an indirect draw command (`DrawElementsIndirectCommand`); `piece` is its base instance."""
+"""Memory layout of an indirect draw command (OpenGL's `DrawElementsIndirectCommand`); `piece` is its base instance."""
 
 _MESHES = (int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_SDF))
 _PLANE, _FIELD = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
 _BITS = 21
 _CELL_M = 48.0
 _WHOLE = 512
-"""Meshes with fewer triangles are not cut into pieces: a draw command costs about as much as these."""
+"""Meshes with fewer triangles are not cut into pieces, because a draw command costs about as much as so many
+triangles.
+"""
 
 _Key = tuple[int, int, tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Geometry:
-    """Triangles of all geoms, P pieces small enough for those outside of the view to be skipped.
+    """Triangles of all geoms in P pieces, so that pieces outside the view can be skipped.
 
     Attributes:
-        vertices: (V,) `VERTEX`.
-        indices: (I,) uint32, three for a triangle.
-        commands: (P,) `DRAW_COMMAND`, piece by piece, in the order of geoms.
-        geoms: (P,) id of the geom that the piece belongs to.
-        centres_m: (P, 3) of spheres about the pieces, in the frames of their geoms.
-        radii_m: (P,) of these spheres.
+        vertices: (V,) of type `VERTEX`.
+        indices: (I,) uint32, three for each triangle.
+        commands: (P,) of type `DRAW_COMMAND`, one for each piece, in the order of geoms.
+        geoms: (P,) id of the geom to which each piece belongs.
+        centres_m: (P, 3) centres of bounding spheres of the pieces, in the frames of their geoms.
+        radii_m: (P,) radii of these spheres.
     """
 
     vertices: npt.NDArray[np.void]
@@ -51,7 +53,9 @@ class Geometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shape:
-    """Triangles that geoms share, and their pieces as in `Geometry`, counted from the shape's own first index."""
+    """Triangles that several geoms share, and their pieces as in `Geometry`, with indices counted from the
+    shape's first index.
+    """
 
     vertices: npt.NDArray[np.void]
     indices: npt.NDArray[np.uint32]
@@ -61,11 +65,11 @@ class _Shape:
 
 
 def geometry_of(model: mujoco.MjModel, drawn: npt.NDArray[np.bool_]) -> Geometry:
-    """Triangles of the geoms that are drawn; geoms of one shape share its triangles.
+    """Collects the triangles of the geoms that are drawn; geoms with equal shapes share triangles.
 
     Args:
         model: the compiled world.
-        drawn: (ngeom,) bool, which geoms are drawn.
+        drawn: (ngeom,) bool: which geoms are drawn.
 
     Raises:
         ValueError: a mesh has more than two million vertices.
@@ -103,7 +107,7 @@ def geometry_of(model: mujoco.MjModel, drawn: npt.NDArray[np.bool_]) -> Geometry
 
 
 def _key(model: mujoco.MjModel, geom: int) -> _Key:
-    """A key that geoms with equal triangles and texture coordinates share."""
+    """A key that is equal for geoms with equal triangles and texture coordinates."""
     kind = int(model.geom_type[geom])
     if kind in _MESHES:
         return kind, int(model.geom_dataid[geom]), (), ()
@@ -120,7 +124,7 @@ def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
 
 
 def _texture_repeats(model: mujoco.MjModel, geom: int) -> Array:
-    """(2,) how often a texture repeats over a primitive: `texrepeat`, per metre with `texuniform`."""
+    """(2,) how often a texture repeats over a primitive: `texrepeat`, which is per metre if `texuniform` is set."""
     material = int(model.geom_matid[geom])
     if material < 0:
         return np.ones(2)
@@ -134,7 +138,7 @@ def _texture_repeats(model: mujoco.MjModel, geom: int) -> Array:
 
 
 def _mesh(model: mujoco.MjModel, index: int) -> Triangles:
-    """A mesh, with a vertex for each combination of place, normal and texture coordinate."""
+    """The triangles of a mesh, with one vertex for each combination of position, normal and texture coordinate."""
     faces = slice(int(model.mesh_faceadr[index]), int(model.mesh_faceadr[index] + model.mesh_facenum[index]))
     if max(int(of[index]) for of in (model.mesh_vertnum, model.mesh_normalnum, model.mesh_texcoordnum)) >= 1 << _BITS:
         raise ValueError(f"mesh {model.mesh(index).name!r} is too large; cut it into several")
@@ -156,7 +160,9 @@ def _mesh(model: mujoco.MjModel, index: int) -> Triangles:
 
 
 def _shape(triangles: Triangles) -> _Shape:
-    """Vertices and indices for the device, cut into pieces by a grid of `_CELL_M` metres."""
+    """Converts triangles to vertices and indices for the graphics device, cut into pieces by a grid of `_CELL_M`
+    metres.
+    """
     vertices = np.zeros(len(triangles.positions_m), VERTEX)
     vertices["position_m"] = triangles.positions_m
     vertices["normal"][:, :3] = np.round(32767 * triangles.normals)
@@ -181,7 +187,9 @@ def _shape(triangles: Triangles) -> _Shape:
 
 
 def _spheres(points_m: Array, starts: npt.NDArray[np.int64]) -> tuple[Array, Array]:
-    """Bounding spheres of runs of points: (P, 3) centres of their boxes, (P,) distances of the farthest points."""
+    """Bounding spheres of consecutive runs of points: (P, 3) centres of their bounding boxes, (P,) distances of
+    the farthest points.
+    """
     if len(starts) < 2:
         return np.zeros((0, 3)), np.zeros(0)
     low, high = (ufunc.reduceat(points_m, starts[:-1]) for ufunc in (np.minimum, np.maximum))

@@ -1,4 +1,4 @@
-"""Wrappers of the parts of OpenGL 4.5 that this renderer uses: programs, buffers, render targets, textures."""
+"""Wrappers for the parts of OpenGL 4.5 that this renderer uses: programs, buffers, render targets, textures."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _REMEDY = "update the driver, or use --renderer filament"
 
 
 def require_version() -> None:
-    """Refuses a current context without OpenGL 4.5.
+    """Checks that the current context has OpenGL 4.5.
 
     Raises:
-        BackendError: says what the driver has.
+        BackendError: it has a lower version; the message names it.
     """
     words = _text(GL.glGetString(GL.GL_VERSION))
     found = re.match(r"(\d+)\.(\d+)", words)
@@ -32,17 +32,18 @@ def require_version() -> None:
 
 
 class Program:
-    """A vertex and a fragment shader, compiled and linked."""
+    """A compiled and linked pair of a vertex and a fragment shader."""
 
     def __init__(self, vertex: str, fragment: str, flags: tuple[str, ...] = ()) -> None:
-        """Compiles two shaders of this folder, each after `frame.glsl`, those of geoms after `pose.glsl` too.
+        """Compiles two shaders of this folder. `frame.glsl` is put before each, and `pose.glsl` too before those that
+        draw geoms.
 
         Args:
-            vertex, fragment: names of files, without `.glsl`.
+            vertex, fragment: names of the files, without `.glsl`.
             flags: preprocessor definitions for both, such as `SHADOWS` or `LIGHTS 2`.
 
         Raises:
-            BackendError: they do not compile; has the driver's message.
+            BackendError: they do not compile; the message is the driver's.
         """
         self.handle = GL.glCreateProgram()
         head = _VERSION + "".join(f"#define {flag}\n" for flag in flags) + _source("frame")
@@ -61,10 +62,10 @@ class Program:
             raise BackendError("raster", f"{vertex}.glsl with {fragment}.glsl: {said}", _REMEDY)
 
     def use(self, **matrices: npt.NDArray[np.float64]) -> None:
-        """Makes the program current and sets uniforms.
+        """Makes the program current and sets its uniforms.
 
         Args:
-            **matrices: by name: (4, 4) and (3, 3) matrices, or vectors of four numbers.
+            **matrices: values by name: (4, 4) or (3, 3) matrices, or vectors of four numbers.
         """
         GL.glUseProgram(self.handle)
         for name, matrix in matrices.items():
@@ -79,7 +80,7 @@ class Program:
 
 
 def static_buffer(content: npt.NDArray[Any]) -> int:
-    """OpenGL's name of a new buffer with constant content."""
+    """Makes a buffer with constant content and returns its OpenGL name."""
     buffer = np.zeros(1, np.uint32)
     GL.glCreateBuffers(1, buffer)
     if content.nbytes:
@@ -88,7 +89,7 @@ def static_buffer(content: npt.NDArray[Any]) -> int:
 
 
 class StreamBuffer:
-    """A buffer that is filled again for each frame."""
+    """A buffer whose content is replaced in each frame."""
 
     def __init__(self, target: int) -> None:
         self._target = target
@@ -107,8 +108,8 @@ class RenderTarget:
     """A framebuffer with a colour (or id) texture and a depth texture.
 
     Attributes:
-        handle, colour, depth: OpenGL's names of the framebuffer and its textures; 0 for a texture that it lacks.
-        width, height: pixels.
+        handle, colour, depth: OpenGL names of the framebuffer and of its textures; 0 for a missing texture.
+        width, height: size in pixels.
     """
 
     handle: int
@@ -119,13 +120,13 @@ class RenderTarget:
 
     @staticmethod
     def create(width: int, height: int, colour_format: int | None, depth: int | None = None) -> RenderTarget:
-        """A new render target.
+        """Makes a render target.
 
         Args:
             width: pixels.
             height: pixels.
             colour_format: OpenGL's internal format of the colour texture; None for no colour.
-            depth: a depth texture to share; 0 for no depth; None for a new 32-bit one.
+            depth: OpenGL name of a depth texture to share; 0 for no depth; None for a new 32-bit depth texture.
         """
         frame = np.zeros(1, np.uint32)
         GL.glCreateFramebuffers(1, frame)
@@ -141,10 +142,10 @@ class RenderTarget:
         return RenderTarget(handle, colour, depth, width, height)
 
     def bind(self, part: tuple[int, int, int, int] | None = None) -> None:
-        """Makes the target current, with viewport and scissors.
+        """Makes the target current and sets viewport and scissors.
 
         Args:
-            part: left, top, width and height in pixels to draw into; None for the whole target.
+            part: left, top, width and height in pixels of the part to draw into; None for the whole target.
         """
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.handle)
         rectangle = part or (0, 0, self.width, self.height)
@@ -153,14 +154,14 @@ class RenderTarget:
 
 
 def upload_texture(content: npt.NDArray[np.uint8], *, is_srgb: bool) -> int:
-    """Uploads a 2D texture with mip levels; it repeats and is filtered trilinearly.
+    """Uploads a 2D texture with mip levels. It repeats and is filtered trilinearly.
 
     Args:
         content: (H, W, C) uint8 with one to four channels; one channel is read as grey.
         is_srgb: whether the bytes are sRGB-encoded.
 
     Returns:
-        OpenGL's name of the texture.
+        OpenGL name of the texture.
     """
     height, width, channels = content.shape
     texture = _texture(GL.GL_TEXTURE_2D)
@@ -180,7 +181,7 @@ def upload_texture(content: npt.NDArray[np.uint8], *, is_srgb: bool) -> int:
 
 
 def upload_cubemap(levels: tuple[npt.NDArray[Any], ...]) -> int:
-    """Uploads a cube map from its mip levels, (6, n, n, 3) linear floats each; returns its name."""
+    """Uploads a cube map from its mip levels, (6, n, n, 3) linear floats each; returns its OpenGL name."""
     texture = _texture(GL.GL_TEXTURE_CUBE_MAP)
     size = levels[0].shape[1]
     GL.glTextureStorage2D(texture, len(levels), GL.GL_RGBA16F, size, size)
@@ -194,7 +195,9 @@ def upload_cubemap(levels: tuple[npt.NDArray[Any], ...]) -> int:
 
 
 def upload_table(content: npt.NDArray[Any]) -> int:
-    """Uploads a lookup table of (H, W, 2) floats, filtered bilinearly and clamped at its borders; returns its name."""
+    """Uploads a lookup table of (H, W, 2) floats, filtered bilinearly and clamped at its borders; returns its
+    OpenGL name.
+    """
     height, width = content.shape[:2]
     texture = _texture(GL.GL_TEXTURE_2D)
     GL.glTextureStorage2D(texture, 1, GL.GL_RG16F, width, height)
@@ -210,7 +213,9 @@ def upload_table(content: npt.NDArray[Any]) -> int:
 
 
 def shadow_map(width: int, height: int) -> int:
-    """A depth texture with comparison: a read returns the lit share, and 1 beyond the borders; returns its name."""
+    """Makes a depth texture with comparison: a read returns the lit share, and 1 outside the borders. Returns
+    its OpenGL name.
+    """
     texture = _texture(GL.GL_TEXTURE_2D)
     GL.glTextureStorage2D(texture, 1, GL.GL_DEPTH_COMPONENT32F, width, height)
     for name, value in (
@@ -227,7 +232,7 @@ def shadow_map(width: int, height: int) -> int:
 
 
 def free_textures(textures: list[int]) -> None:
-    """Frees textures by OpenGL's names."""
+    """Frees textures, given by their OpenGL names."""
     GL.glDeleteTextures(len(textures), np.array(textures, np.uint32))
 
 

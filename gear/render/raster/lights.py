@@ -1,4 +1,4 @@
-"""Lights of a model in units of the frame: a radiance of 1 is full scale."""
+"""Lights of a model, in units of the frame: a radiance of 1 is full scale."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ MIN_SUN = 1e-3
 _TYPE = mujoco.mjtLightType
 
 DIRECTIONAL_SHARE = 0.2
-"""Share of the difference between two opposite faces of the environment map in the irradiance along their axis."""
+"""Share of the radiance difference between two opposite faces of the environment map that appears in the
+irradiance along their axis.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,7 +29,8 @@ class Environment:
     """Light from all directions.
 
     Attributes:
-        irradiance: (4, 3) float64, RGB irradiance divided by pi: the mean, and its slopes along the normal's x, y, z.
+        irradiance: (4, 3) float64 irradiance divided by pi, as a linear function of the normal. The rows are the mean
+            and the slopes along the normal's x, y, z; the columns are red, green, blue.
         levels: mip levels of the environment map, (6, n, n, 3) radiance each; empty for a model without one.
     """
 
@@ -37,12 +40,13 @@ class Environment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lights:
-    """Distant lights and point lights, N of them.
+    """N distant lights and point lights.
 
     Attributes:
-        towards: (N, 4) float64: a unit vector towards a distant light and 0, or a point light's world position and 1.
+        towards: (N, 4) float64. For a distant light: the unit vector towards it, and 0. For a point light: its world
+            position, and 1.
         light: (N, 3) float64 RGB: irradiance of a distant light, intensity of a point light.
-        casts_shadows: whether the first one casts shadows that can be seen.
+        casts_shadows: whether the first light casts visible shadows.
     """
 
     towards: Array
@@ -51,7 +55,7 @@ class Lights:
 
 
 def environment_of(model: mujoco.MjModel, faces_of: dict[int, Array]) -> Environment:
-    """The first active light of type `image`; without one the environment is black.
+    """The environment from the first active light of type `image`; black if there is none.
 
     Args:
         model: the compiled world.
@@ -66,7 +70,7 @@ def environment_of(model: mujoco.MjModel, faces_of: dict[int, Array]) -> Environ
 
 
 def irradiance_over_pi(radiance: Array) -> Array:
-    """Irradiance over pi as a linear function of the normal, fitted to what Filament shows.
+    """Irradiance divided by pi as a linear function of the normal, fitted to Filament's result.
 
     Args:
         radiance: (6, n, n, 3) faces of the environment map.
@@ -80,14 +84,14 @@ def irradiance_over_pi(radiance: Array) -> Array:
 
 
 def lights_of(model: mujoco.MjModel, data: mujoco.MjData) -> Lights:
-    """The first `MAX_LIGHTS` active lights that are not images; one that casts shadows comes first.
+    """The first `MAX_LIGHTS` active lights that are not images; a light that casts shadows comes first.
 
-    Only distant lights cast shadows, and point lights shine in all directions. A light without an intensity lights a
-    surface that faces it with its diffuse colour; for a point light, at a distance of one metre.
+    Only distant lights cast shadows, and point lights shine in all directions. A light without an intensity gives its
+    diffuse colour as irradiance to a surface that faces it; a point light does so at a distance of one metre.
 
     Args:
         model: the compiled world.
-        data: its positions; lights are up to date.
+        data: MuJoCo data of the model; positions and lights must be up to date.
     """
     lit = np.flatnonzero((model.light_type != _TYPE.mjLIGHT_IMAGE) & model.light_active & _shines(model))
     is_far = model.light_type[lit] == _TYPE.mjLIGHT_DIRECTIONAL

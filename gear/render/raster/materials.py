@@ -14,10 +14,10 @@ from gear.render.display_colours import has_linear_colours
 from gear.values.geometry import Array
 
 TEXTURE_ROLES = {"HAS_BASE": "RGB", "HAS_NORMAL": "NORMAL", "HAS_ORM": "ORM", "HAS_EMISSIVE": "EMISSIVE"}
-"""MuJoCo's texture roles by the flag that a shader is compiled with, in the order of its samplers."""
+"""MuJoCo's texture roles by the preprocessor flag of the shaders, in the order of the shaders' samplers."""
 
 DIELECTRIC = 0.04
-"""Reflectance at normal incidence (f0) of everything but metal."""
+"""Reflectance at normal incidence (f0) of all materials except metal."""
 
 _DEFAULT_SHININESS = 0.5
 _MOST_SHININESS = 128
@@ -25,13 +25,13 @@ _MOST_SHININESS = 128
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeomMaterials:
-    """Materials, one row per geom.
+    """Materials, one row for each geom.
 
     Attributes:
         albedo: (ngeom, 3) float32, linear RGB.
         surface: (ngeom, 4) float32: perceptual roughness, metallic, emission, reflectance at normal incidence.
         textures: (ngeom, 4) int32 texture ids in the order of `TEXTURE_ROLES`, -1 for none.
-        is_invisible: (ngeom,) bool, whether the geom is fully transparent.
+        is_invisible: (ngeom,) bool: whether the geom is fully transparent.
     """
 
     albedo: npt.NDArray[np.float32]
@@ -41,10 +41,11 @@ class GeomMaterials:
 
 
 def materials_of(model: mujoco.MjModel) -> GeomMaterials:
-    """Materials of a model's geoms, without the paint and faces of a stage.
+    """Materials of all geoms as the model has them, without the colours and patches that each sample changes
+    (`Stage.paint_rgb`, `Stage.faces`).
 
-    A material without roughness has Phong's shininess instead; its highlight is as wide as that of a perceptual
-    roughness of (2 / (2 + 128 shininess)) ^ (1/4). Geoms that are partly transparent are drawn as opaque.
+    If a material has no roughness, it follows from Phong's shininess: (2 / (2 + 128 shininess)) ^ (1/4) is the
+    perceptual roughness with an equally wide highlight. Partly transparent geoms are drawn as opaque.
     """
     material = model.geom_matid
     bare = material < 0
@@ -65,7 +66,7 @@ def materials_of(model: mujoco.MjModel) -> GeomMaterials:
 
 
 def _surfaces(model: mujoco.MjModel) -> npt.NDArray[np.float32]:
-    """(nmat, 4) float32: `GeomMaterials.surface` of each material."""
+    """(nmat, 4) float32 surface parameters of each material, in the columns of `GeomMaterials.surface`."""
     rough, metallic = model.mat_roughness, model.mat_metallic
     return np.stack(
         [

@@ -13,8 +13,9 @@ from gear.values.geometry import Array
 
 _AROUND, _UPWARDS = 48, 24
 _BOX_TEXTURE = ((1, 2), (0, 2), (0, 1))
-"""Along which axis u grows, and against which v does, on the sides of a box that look along x, y, z: as MuJoCo has it,
-on opposite sides the same."""
+"""For the sides of a box that face along x, y and z: the axis along which u increases, and the axis against
+which v increases. As in MuJoCo, opposite sides have the same axes.
+"""
 
 _GEOM = mujoco.mjtGeom
 
@@ -24,10 +25,10 @@ class Triangles:
     """An indexed triangle mesh with V vertices and T triangles.
 
     Attributes:
-        positions_m: (V, 3) metres.
-        normals: (V, 3) unit vectors.
-        texcoords: (V, 2) texture coordinates; v grows downwards.
-        corners: (T, 3) int64 vertex indices, counter-clockwise seen from outside.
+        positions_m: (V, 3) positions, metres.
+        normals: (V, 3) unit normals.
+        texcoords: (V, 2) texture coordinates; v increases downwards.
+        corners: (T, 3) int64 vertex indices, counter-clockwise as seen from outside.
     """
 
     positions_m: Array
@@ -37,11 +38,11 @@ class Triangles:
 
 
 def primitive(kind: int, size_m: Array) -> Triangles:
-    """Triangles of one of MuJoCo's primitive shapes, in the geom's frame.
+    """Triangles of a primitive shape of MuJoCo, in the geom's frame.
 
     Args:
         kind: an `mjtGeom`: plane, sphere, capsule, ellipsoid, cylinder or box.
-        size_m: (3,) as `geom_size`.
+        size_m: (3,) sizes as in MuJoCo's `geom_size`.
 
     Raises:
         ValueError: the kind is not a primitive.
@@ -104,7 +105,7 @@ def _box(half_m: Array) -> Triangles:
 
 
 def _capsule_profile(radius_m: float, half_length_m: float) -> tuple[Array, Array]:
-    """Profile of a capsule: (N, 2) radius and height from the lower pole to the upper one, and its normals."""
+    """Profile of a capsule from its lower to its upper pole: (N, 2) radius and height, and (N, 2) normals."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, _UPWARDS + 1)
     normals = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     if half_length_m:
@@ -115,11 +116,11 @@ def _capsule_profile(radius_m: float, half_length_m: float) -> tuple[Array, Arra
 
 
 def _surface_of_revolution(profile: tuple[Array, Array], scale: Array) -> Triangles:
-    """A surface of revolution about z, then scaled along the axes.
+    """A surface of revolution about z, scaled along the axes afterwards.
 
     Args:
         profile: (N, 2) radius and height from bottom to top, and (N, 2) normals.
-        scale: (3,).
+        scale: (3,) factors along x, y and z.
     """
     points, slopes = profile
     around = np.linspace(0, 2 * np.pi, _AROUND + 1)
@@ -147,7 +148,7 @@ def _cylinder(radius_m: float, half_length_m: float) -> Triangles:
 
 
 def _grid(positions_m: Array, normals: Array) -> Triangles:
-    """Triangles of a grid of (rows, columns, 3) points; seen from outside, columns go right and rows go up."""
+    """Triangles of a grid of (rows, columns, 3) points. Seen from outside, columns go right and rows go up."""
     rows, columns = positions_m.shape[:2]
     u, v = np.meshgrid(np.linspace(0, 1, columns), np.linspace(1, 0, rows))
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1)

@@ -1,4 +1,4 @@
-"""The renderer: a pass for ids and depth, shadow maps, and a colour pass over what is visible."""
+"""The renderer: a pass for ids and depth, passes for shadow maps, and a colour pass over the visible pieces."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _FULL = 65535
 
 
 class RasterRenderer:
-    """One OpenGL context with one model in it. Not for use from several threads."""
+    """An OpenGL context with one model in it. Not thread-safe."""
 
     def __init__(self, model: mujoco.MjModel, context: Any, *, quality: Quality = "film") -> None:
         """Uploads a model into a context.
@@ -41,7 +41,7 @@ class RasterRenderer:
             quality: see `gear.contracts.rendering.Quality`.
 
         Raises:
-            BackendError: the driver has less than OpenGL 4.5.
+            BackendError: the driver does not support OpenGL 4.5.
             ValueError: a mesh has more than two million vertices.
         """
         self._closed = True
@@ -83,10 +83,10 @@ class RasterRenderer:
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """One raw view per camera; see `gear.contracts.rendering.Renderer`.
+        """Renders one raw view for each camera; `gear.contracts.rendering.Renderer` documents the arguments.
 
         Raises:
-            ValueError: the stage belongs to another model, or a face does not fit its texture.
+            ValueError: the stage belongs to another model, or a patch does not have the size of its texture.
             RuntimeError: the renderer is closed.
         """
         if self._closed:
@@ -102,7 +102,7 @@ class RasterRenderer:
         )
 
     def close(self) -> None:
-        """Frees the context; safe to call twice."""
+        """Frees the context; may be called twice."""
         if self._closed:
             return
         self._closed = True
@@ -134,7 +134,7 @@ class RasterRenderer:
         return RawView(linear_rgb=linear_rgb, depth_m=depth_m, geom_id=geom_id)
 
     def _render_ids(self, size: tuple[int, int], seen: Selection, frustum: Frustum) -> gl.RenderTarget:
-        """Draws ids of pieces and depth at a size in pixels; the returned target is current."""
+        """Draws ids of pieces, and depth, at a size in pixels; the returned target is current."""
         target = self._target("truth", size, GL.GL_R32I)
         target.bind()
         _depth_state(GL.GL_GREATER, writes=True)
@@ -163,13 +163,13 @@ class RasterRenderer:
     def _render_colour(
         self, size: tuple[int, int], seen: Selection, frustum: Frustum, truth: gl.RenderTarget | None
     ) -> gl.RenderTarget:
-        """Draws colour; the returned target is current and may not be finished yet.
+        """Draws colour. The returned target is current, and the device may still be drawing.
 
         Args:
             size: width and height of the picture in pixels.
             seen: pieces to draw, near ones first.
             frustum: the camera's view volume.
-            truth: ids and depth of this picture where they have just been drawn, else None.
+            truth: ids and depth of this picture if they have just been drawn, otherwise None.
         """
         is_film = self._quality == "film"
         samples = (2 * size[0], 2 * size[1]) if is_film else size
@@ -192,7 +192,7 @@ class RasterRenderer:
         return target
 
     def _draw_sky(self, frustum: Frustum) -> None:
-        """Draws the sky where depth is still that of infinity."""
+        """Draws the sky where no surface was drawn."""
         if not self._scene.sky:
             return
         _depth_state(GL.GL_EQUAL, writes=False)
@@ -205,7 +205,7 @@ class RasterRenderer:
         GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
 
     def _downsampled(self, samples: gl.RenderTarget) -> gl.RenderTarget:
-        """The means of blocks of 2 x 2 samples; the returned target is current."""
+        """Averages blocks of 2 x 2 samples; the returned target is current."""
         half = self._target("half", (samples.width // 2, samples.height // 2), GL.GL_RGBA16, 0)
         half.bind()
         _depth_state(GL.GL_ALWAYS, writes=False)
@@ -222,7 +222,7 @@ class RasterRenderer:
 
 
 def _pieces(truth: gl.RenderTarget) -> npt.NDArray[np.int32]:
-    """(H, W) int32 ids of pieces in the current target, -1 for nothing."""
+    """(H, W) int32 ids of pieces in the current target, -1 where nothing was drawn."""
     pieces = np.empty((truth.height, truth.width), np.int32)
     GL.glReadPixels(0, 0, truth.width, truth.height, GL.GL_RED_INTEGER, GL.GL_INT, pieces)
     return pieces
@@ -241,7 +241,7 @@ def _depth_state(compare: int, *, writes: bool) -> None:
 
 
 def _clip_matrix(frustum: Frustum) -> Array:
-    """(4, 4) from positions relative to the camera, in the world's axes, to clip space with reversed depth."""
+    """(4, 4) matrix from positions relative to the camera (world axes) to clip space with reversed depth."""
     right = np.cross(frustum.forward_world, frustum.up_world)
     span_m = FAR_M - NEAR_M
     matrix = np.zeros((4, 4))

@@ -77,7 +77,7 @@ class Scene:
         self._light_flags: tuple[str, ...] = ("LIGHTS 0",)
 
     def set_faces(self, stage: Stage) -> None:
-        """Uses the faces of a stage as textures, instead of those of the last stage."""
+        """Makes the faces show the patches of a stage instead of those of the last stage."""
         self._face_of_geom = self._textures.faces(stage.faces)
 
     def set_poses(self, stage: Stage, camera_m: Array) -> None:
@@ -85,7 +85,7 @@ class Scene:
 
         Args:
             stage: the posed world.
-            camera_m: (3,) world position that positions are relative to.
+            camera_m: (3,) world position to which all positions are relative.
         """
         geoms = np.zeros(stage.model.ngeom, _PIECE)
         geoms["camera_from_geom"][..., :3] = stage.data.geom_xmat.reshape(-1, 3, 3)
@@ -104,7 +104,7 @@ class Scene:
 
         Args:
             lights: distant lights and point lights.
-            maps: shadow maps of the first light; None where it casts no shadows.
+            maps: shadow maps of the first light; None if it casts no shadows.
             camera_m: (3,) world position of the camera.
         """
         frame = np.zeros(1, _FRAME)
@@ -127,19 +127,19 @@ class Scene:
         self._light_flags = (f"LIGHTS {count}", *(("SHADOWS",) if maps is not None else ()))
 
     def spheres(self, stage: Stage) -> tuple[Array, Array]:
-        """Bounding spheres of the P pieces: (P, 3) centres in the world and (P,) radii, metres."""
+        """Bounding spheres of the P pieces: (P, 3) centres in world coordinates and (P,) radii, metres."""
         centres_m, radii_m = self._spheres
         turns = stage.data.geom_xmat.reshape(-1, 3, 3)[self.geom_of_piece]
         return np.einsum("pij,pj->pi", turns, centres_m) + stage.data.geom_xpos[self.geom_of_piece], radii_m
 
     def present(self, stage: Stage) -> Mask:
-        """(P,) bool, the pieces of geoms that a stage shows."""
+        """(P,) bool: which pieces belong to geoms that a stage shows."""
         if stage.is_absent is None:
             return np.ones(len(self.geom_of_piece), np.bool_)
         return np.asarray(~stage.is_absent[self.geom_of_piece])
 
     def sample_vertices(self, stage: Stage, chosen: Mask) -> Array:
-        """(N, 3) world positions of a few vertices of each chosen piece; the origin where none is chosen."""
+        """(N, 3) world positions of a few vertices of each chosen piece; the origin if no piece is chosen."""
         marks_m = self._samples_m[chosen]
         geoms = self.geom_of_piece[chosen]
         turns = stage.data.geom_xmat.reshape(-1, 3, 3)[geoms]
@@ -150,7 +150,7 @@ class Scene:
         """Draws pieces with the current program, without materials, in the given order.
 
         Args:
-            selection: indices of pieces.
+            selection: indices of the pieces.
         """
         self._submit([(selection, None)])
 
@@ -158,8 +158,8 @@ class Scene:
         """Draws pieces with their materials.
 
         Args:
-            selection: indices of pieces; their order is kept within each material.
-            matrix: (4, 4) from positions relative to the camera to clip space.
+            selection: indices of the pieces; pieces of the same material keep their order.
+            matrix: (4, 4) matrix from positions relative to the camera to clip space.
             flags: preprocessor definitions for all shaders.
         """
         geoms = self.geom_of_piece[selection]
@@ -169,7 +169,7 @@ class Scene:
         self._submit([(group, (matrix, flags)) for group in groups])
 
     def _submit(self, groups: list[tuple[Selection, tuple[Array, tuple[str, ...]] | None]]) -> None:
-        """One draw call per group, from one buffer of commands."""
+        """Issues one draw call for each group, from one buffer of commands."""
         if not any(len(group) for group, _ in groups):
             return
         self._draws.upload(self._commands[np.concatenate([group for group, _ in groups])])

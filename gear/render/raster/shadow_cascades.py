@@ -1,4 +1,4 @@
-"""Cascaded shadow maps of the sun: which part of the world each map covers."""
+"""Cascaded shadow maps of the sun: computes which part of the world each map covers."""
 
 from __future__ import annotations
 
@@ -11,13 +11,17 @@ from gear.render.pinhole import NEAR_M, Frustum
 from gear.values.geometry import Array
 
 CASCADE_ENDS_M = (40.0, 160.0)
-"""Metres ahead of the camera at which the map of everything and the map of what moves end."""
+"""Distances in front of the camera, metres, at which the map of all geoms and the map of moving geoms end."""
 
 TOWARDS_SUN_RANGE_M = 600.0
-"""Metres towards the sun in which a map resolves depth. Casters farther away are clamped and still cast shadows."""
+"""Range of depth of a map towards the sun, metres. Geoms farther towards the sun are clamped to it and still
+cast shadows.
+"""
 
 _MARGIN = 1.005
-"""Factor by which maps are larger than what they must cover, so that filtered reads at their edge stay inside."""
+"""Factor by which maps are larger than the part that they must cover, so that filtered reads at its edge stay
+inside.
+"""
 
 _WIDEST_M = 500.0
 _OUTLIERS = 0.02
@@ -25,13 +29,14 @@ _OUTLIERS = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cascade:
-    """The square across the sun's rays that one shadow map covers.
+    """The square, perpendicular to the sun's rays, that one shadow map covers.
 
     Attributes:
-        centre_m: (3,) its middle in the world.
+        centre_m: (3,) middle of the square, world coordinates.
         axes: (3, 3) rows: two unit vectors across the sun's rays, and one towards the sun.
         half_side_m: half the length of its sides.
-        receivers_m: (N, 3) corners of the convex part of the world on which the map's shadows are seen; None for all.
+        receivers_m: (N, 3) corners of the convex part of the world in which shadows of the map are visible; None for
+            everywhere.
     """
 
     centre_m: Array
@@ -41,23 +46,25 @@ class Cascade:
 
     @property
     def scale(self) -> Array:
-        """(3,) factors from metres along `axes` to -1..1 across the map and 0..1 away from the sun."""
+        """(3,) factors from metres along `axes` to map coordinates: -1..1 across the map, and 0..1 away from the
+        sun.
+        """
         return np.array([1 / self.half_side_m, 1 / self.half_side_m, -1 / (TOWARDS_SUN_RANGE_M + 2 * self.half_side_m)])
 
     def offset(self, origin_m: Array) -> Array:
-        """(3,) offset that is added to scaled positions relative to an origin.
+        """(3,) offset that is added to scaled positions which are relative to an origin.
 
         Args:
-            origin_m: (3,) in the frame of the centre.
+            origin_m: (3,) origin, in the same coordinates as the centre.
         """
         towards_sun = -self.scale[2] * (TOWARDS_SUN_RANGE_M + self.half_side_m)
         return np.asarray((0.0, 0.0, towards_sun) - self.scale * (self.axes @ (self.centre_m - origin_m)))
 
     def seen_part(self, margin_m: float) -> tuple[Array, Array]:
-        """(2,) and (2,) least and largest coordinates, -1..1 across the map, of the shadows that are seen.
+        """(2,) smallest and (2,) largest map coordinates, -1..1, of the shadows that are visible.
 
         Args:
-            margin_m: distance by which the part is enlarged.
+            margin_m: distance by which the visible part of the world is enlarged.
         """
         if self.receivers_m is None:
             return np.full(2, -1.0), np.full(2, 1.0)
@@ -67,10 +74,10 @@ class Cascade:
         return low, high
 
     def matrix(self, origin_m: Array) -> Array:
-        """(4, 4) from positions relative to an origin to coordinates of the map.
+        """(4, 4) matrix from positions relative to an origin to map coordinates.
 
         Args:
-            origin_m: (3,) in the frame of the centre.
+            origin_m: (3,) origin, in the same coordinates as the centre.
         """
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = self.scale[:, None] * self.axes, self.offset(origin_m)
@@ -79,15 +86,16 @@ class Cascade:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShadowMaps:
-    """The three shadow maps in the form that shaders read: of everything near, of what moves, of the whole town.
+    """The three shadow maps in the form that shaders read: of all near geoms, of moving geoms, and of the whole town.
 
     Attributes:
-        axes: (3, 3) rows: the axes that all cascades share.
-        scale: (3, 3) per map: factors from metres along the axes to texture coordinates 0..1 and depth 0..1.
-        offset: (3, 3) per map: added for positions relative to the camera.
+        axes: (3, 3) rows: the axes that all three maps share.
+        scale: (3, 3) one row for each map: factors from metres along the axes to texture coordinates 0..1 and depth
+            0..1.
+        offset: (3, 3) one row for each map: offset for positions relative to the camera.
         texel_m: (3,) side of a texel in metres.
-        end_m: (2,) metres ahead at which the first two maps end.
-        town_ends: texture row, 0..1, at which the town's map ends; the other two lie below it.
+        end_m: (2,) distances in front of the camera, metres, at which the first two maps end.
+        town_ends: texture coordinate 0..1 of the row at which the town's map ends; the other two maps lie below it.
     """
 
     axes: Array
@@ -99,11 +107,11 @@ class ShadowMaps:
 
 
 def view_cascades(frustum: Frustum, towards_sun: Array) -> tuple[Cascade, ...]:
-    """Cascades that hold all that the frustum shows up to each of `CASCADE_ENDS_M`.
+    """The squares that cover everything in the view up to each of `CASCADE_ENDS_M`.
 
     Args:
         frustum: the camera's view volume.
-        towards_sun: (3,) unit vector in the world's axes.
+        towards_sun: (3,) unit vector, world axes.
     """
     axes = _axes(towards_sun)
     made = []
@@ -122,11 +130,11 @@ def view_cascades(frustum: Frustum, towards_sun: Array) -> tuple[Cascade, ...]:
 
 
 def town_cascade(points_m: Array, towards_sun: Array) -> Cascade:
-    """The cascade of a whole town, without outliers far outside of it.
+    """The square that covers the whole town; outliers far outside are ignored.
 
     Args:
-        points_m: (N, 3) some of the town's vertices in the world.
-        towards_sun: (3,) unit vector in the world's axes.
+        points_m: (N, 3) some of the town's vertices, world coordinates.
+        towards_sun: (3,) unit vector, world axes.
     """
     axes = _axes(towards_sun)
     low, high = np.quantile(points_m @ axes.T, (_OUTLIERS, 1 - _OUTLIERS), axis=0)

@@ -1,4 +1,4 @@
-"""The environment BRDF as a table: the second factor of the split-sum approximation (Karis 2013)."""
+"""Table of the environment BRDF, the second factor of the split-sum approximation (Karis 2013)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ _SAMPLES = 32
 
 @cache
 def split_sum_table(size: int = TABLE_PX) -> Array:
-    """Share of uniform light that a rough surface reflects: f0 * scale + offset, f0 being its normal reflectance.
+    """Computes the share of uniform light that a rough surface reflects: f0 * scale + offset, with the reflectance f0
+    at normal incidence.
 
     Args:
-        size: rows and columns of the table.
+        size: number of rows and of columns of the table.
 
     Returns:
-        (size, size, 2) float64, read-only: scale and offset. Rows are perceptual roughness, columns the cosine between
-        the normal and the direction to the camera, both 0..1 at the centres of cells.
+        (size, size, 2) float64, read-only: scale and offset. Rows are perceptual roughness, columns are the cosine
+        between the normal and the direction to the camera; both are 0..1 at the centres of cells.
     """
     middles = (np.arange(size) + 0.5) / size
     cosine = middles[None, :, None]

@@ -1,7 +1,8 @@
-"""Shadow maps of the sun.
+"""Draws the shadow maps of the sun.
 
-Static geoms cast the same shadows in every picture, so one map of the whole town is drawn once. Near the camera it is
-too coarse: a map of everything there, and a farther one of what can move, are drawn for each picture.
+Static geoms cast the same shadows in every picture, so one map of the whole town is drawn only once. Near the camera
+this map is too coarse. Two further maps are therefore drawn for each picture: one of all geoms near the camera, and
+one, reaching farther, of geoms that can move.
 """
 
 from __future__ import annotations
@@ -21,26 +22,28 @@ from gear.values.geometry import Array
 _NEAR_PX, _TOWN_PX = 2048, 4096
 _SIZE_PX = 4096, 6144
 _PARTS_PX = ((0, 4096, _NEAR_PX), (2048, 4096, _NEAR_PX), (0, 0, _TOWN_PX))
-"""Left, top and side in pixels of the three maps in one texture: everything near, what moves, the town."""
+"""Left, top and side in pixels of the three maps in one texture: of all near geoms, of moving geoms, of the town."""
 
 _UNIT = 4
 _SLOPE_BIAS, _UNIT_BIAS = 1.5, 2.0
 _SEEN_TEXELS = 2
-"""Geoms smaller than this many texels of a map cast no shadow in it."""
+"""Geoms that are smaller than this number of texels cast no shadow in a map."""
 
 _READ_TEXELS = 4
-"""Texels beside a surface that its shader may read: 1.5 along the normal, 0.75 aside, and one for the filter."""
+"""Distance in texels from a surface at which its shader may read: 1.5 along the normal, 0.75 to the side, and
+one for the filter.
+"""
 
 
 class SunShadows:
     """The shadow maps of one model."""
 
     def __init__(self, model: mujoco.MjModel, scene: Scene) -> None:
-        """Allocates the texture; the town's map is drawn by the first `draw`.
+        """Allocates the texture. The first call of `draw` draws the town's map.
 
         Args:
             model: the compiled world.
-            scene: the same model on the device.
+            scene: the same model on the graphics device.
         """
         self._model, self._scene = model, scene
         self._program = gl.Program("positions.vert", "depth_only.frag")
@@ -51,12 +54,12 @@ class SunShadows:
         self._town: tuple[Array, Cascade] | None = None
 
     def draw(self, stage: Stage, frustum: Frustum, towards_sun: Array, spheres: tuple[Array, Array]) -> ShadowMaps:
-        """Draws the maps that change with the picture, and binds all of them. The scene must be posed for this camera.
+        """Draws the maps that change with the picture, and binds all three. The scene must be posed for this camera.
 
         Args:
             stage: the posed world that casts shadows.
             frustum: the camera's view volume.
-            towards_sun: (3,) unit vector.
+            towards_sun: (3,) unit vector, world axes.
             spheres: bounding spheres of the pieces, from `Scene.spheres`.
 
         Returns:
@@ -76,7 +79,7 @@ class SunShadows:
         return _maps(cascades, frustum.position_world_m)
 
     def _draw_town(self, towards_sun: Array) -> Cascade:
-        """Draws the map of static geoms at their initial poses, so that it does not depend on the first stage."""
+        """Draws the map of static geoms, at their initial poses so that it does not depend on the first stage."""
         data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, data)
         stage = Stage(model=self._model, data=data)
@@ -128,7 +131,7 @@ def _maps(cascades: tuple[Cascade, ...], camera_m: Array) -> ShadowMaps:
 
 
 def _margin_m(cascade: Cascade, side_px: int) -> float:
-    """Distance in metres from a surface at which its shader may read a map of this side in pixels."""
+    """Distance in metres from a surface at which its shader may read a map whose side is `side_px`."""
     return _READ_TEXELS * 2 * cascade.half_side_m / side_px
 
 
@@ -143,6 +146,6 @@ def _rectangle(cascade: Cascade, part: tuple[int, int, int]) -> tuple[int, int, 
 
 
 def _can_move(model: mujoco.MjModel) -> Mask:
-    """(ngeom,) bool, whether a geom's body can move: it or a parent has a joint, or is a mocap body."""
+    """(ngeom,) bool: whether a geom's body can move, because it or a parent has a joint or is a mocap body."""
     root = model.body_rootid[model.geom_bodyid]
     return np.asarray((model.body_weldid[model.geom_bodyid] != 0) | (model.body_mocapid[root] >= 0))

@@ -1,4 +1,4 @@
-"""Textures of a model, and of the patches on surfaces' faces, on the graphics device."""
+"""Textures on the graphics device: those of a model, and the patches that the faces of surfaces show."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _SKY = int(mujoco.mjtTexture.mjTEXTURE_SKYBOX)
 
 
 class TextureStore:
-    """Device textures: the model's by texture id, faces by content."""
+    """Textures on the graphics device: those of the model by texture id, patches by content."""
 
     def __init__(self, model: mujoco.MjModel, used: list[int]) -> None:
         """Uploads the textures that geoms use.
 
         Args:
             model: the compiled world.
-            used: texture ids; -1 and cube textures are left out.
+            used: texture ids; -1 and cube textures are ignored.
         """
         self._handles = {
             texture: gl.upload_texture(_texels(model, texture), is_srgb=int(model.tex_colorspace[texture]) == _SRGB)
@@ -38,14 +38,15 @@ class TextureStore:
         self._faces: OrderedDict[bytes, int] = OrderedDict()
 
     def of(self, texture: int) -> int:
-        """OpenGL's name of a texture id; 0 for -1 and for cube textures."""
+        """OpenGL name for a texture id; 0 for -1 and for cube textures."""
         return self._handles.get(texture, 0)
 
     def faces(self, srgb_of_geom: Mapping[int, UInt8Image]) -> dict[int, int]:
-        """Uploads faces and returns OpenGL's names of their textures by geom id; valid until the next call.
+        """Uploads patches and returns the OpenGL names of their textures by geom id; they are valid until the next
+        call.
 
         Args:
-            srgb_of_geom: (H, W, 3) uint8 by geom id.
+            srgb_of_geom: (H, W, 3) uint8 sRGB by geom id.
         """
         shown = {geom: self._face(srgb) for geom, srgb in srgb_of_geom.items()}
         idle = [key for key, texture in self._faces.items() if texture not in shown.values()]
@@ -78,7 +79,7 @@ def linear_cubes(model: mujoco.MjModel) -> dict[int, Array]:
 
 
 def sky_of(model: mujoco.MjModel) -> int | None:
-    """The id of the model's sky texture; None for a model without one."""
+    """Id of the model's sky texture; None for a model without a sky."""
     skies = np.flatnonzero(model.tex_type == _SKY)
     return int(skies[0]) if len(skies) else None
 
