@@ -128,3 +128,10 @@ def test_a_plane_through_the_camera_projects_below_the_horizon_only() -> None:
     horizon = pinhole.cy_px + 1.5 / 20 * 20.0
     assert not mask[: int(horizon)].any()
     assert mask[-1].all()
+
+
+def test_an_empty_window_has_a_mask_of_its_own_shape() -> None:
+    triangle = np.array([[[0.0, 0.0], [0.0, 9.0], [9.0, 0.0]]])
+    assert fill(triangle, (0, 5, 7, 5)).shape == (0, 7)
+    assert fill(triangle, (5, 0, 5, 7)).shape == (7, 0)
+    assert fill(triangle, (5, 6, 2, 1)).shape == (0, 0)

@@ -32,12 +32,12 @@ def test_small_pieces_inside_the_box_of_the_rest_are_kept() -> None:
 
 
 def test_a_twentieth_of_the_pixels_is_stray_and_more_is_not() -> None:
-    for pixels, is_stray in ((42, True), (43, False)):
+    for rest, pixels, is_stray in ((800, 42, True), (800, 43, False), (760, 40, True)):
         mask = np.zeros((1, 1000), np.bool_)
-        mask[0, :800] = True
+        mask[0, :rest] = True
         mask[0, 900 : 900 + pixels] = True
         kept, _, _ = without_strays(mask[:, : 900 + pixels])
-        assert (kept.shape[1] == 800) is is_stray
+        assert (kept.shape[1] == rest) is is_stray
 
 
 def test_pieces_that_touch_at_corners_are_one() -> None:
