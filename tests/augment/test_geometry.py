@@ -282,3 +282,13 @@ def test_a_pairs_focal_length_is_that_of_its_columns(scale: float) -> None:
     some = draw_window((HEIGHT, WIDTH), (31, 77), scale, derive_rng(0, "window"), is_centred=True)
     focal_px = moved(sample, some).calibration.intrinsics.focal_px
     assert focal_px == pytest.approx(some.scale_x * sample.calibration.intrinsics.focal_px)
+
+
+@pytest.mark.parametrize("place", [(-60, 0), (60, 0), (0, -30), (0, 30), (-52, -26), (52, 26), (50, 0), (0, 25)])
+def test_a_window_beyond_the_picture_shows_padding_alone(place: tuple[int, int]) -> None:
+    """Also one that touches the picture's border."""
+    picture = np.full((25, 50, 3), 7, np.uint8)
+    beyond = window(*place, 50, 25)
+    assert cut_picture(picture, beyond).shape == (beyond.out_height_px, beyond.out_width_px, 3)
+    assert (cut_picture(picture, beyond) == 114).all()
+    assert (cut_map(picture[..., 0], beyond, 3) == 3).all()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gear.augment.pictures import Colours, recolour
+from gear.values.errors import FieldError
 from gear.values.rng import derive_rng
 
 STILL = {
@@ -100,3 +101,24 @@ def test_what_is_erased_is_a_rectangle_of_at_most_its_share() -> None:
         assert len(rows) >= 0.95 * sizes[-1][0] * sizes[-1][1]
     height, width = np.max(sizes, axis=0)
     assert 12 <= height <= 15 and 20 <= width <= 24
+
+
+@pytest.mark.parametrize(
+    ("names", "least", "most", "beyond"),
+    [
+        (("brightness", "contrast", "saturation", "balance"), 0.0, 0.999, 1.0),
+        (("noise", "blur", "jpeg", "erase", "erase_share"), 0.0, 1.0, 1.001),
+        (("gamma", "noise_levels"), 0.0, 1e6, None),
+        (("blur_px",), 0.0, 100.0, 100.1),
+        (("jpeg_quality",), 1, 100, 101),
+    ],
+)
+def test_each_option_has_its_range(names: tuple[str, ...], least: float, most: float, beyond: float | None) -> None:
+    below = least - 1 if isinstance(least, int) else least - 1e-3
+    for name in names:
+        for value in (least, most):
+            assert getattr(Colours(**{name: value}), name) == value  # type: ignore[arg-type]
+        for value in (below, beyond):
+            if value is not None:
+                with pytest.raises(FieldError, match=name):
+                    Colours(**{name: value})  # type: ignore[arg-type]
