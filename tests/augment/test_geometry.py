@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gear.augment.geometry import Window, cut_map, cut_picture, draw_window
+from gear.augment.geometry import Window, cut_map, cut_picture, draw_window, whole_window
 from gear.augment.registry import geometry_of
 from gear.formats import rle
 from gear.groundtruth.visibility import Visibility
@@ -292,3 +292,25 @@ def test_a_window_beyond_the_picture_shows_padding_alone(place: tuple[int, int])
     assert cut_picture(picture, beyond).shape == (beyond.out_height_px, beyond.out_width_px, 3)
     assert (cut_picture(picture, beyond) == 114).all()
     assert (cut_map(picture[..., 0], beyond, 3) == 3).all()
+
+
+@pytest.mark.parametrize("size_px", [(96, 192), (97, 191), (96, 191)])
+def test_a_centred_window_has_the_nearest_size_that_can_share_the_middle(size_px: tuple[int, int]) -> None:
+    """Widths as even as the picture's, at least one pixel, and the height that belongs to the width."""
+    for scale in (*np.linspace(0.4, 3.0, 40), 500.0):
+        drawn = draw_window(size_px, (64, 128), scale, derive_rng(0, "centred"), is_centred=True)
+        for found, whole, wanted in (
+            (drawn.width_px, size_px[1], 128 / scale),
+            (drawn.height_px, size_px[0], 64 * drawn.width_px / 128),
+        ):
+            candidates = np.arange(2 - whole % 2, 1000, 2)
+            assert found in candidates
+            assert abs(found - wanted) == pytest.approx(np.abs(candidates - wanted).min())
+
+
+def test_a_whole_window_is_the_picture_at_a_share_of_its_size_and_never_less_than_a_pixel() -> None:
+    half = whole_window((97, 192), 0.5)
+    assert (half.left_px, half.top_px, half.width_px, half.height_px) == (0, 0, 192, 97)
+    assert (half.out_width_px, half.out_height_px) == (96, 48)
+    tiny = whole_window((3, 5), 0.05)
+    assert (tiny.out_width_px, tiny.out_height_px) == (1, 1)

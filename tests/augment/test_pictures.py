@@ -122,3 +122,27 @@ def test_each_option_has_its_range(names: tuple[str, ...], least: float, most: f
             if value is not None:
                 with pytest.raises(FieldError, match=name):
                     Colours(**{name: value})  # type: ignore[arg-type]
+
+
+def test_what_is_erased_is_noise_of_all_levels_somewhere_in_the_picture() -> None:
+    """Row and column of the rectangle are drawn each for itself, and so are its height and its width."""
+    places, levels = [], []
+    for number in range(150):
+        picture = changed(np.full((60, 60, 3), 77), number, erase=1.0)
+        rows, columns = np.nonzero((picture != 77).any(axis=2))
+        # Where the rectangle begins, as a share of the room that its size leaves.
+        height, width = np.ptp(rows) + 1, np.ptp(columns) + 1
+        places.append((rows.min() / (60 - height), columns.min() / (60 - width), height, width))
+        levels.append(picture[rows, columns].reshape(-1))
+    drawn = np.corrcoef(np.array(places).T)
+    assert np.abs(drawn - np.eye(4)).max() < 0.35
+    assert np.min(places, axis=0)[:2].max() < 0.1 and np.max(places, axis=0)[:2].min() > 0.9
+    every = np.concatenate(levels)
+    assert (every.min(), every.max()) == (0, 255) and every.mean() == pytest.approx(127.5, abs=3)
+    assert every.std() == pytest.approx(256 / np.sqrt(12), abs=2)
+
+
+def test_the_least_that_is_erased_is_a_pixel() -> None:
+    for number in range(20):
+        picture = changed(np.full((50, 80, 3), 77), number, erase=1.0, erase_share=0.0)
+        assert (picture != 77).any(axis=2).sum() == 1
