@@ -158,6 +158,29 @@ class ChangeCount:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DistanceBin:
+    """The objects found in the twin that lie at some distance from the patch, and how many of them are lost.
+
+    Attributes:
+        low, high: distances in the bin are at least `low` and less than `high`.
+        found: number of objects found in `against`.
+        lost: number of those that are hidden, misclassified or moved, by kind.
+        rate: the lost objects as a share of `found`.
+    """
+
+    low: float
+    high: float
+    found: int
+    lost: Mapping[str, int]
+    rate: Estimate
+
+    def as_json(self) -> Json:
+        """The entry of the bin in results.json; null for a bin without an upper end."""
+        limits = known_json({"low": self.low, "high": self.high})
+        return {**limits, "found": self.found, **self.lost, "rate": self.rate.as_json()}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectChanges:
     """What became of the objects that are found in the twin, and which detections are invented.
 
@@ -165,17 +188,21 @@ class ObjectChanges:
         found: number of objects found in `against`.
         counts: by kind (`gear.metrics.object_changes`) and place: `hidden`, `hidden_on_patch`, `hidden_elsewhere`, ….
         changes: every change, with the index of its sample; empty for a pool.
+        by_distance: objects by their distance from the patch, in bins of `metres` and of `pixels`; objects of pictures
+            without a visible patch are in no bin.
     """
 
     found: int
     counts: Mapping[str, ChangeCount]
     changes: tuple[tuple[int, ObjectChange], ...]
+    by_distance: Mapping[str, tuple[DistanceBin, ...]]
 
     def as_json(self) -> Json:
         """The entry of the objects in results.json."""
         return {
             "found": self.found,
             "counts": {name: one.as_json() for name, one in self.counts.items()},
+            "by_distance": {unit: [one.as_json() for one in bins] for unit, bins in self.by_distance.items()},
             "changes": [{"sample": index, **to_json(one)} for index, one in self.changes],
         }
 

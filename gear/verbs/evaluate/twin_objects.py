@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from gear.measuring.intervals import LEFT_OUT, Interval, Values, jackknife_interval, leave_one_out
 from gear.measuring.statistics import clustered, paired_p
-from gear.metrics.object_changes import CHANGES, Change, ObjectChange, changes, found_in_twin
-from gear.values.picture_objects import PictureOutcomes
-from gear.verbs.evaluate.report import ChangeCount, Estimate, ObjectChanges, PairedTest
+from gear.metrics.object_changes import CHANGES, OF_OBJECTS, Change, ObjectChange, changes, found_in_twin
+from gear.values.picture_objects import ObjectOutcome, PictureOutcomes
+from gear.verbs.evaluate.report import ChangeCount, DistanceBin, Estimate, ObjectChanges, PairedTest
 
 PLACES = ("", "_on_patch", "_elsewhere")
 """Ends of the names of counts: anywhere, on the patch, elsewhere."""
+
+
+BINS = {"metres": (0.0, 5.0, 10.0, 20.0, 40.0, math.inf), "pixels": (0.0, 25.0, 50.0, 100.0, 200.0, math.inf)}
+"""Ends of the bins of distances from the patch (`gear.values.picture_objects.PatchDistance`)."""
 
 
 def object_changes(
@@ -37,7 +42,8 @@ def object_changes(
     pairs = list(zip(here, there, strict=True))
     lost = [changes(now, twin) for now, twin in pairs]
     back = [changes(twin, now) for now, twin in pairs]
-    found = np.array([_places([thing.patch.is_on_patch for thing in found_in_twin(*pair)]) for pair in pairs])
+    things = [found_in_twin(now, twin) for now, twin in pairs]
+    found = np.array([_places([thing.patch.is_on_patch for thing in some]) for some in things])
     kept = [row[row != LEFT_OUT] for row in leave_one_out(streets)]
     counts = {}
     for kind in CHANGES:
@@ -53,7 +59,34 @@ def object_changes(
                 paired=tests[column],
             )
     every = tuple((index, one) for index, some in zip(indices, lost, strict=True) for one in some)
-    return ObjectChanges(found=int(found[:, 0].sum()), counts=counts, changes=every)
+    by_distance = {
+        unit: tuple(_distance_bin(things, unit, low, high, kept) for low, high in pairwise(ends))
+        for unit, ends in BINS.items()
+    }
+    return ObjectChanges(found=int(found[:, 0].sum()), counts=counts, changes=every, by_distance=by_distance)
+
+
+def _distance_bin(
+    pictures: Sequence[Sequence[ObjectOutcome]],
+    unit: str,
+    low: float,
+    high: float,
+    kept: Sequence[npt.NDArray[np.int64]],
+) -> DistanceBin:
+    """The objects of each picture, all of them found in the twin, whose distance from the patch is in a bin."""
+    inside = [
+        [thing for thing in some if (away := getattr(thing.patch, unit)) is not None and low <= away < high]
+        for some in pictures
+    ]
+    found = np.array([len(some) for some in inside], np.float64)
+    lost = np.array([[sum(thing.state == state for thing in some) for state in OF_OBJECTS] for some in inside])
+    return DistanceBin(
+        low=low,
+        high=high,
+        found=int(found.sum()),
+        lost=dict(zip(OF_OBJECTS.values(), lost.sum(axis=0).tolist(), strict=True)),
+        rate=_rate(lost.sum(axis=1, dtype=np.float64), found, kept, (0.0, 1.0)),
+    )
 
 
 def _places(are_on_patch: Sequence[bool]) -> tuple[float, float, float]:

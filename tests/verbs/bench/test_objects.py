@@ -32,6 +32,7 @@ CHANGES = ObjectChanges(
         for i, name in enumerate(NAMES, 1)
     },
     changes=(),
+    by_distance={},
 )
 
 

@@ -80,6 +80,29 @@ def test_counts_rates_intervals_and_tests_by_hand() -> None:
     assert [index for index, one in found.changes if one.change == "invented"] == [7, 9]
 
 
+def test_objects_are_counted_by_their_distance_from_the_patch() -> None:
+    """At 3, 5 and 50 m; of a fourth one nothing is known. The middle one is lost in both pictures, the last in one."""
+
+    def at(metres: float | None) -> PatchDistance:
+        return PatchDistance(is_on_patch=False, pixels=24.99, metres=metres)
+
+    places = [at(3.0), at(5.0), at(50.0), at(None)]
+    twin = [picture([thing(n, "found", place) for n, place in enumerate(places)])] * 2
+    states: list[list[ObjectState]] = [
+        ["found", "missed", "moved", "found"],
+        ["found", "misclassified", "found", "found"],
+    ]
+    now = [picture([thing(n, s, p) for n, (s, p) in enumerate(zip(some, places, strict=True))]) for some in states]
+    bins = object_changes([0, 1], now, twin, ["a", "b"], seed=0).by_distance
+    assert [(one.low, one.high, one.found) for one in bins["metres"]] == [
+        (0, 5, 2), (5, 10, 2), (10, 20, 0), (20, 40, 0), (40, math.inf, 2),
+    ]  # fmt: skip
+    assert bins["metres"][1].lost == {"hidden": 1, "misclassified": 1, "moved": 0}
+    assert [one.rate.value for one in bins["metres"]] == pytest.approx([0, 1, math.nan, math.nan, 0.5], nan_ok=True)
+    assert (bins["pixels"][0].found, bins["pixels"][0].rate.value) == (8, 3 / 8)
+    assert bins["metres"][4].as_json()["high"] is None
+
+
 def test_twins_that_are_equal_differ_in_nothing() -> None:
     some = [picture([thing(1, "found"), thing(2, "missed")], background(HERE)), picture([])]
     found = object_changes([0, 1], some, some, ["a", "b"], seed=0)
@@ -136,6 +159,7 @@ def test_what_a_patch_does_to_a_detector_is_shown(tmp_path: Path, small: Small, 
     single = [note["metrics"] for note in random.per_sample]
     assert [one["task"]["false_alarms"] - one["outside_patch"]["false_alarms"] for one in single] == [1, 0]
 
+    assert sum(one.found for one in found.by_distance["metres"]) == 3
     written = json.loads((tmp_path / "out/results.json").read_text())["differences"][0]["objects"]
     assert written == found.as_json() and written["changes"][0]["sample"] == 0
     note = json.loads((tmp_path / "out" / random.name / "samples/000001.json").read_text())
