@@ -10,6 +10,7 @@ from typing import Any
 
 from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
 from gear.dataset.claims import clear_claims
+from gear.dataset.closing import SidecarStream
 from gear.dataset.failures import clear_failures
 from gear.dataset.files import clear_scratch, inside, read_bytes, sha256, sync_folder, write_whole
 from gear.dataset.guarded_paths import owned, refuse_links, remove_empty_folders, remove_file, remove_files
@@ -241,18 +242,6 @@ class Store:
         write_whole(self.root, sidecar_path(self.split, sample.record.index), sidecar_bytes(sidecar))
         remove_file(self.root, begun)
 
-    def sidecars(self) -> list[Sidecar]:
-        """The sidecars of all samples, in order of index.
-
-        Raises:
-            DatasetError: a sidecar is missing or damaged.
-        """
-        return [read_sidecar(inside(self.root, sidecar_path(self.split, i))) for i in range(self.plan.samples)]
-
-    def _hashes_of_sidecars(self) -> dict[str, str]:
-        paths = [sidecar_path(self.split, index) for index in range(self.plan.samples)]
-        return {relative: sha256(read_bytes(inside(self.root, relative))) for relative in paths}
-
     def _patches(self) -> dict[str, Json]:
         """The manifest's entry for the copies of the patches; empty if the split shows no patch."""
         folder = inside(self.root, patch_path(self.plan.patch["label"], "patch_0.png")).parent
@@ -273,7 +262,8 @@ class Store:
         there = read_plan(self.root, self.split)
         if there is not None and there.samples > self.plan.samples:
             return
-        sidecars = self.sidecars()
+        views = {camera.name for camera in task.rig().cameras}
+        sidecars = SidecarStream(self.root, self.split, self.plan.samples, views)
         indexes: dict[str, str] = {}
         files = sorted(self._indexes(task, sidecars).items())
         begun = begun_path(self.split, "indexes")
@@ -284,23 +274,16 @@ class Store:
             if not (target.exists() and target.read_bytes() == data):
                 write_whole(self.root, relative, data)
             indexes[relative] = sha256(data)
+        listed = sidecars.facts()
         manifest = {
             "format": "gear-dataset",
             "version": 1,
             "twin_key": self.plan.twin_key,
             "content_key": self.plan.content_key,
             **facts,
-            "samples": [
-                {
-                    "index": s.record.index,
-                    "sequence": s.record.sequence,
-                    "frame": s.record.frame,
-                    "files": dict(s.files),
-                }
-                for s in sidecars
-            ],
+            "samples": listed["samples"],
             "indexes": indexes,
-            "sidecars": self._hashes_of_sidecars(),
+            "sidecars": listed["sidecars"],
             **self._patches(),
         }
         data = sealed_json(manifest)
@@ -321,11 +304,6 @@ class Store:
         Raises:
             DatasetError: a sidecar lacks something that the task needs.
         """
-        views = {camera.name for camera in task.rig().cameras}
-        for sidecar in sidecars:
-            lacking = views - {camera.name for camera in sidecar.record.cameras}
-            if lacking:
-                raise self._no_sidecar(sidecar, FieldError("record.cameras", f"there is no {min(lacking)!r}"))
         try:
             return task.finalise(sidecars, self.plan.info)
         except FieldError:  # facts are the task's own, which reads them with `from_json`

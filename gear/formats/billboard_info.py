@@ -9,7 +9,7 @@ false`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -27,12 +27,12 @@ LEVEL_RAD = 1e-4
 
 
 def billboard_info(
-    records: Sequence[SceneRecord], *, task: str, patch_label: str, reference: str, second: str | None = None
+    records: Iterable[SceneRecord], *, task: str, patch_label: str, reference: str, second: str | None = None
 ) -> Json:
     """The content of the file for one split.
 
     Args:
-        records: scene records of the samples, in the loader's order.
+        records: scene records of the samples, in the loader's order; read once, and none is kept.
         task: CARLA-GeAR's name of the task: `ss`, `2dod`, `3dod`, `depth`.
         patch_label: `none`, `random`, or the patch's name and hash.
         reference: name of the camera whose pictures the loader reads.
@@ -40,8 +40,16 @@ def billboard_info(
     """
     second = second or reference
     is_patched = patch_label != "none"
-    entries = [_entry(index, record, reference, second) for index, record in enumerate(records)]
-    boards = max((len(record.surfaces) for record in records), default=0)
+    entries: list[Json] = []
+    boards, is_level, is_symmetric = 0, True, True
+    params: dict[str, Json] = {reference: {}, second: {}}
+    for index, record in enumerate(records):
+        entries.append(_entry(index, record, reference, second))
+        boards = max(boards, len(record.surfaces))
+        is_level &= _is_level(record, (reference, second))
+        is_symmetric &= all(record.camera(name).intrinsics.is_symmetric for name in params)
+        if not index:
+            params = {name: _params(record, name) for name in params}
     info = {
         "task": task,
         "num_billboards": boards,
@@ -50,17 +58,15 @@ def billboard_info(
         "patch_type": ("random" if patch_label == "random" else "adversarial") if is_patched else "none",
         "net": None,
         "creator": "gear",
-        "level": all(_is_level(record, (reference, second)) for record in records),
-        "symmetric": all(
-            record.camera(name).intrinsics.is_symmetric for record in records for name in {reference, second}
-        ),
+        "level": is_level,
+        "symmetric": is_symmetric,
     }
     return {
         "info": info,
         "camera_billboard_positions": entries,
         "patch_mask_corners": {},
-        "camera_params": _params(records, reference),
-        "camera_dx_params": _params(records, second),
+        "camera_params": params[reference],
+        "camera_dx_params": params[second],
     }
 
 
@@ -101,10 +107,8 @@ def _entry(index: int, record: SceneRecord, reference: str, second: str) -> Json
     return entry
 
 
-def _params(records: Sequence[SceneRecord], name: str) -> Json:
-    if not records:
-        return {}
-    camera = records[0].camera(name)
+def _params(record: SceneRecord, name: str) -> Json:
+    camera = record.camera(name)
     return {
         "height": camera.height_px,
         "width": camera.width_px,

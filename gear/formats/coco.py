@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from gear.formats.jsontext import dump
 from gear.values.ground_truth import BoxPx
 from gear.values.serial import Json
 
@@ -106,19 +107,45 @@ def dataset_json(pictures: Sequence[Picture], *, description: str, created: str)
     """
     annotations: list[Json] = []
     for picture in pictures:
-        for item in picture.annotations:
-            annotations.append(
-                {
-                    "id": len(annotations) + 1,
-                    "image_id": picture.id,
-                    "category_id": item.category_id,
-                    "bbox": list(item.box_xywh),
-                    "area": item.area_px,
-                    "segmentation": _segmentation(item, picture),
-                    "iscrowd": int(item.is_crowd),
-                    "gear": item.extras,
-                }
-            )
+        annotations += _annotation_entries(picture, len(annotations) + 1)
+    return {
+        **_head(description, created),
+        "images": [_image_entry(picture, created) for picture in pictures],
+        "annotations": annotations,
+        "categories": list(CATEGORIES),
+    }
+
+
+class DatasetWriter:
+    """Writes an annotation file picture by picture: `dump(dataset_json(...))` without the pictures in memory."""
+
+    def __init__(self, *, description: str, created: str) -> None:
+        """Args:
+        description, created: as of `dataset_json`.
+        """
+        self._description, self._created = description, created
+        self._images: list[bytes] = []
+        self._annotations: list[bytes] = []
+        self._count = 0
+
+    def add(self, picture: Picture) -> None:
+        """Adds the next picture."""
+        self._images.append(dump(_image_entry(picture, self._created)).rstrip(b"\n"))
+        entries = _annotation_entries(picture, self._count + 1)
+        self._count += len(entries)
+        if entries:
+            self._annotations.append(dump(entries).rstrip(b"\n")[1:-1])
+
+    def data(self) -> bytes:
+        """The bytes of the file."""
+        head = dump(_head(self._description, self._created)).rstrip(b"\n")[:-1]
+        images, annotations = b",".join(self._images), b",".join(self._annotations)
+        categories = dump(list(CATEGORIES)).rstrip(b"\n")
+        parts = (head, b',"images":[', images, b'],"annotations":[', annotations, b'],"categories":', categories)
+        return b"".join((*parts, b"}\n"))
+
+
+def _head(description: str, created: str) -> dict[str, Json]:
     return {
         "info": {
             "year": int(created[:4]),
@@ -129,22 +156,36 @@ def dataset_json(pictures: Sequence[Picture], *, description: str, created: str)
             "date_created": created.replace("-", "/"),
         },
         "licenses": [{"id": 1, "name": "unspecified", "url": ""}],
-        "images": [
-            {
-                "id": picture.id,
-                "width": picture.width_px,
-                "height": picture.height_px,
-                "file_name": picture.file_name,
-                "license": 1,
-                "flickr_url": "",
-                "coco_url": "",
-                "date_captured": f"{created} 00:00:00",
-            }
-            for picture in pictures
-        ],
-        "annotations": annotations,
-        "categories": list(CATEGORIES),
     }
+
+
+def _image_entry(picture: Picture, created: str) -> Json:
+    return {
+        "id": picture.id,
+        "width": picture.width_px,
+        "height": picture.height_px,
+        "file_name": picture.file_name,
+        "license": 1,
+        "flickr_url": "",
+        "coco_url": "",
+        "date_captured": f"{created} 00:00:00",
+    }
+
+
+def _annotation_entries(picture: Picture, first_id: int) -> list[Json]:
+    return [
+        {
+            "id": number,
+            "image_id": picture.id,
+            "category_id": item.category_id,
+            "bbox": list(item.box_xywh),
+            "area": item.area_px,
+            "segmentation": _segmentation(item, picture),
+            "iscrowd": int(item.is_crowd),
+            "gear": item.extras,
+        }
+        for number, item in enumerate(picture.annotations, first_id)
+    ]
 
 
 def _segmentation(item: Annotation, picture: Picture) -> Json:

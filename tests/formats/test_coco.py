@@ -3,7 +3,16 @@ from dataclasses import replace
 
 import pytest
 
-from gear.formats.coco import CATEGORIES, CATEGORY_NAMES, Annotation, Detection, Picture, dataset_json, results_json
+from gear.formats.coco import (
+    CATEGORIES,
+    CATEGORY_NAMES,
+    Annotation,
+    DatasetWriter,
+    Detection,
+    Picture,
+    dataset_json,
+    results_json,
+)
 from gear.formats.jsontext import dump
 from gear.values.labels import LABELS
 
@@ -62,3 +71,19 @@ def test_json_text_is_steady() -> None:
     assert json.loads(dump({"a": "ä"})) == {"a": "ä"}
     with pytest.raises(ValueError, match="JSON"):
         dump({"a": float("nan")})
+
+
+def test_a_file_written_picture_by_picture_has_the_same_bytes() -> None:
+    thing = Annotation(
+        category_id=1, box_xywh=(1.0, 2.0, 3.5, 4.0), area_px=9, rle="0n4", is_crowd=True, extras={"ü": 1}
+    )
+    shown = [
+        Picture(id=1, file_name="a.png", height_px=4, width_px=6, annotations=(thing, thing)),
+        Picture(id=2, file_name="b.png", height_px=4, width_px=6, annotations=()),
+        Picture(id=3, file_name="c.png", height_px=4, width_px=6, annotations=(thing,)),
+    ]
+    for pictures in (shown, shown[1:2], []):
+        writer = DatasetWriter(description="é", created="2022-01-01")
+        for picture in pictures:
+            writer.add(picture)
+        assert writer.data() == dump(dataset_json(pictures, description="é", created="2022-01-01"))

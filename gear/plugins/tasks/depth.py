@@ -122,8 +122,8 @@ class DepthTask:
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
         """Writes the file lists and the poses for CARLA-GeAR's loader."""
-        paths = [_paths(info.split, sidecar.record.index) for sidecar in sidecars]
-        records = [sidecar.record for sidecar in sidecars]
+        paths = [_paths(info.split, index) for index in range(len(sidecars))]
+        records = (sidecar.record for sidecar in sidecars)
         poses = billboard_info(records, task="depth", patch_label=info.patch_label, reference=VIEW)
         return {
             # The original's loader takes the file's numbers for metres, so its list names the float pictures.

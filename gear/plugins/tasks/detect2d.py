@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -176,11 +176,16 @@ class Detect2dTask:
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
         """Writes the annotation file under both of its usual names, and the poses for CARLA-GeAR's loader."""
-        pictures = [self._picture(sidecar) for sidecar in sidecars]
         description = f"gear {info.town} {info.scene} {info.split}, patch: {info.patch_label}"
-        annotations = dump(coco.dataset_json(pictures, description=description, created=info.created))
-        records = [sidecar.record for sidecar in sidecars]
-        poses = billboard_info(records, task="2dod", patch_label=info.patch_label, reference=VIEW)
+        writer = coco.DatasetWriter(description=description, created=info.created)
+
+        def records() -> Iterator[SceneRecord]:
+            for sidecar in sidecars:
+                writer.add(self._picture(sidecar))
+                yield sidecar.record
+
+        poses = billboard_info(records(), task="2dod", patch_label=info.patch_label, reference=VIEW)
+        annotations = writer.data()
         return {
             f"annotations/{info.split}/coco_annotations.json": annotations,
             f"annotations/instances_{info.split}.json": annotations,

@@ -136,7 +136,7 @@ class SemsegTask:
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
         """Writes the poses for CARLA-GeAR's loader."""
-        records = [sidecar.record for sidecar in sidecars]
+        records = (sidecar.record for sidecar in sidecars)
         poses = billboard_info(records, task="ss", patch_label=info.patch_label, reference=VIEW)
         return {f"gtFine/{info.split}/camera_billboard_info.json": dump(poses)}
 

@@ -201,9 +201,9 @@ class Stereo3dTask:
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
         """Writes the lists of ids, and the poses for CARLA-GeAR's loader."""
-        records = [sidecar.record for sidecar in sidecars]
+        records = (sidecar.record for sidecar in sidecars)
         poses = billboard_info(records, task="3dod", patch_label=info.patch_label, reference=LEFT, second=RIGHT)
-        lists = split_lists(info.split, [_name(record.index) for record in records])
+        lists = split_lists(info.split, [_name(index) for index in range(len(sidecars))])
         return {**lists, f"{info.split}/label_2/camera_billboard_info.json": dump(poses)}
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Stereo3dSample:
