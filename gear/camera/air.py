@@ -80,12 +80,13 @@ class Fog:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Air:
-    """Extinction and in-scattered light of one weather's air.
+    """The air of one weather: how much of a surface's light it takes away, and the light that it scatters to the
+    camera.
 
     Attributes:
         fogs: fog and the veil of rain; their optical thicknesses add up.
-        clear_per_m: (3,) extinction of clear air per channel, 1/m, at every height. It does not dim the sky, whose
-            picture includes it.
+        clear_per_m: (3,) extinction coefficient of clear air for red, green and blue, 1/m, the same at every height. It
+            does not dim the sky, because the picture of the sky already contains it.
         ring: (N, 3) light of the air by azimuth, counter-clockwise from east; 1.0 is the frame's full scale.
     """
 

@@ -165,9 +165,9 @@ class ContactShadows:
     """The contact shadows of a world's actors in one weather.
 
     Attributes:
-        shapes: triangles of every asset that may take part, by name.
-        even_share: share of the light on open level ground that is not the sun's, 0..1.
-        is_display: whether frames hold display values instead of light.
+        shapes: triangles of every asset that may take part in a scene, by name.
+        even_share: share of the light on open level ground that does not come from the sun directly, 0..1.
+        is_display: whether frames hold display values instead of light (the classic renderer).
     """
 
     shapes: Mapping[str, Shape]

@@ -66,6 +66,8 @@ def sampled(
 
 
 def smooth_step(value: npt.NDArray[np.float32], edge: float, width: float) -> npt.NDArray[np.float32]:
-    """0 up to `edge`, 1 from `edge + width` on, a cubic between them; elementwise."""
+    """A smooth step from 0 to 1, elementwise: 0 up to `edge`, 1 from `edge + width` on, a cubic polynomial
+    between them.
+    """
     t = np.clip((value - edge) / width, 0, 1)
     return np.asarray(t * t * (3 - 2 * t), dtype=np.float32)

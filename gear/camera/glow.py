@@ -130,7 +130,9 @@ class LampGlare:
         )
 
     def spots(self, size_px: tuple[int, ...]) -> FloatImage:
-        """(height, width) float32 light without colour: for each lamp a narrow Gaussian spot and a wide, faint one."""
+        """(height, width) float32 light, equal for all channels: for each lamp a narrow Gaussian spot and a
+        wide, faint one.
+        """
         result = np.zeros(size_px, np.float32)
         for place, size, strength in zip(self.places_px, self.size_px, self.strength, strict=True):
             sigma = max(_LEAST_SIGMA_PX, size)
@@ -141,8 +143,8 @@ class LampGlare:
         return result
 
     def streaks(self, camera: CameraRecord, ground_m: float) -> FloatImage:
-        """(H, W) float32 light without colour: reflections of the lamps on wet ground, as streaks that point to the
-        camera.
+        """(H, W) float32 light, equal for all channels: reflections of the lamps on wet ground, as streaks that point
+        to the camera.
 
         Args:
             camera: the camera that takes the picture.

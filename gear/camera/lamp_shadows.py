@@ -1,7 +1,7 @@
-"""Shadows in the light of lamps, cast by static objects of a town and by the road users of a scene.
+"""Shadows in the light of lamps at night.
 
-Static objects cast shadows in the light of static lamps, from shadow maps that are computed once. Road users cast
-shadows in the light of all lamps. The ground casts none.
+Static objects of a town cast shadows in the light of static lamps, by shadow maps that are computed once. Road users of
+a scene cast shadows in the light of all lamps. The ground casts no shadows.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ WORTH = 0.85
 
 STANDING = Layout(cells=384, zoom=1.0)
 DRIVING = Layout(cells=384, zoom=2.2)
-"""Layouts of shadow maps. Headlamps cast shadows within 49 degrees of their axis; beyond it they only scatter light."""
+"""Layouts of the shadow maps of static lamps and of headlamps. Headlamps cast shadows only within 49 degrees of
+their axis; farther from it there is only scattered light.
+"""
 
 _PIECE_M = 24.0
 _SPACING_M = {"large": 0.07, "small": 0.035}

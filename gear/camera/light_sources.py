@@ -116,7 +116,13 @@ def board_light(
 def world_positions(
     rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp], depth_m: FloatImage, camera: CameraRecord
 ) -> Array:
-    """(N, 3) positions in the world of the surfaces at (N,) rows and columns."""
+    """(N, 3) world positions of the surfaces that N pixels show, metres.
+
+    Args:
+        rows, columns: (N,) index pixels.
+        depth_m: (H, W) planar z of the view.
+        camera: the camera that takes the picture.
+    """
     pose = camera.world_from_camera_transform
     z = depth_m[rows, columns].astype(np.float64)
     pinhole = camera.intrinsics

@@ -119,12 +119,12 @@ def face_light(renderer_name: str, face: UInt8Image) -> Floats:
 
 
 def encode_srgb(light: npt.ArrayLike) -> Floats:
-    """Linear light 0..1 to sRGB values 0..1, elementwise."""
+    """Converts linear light 0..1 to sRGB values 0..1, elementwise."""
     x = np.asarray(light, dtype=np.float64)
     return np.where(x <= 0.0031308, x * 12.92, 1.055 * np.maximum(x, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
 def decode_srgb(values: npt.ArrayLike) -> Floats:
-    """sRGB values 0..1 to linear light 0..1, elementwise."""
+    """Converts sRGB values 0..1 to linear light 0..1, elementwise."""
     v = np.asarray(values, dtype=np.float64)
     return np.where(v <= 0.04045, v / 12.92, ((np.maximum(v, 0.04045) + 0.055) / 1.055) ** 2.4)

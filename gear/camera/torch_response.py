@@ -1,4 +1,6 @@
-"""The camera's response in torch, for gradients. Packages that collecting uses never import this module."""
+"""The camera's response in torch, for gradients. It is a module of its own so that collecting datasets does not
+import torch.
+"""
 
 from __future__ import annotations
 

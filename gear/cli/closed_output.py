@@ -7,7 +7,7 @@ import sys
 
 
 def discard_output() -> None:
-    """Discards the rest of stdout's buffer, which the interpreter would try to write again at its exit."""
+    """Discards the rest of stdout's buffer. Otherwise the interpreter would try to write it again at its exit."""
     try:
         sys.stdout.flush()
     except OSError:

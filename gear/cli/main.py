@@ -126,7 +126,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def full_parser(wanted: str | None = None) -> Parser:
-    """The parser of the command line.
+    """Makes the parser of the command line.
 
     Args:
         wanted: the only command whose flags are added, so that only its module is imported; None for all commands.

@@ -13,7 +13,7 @@ RequestT = TypeVar("RequestT")
 
 
 def request_of(kind: type[RequestT], args: argparse.Namespace, **given: Any) -> RequestT:
-    """Makes a request from flags; lists become tuples, and flags that were not given leave the field's default.
+    """Makes a request from flags. Lists become tuples; a flag that was not given leaves the field's default.
 
     Args:
         kind: dataclass of the request.

@@ -20,7 +20,7 @@ def prepare_streams() -> None:
 
 
 def line_width() -> int:
-    """Largest width of a line in characters: that of the terminal (or `COLUMNS`); 100 if the output is not
-    a terminal.
+    """Largest width of a line in characters: that of the terminal (or `COLUMNS`), or 100 if the output is not a
+    terminal.
     """
     return max(shutil.get_terminal_size((WIDTH, 24)).columns, 60)

@@ -193,7 +193,9 @@ def products(matrices: Sequence[SparseMatrix], columns: Tensor) -> Tensor:
 
 
 def rounded(values: Tensor) -> Tensor:
-    """Values in 0..1 rounded to multiples of 1/255; gradients pass unchanged (straight-through estimator)."""
+    """Rounds values in 0..1 to multiples of 1/255. Gradients pass as if nothing was rounded (straight-through
+    estimator).
+    """
     stepped = torch.floor(values.detach() * 255 + 0.5) / 255
     return values + (stepped - values.detach())
 

@@ -1,4 +1,4 @@
-"""A least-recently-used cache with a limit in bytes."""
+"""A cache with a limit in bytes, which drops the least recently used objects."""
 
 from __future__ import annotations
 

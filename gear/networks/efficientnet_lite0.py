@@ -22,7 +22,7 @@ MEAN, STD = (127 / 255,) * 3, (128 / 255,) * 3
 """Mean and standard deviation of the pixel values in the normalisation with which the weights were trained."""
 
 STAGES = (1, 2, 2, 3, 3, 4, 1)
-"""Number of blocks of each stage."""
+"""Number of blocks in each stage."""
 
 LEVELS = ((0,), (1,), (2,), (3, 4), (5, 6))
 """For 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's sides: the indices of the stages at this resolution."""

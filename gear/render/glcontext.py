@@ -96,7 +96,7 @@ def _cause(backend: str, error: Exception) -> tuple[str, str]:
 
 
 def egl_problem() -> tuple[str, str] | None:
-    """What is missing for EGL without a display, and what to install; None if a device initialises."""
+    """What is missing for EGL without a display, and what to install; None if EGL can start a device."""
     if not _loads("libEGL.so.1"):
         return "the EGL library libEGL.so.1 is not installed", _NO_LIBRARY
     devices = _egl_devices()

@@ -135,7 +135,7 @@ class NpcLimits:
 
     @property
     def needs_board(self) -> bool:
-        """Whether the limits refer to a board."""
+        """Whether the limits are given relative to a board."""
         return self.ahead_m is not None or self.lateral_m is not None
 
 

@@ -1,7 +1,8 @@
 """Optional effects of the camera, one file each: motion blur, lens distortion, vignette, noise.
 
-A new effect is a new module in this folder with one subclass of `Effect`; nothing else names it. Its parameters become
-keys of the config's `camera` section, and it is applied to pictures, ground truth and composed patches in its order.
+A new effect is one new module in this folder with one subclass of `Effect`; no other file must be changed. Its
+parameters become keys of the config's `camera` section. The effect is then applied to pictures, to ground truth and to
+composed patches, in the order that its `ORDER` gives.
 """
 
 from __future__ import annotations

@@ -79,11 +79,13 @@ class LensDistortion(Effect):
         return self.lens.k1 != 0 or self.lens.k2 != 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
-        """The distorted view, rounded."""
+        """The view with the distortion: colour is resampled and rounded, depth and ids are those of the nearest
+        pixel.
+        """
         return distort(view, self.lens, exposure.camera.intrinsics)
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """See `Effect.apply_torch`."""
+        """The same as `apply` for colour in torch; `Effect.apply_torch` documents the arguments."""
         found = lens_map(self.lens, exposure.camera.intrinsics)
         return read_bilinear(light, found.x.astype(np.float64), found.y.astype(np.float64))
 
@@ -117,13 +119,13 @@ class LensDistortion(Effect):
             raise FieldError("lens", f"{error}; take k1 and k2 nearer to 0, or a narrower field of view") from error
 
     def recorded(self, camera: CameraRecord) -> CameraRecord:
-        """The camera's record with the lens in it."""
+        """The camera's record, completed with the coefficients of the lens."""
         found = lens_map(self.lens, camera.intrinsics)
         return replace(camera, lens=LensRecord(k1=self.lens.k1, k2=self.lens.k2, focal_px=found.focal_px))
 
     @classmethod
     def from_record(cls, camera: CameraRecord) -> LensDistortion | None:
-        """The lens that a camera's record holds; None for a pinhole."""
+        """The lens that a camera's record describes; None for a pinhole camera."""
         return None if camera.lens is None else cls(lens=Lens(k1=camera.lens.k1, k2=camera.lens.k2))
 
     def pixel_map(self, camera: CameraRecord) -> PixelMap:

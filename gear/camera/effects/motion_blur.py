@@ -1,4 +1,4 @@
-"""Motion blur: the ego car drives while the shutter is open."""
+"""Motion blur: things smear in the picture because the ego car drives while the shutter is open."""
 
 from __future__ import annotations
 
@@ -53,7 +53,9 @@ class MotionBlur(Effect):
         return self.shutter_s > 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
-        """The view with blurred colour, rounded; depth and ids are those of the shutter's middle."""
+        """The view with blurred and rounded colour. Depth and ids are not blurred: they are those of the middle
+        moment.
+        """
         import cv2  # not at the top: configs are read without OpenCV
 
         assert view.linear_rgb is not None
@@ -63,7 +65,7 @@ class MotionBlur(Effect):
         return replace(view, linear_rgb=np.asarray(total / np.float32(MOMENTS) + np.float32(0.5), dtype=np.uint16))
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """See `Effect.apply_torch`."""
+        """The same as `apply` for colour in torch; `Effect.apply_torch` documents the arguments."""
         total = light * 0
         for from_x, from_y in self._paths(truth, exposure):
             total = total + read_bilinear(light, from_x.astype(np.float64), from_y.astype(np.float64))

@@ -48,7 +48,7 @@ class Vignette(Effect):
         return replace(view, linear_rgb=np.asarray(dimmed, dtype=np.uint16))
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """See `Effect.apply_torch`."""
+        """The same as `apply` for colour in torch; `Effect.apply_torch` documents the arguments."""
         return light * light.new_tensor(vignette_map(self.vignette, light.shape[-1], light.shape[-2]))
 
 

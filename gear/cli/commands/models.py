@@ -61,11 +61,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def the_one(models: Sequence[ModelFacts], name: str | None) -> ModelFacts:
-    """The network with the given name.
+    """The network with the given name, for `gear models show`.
 
     Raises:
         GearError: no name was given.
-        UnknownNameError: there is no model of this name.
+        UnknownNameError: there is no model with this name.
     """
     from gear.values.errors import GearError, UnknownNameError
 

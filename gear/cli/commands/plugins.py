@@ -99,11 +99,11 @@ def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) ->
 
 
 def the_one(found: Catalogue, kinds: tuple[Kind, ...], name: str | None) -> PluginEntry:
-    """The plugin with the given name, of any kind.
+    """The plugin with the given name, of any kind, for `gear plugins show`.
 
     Raises:
         GearError: no name was given, or plugins of several kinds have it.
-        UnknownNameError: there is no plugin of this name.
+        UnknownNameError: there is no plugin with this name.
         DuplicateNameError: plugins of two packages have this name.
     """
     from gear.values.errors import GearError, UnknownNameError

@@ -108,7 +108,7 @@ class TrainingLog:
         self._display = display
 
     def __call__(self, state: TrainingState, share: float, metrics: dict[str, float] | None) -> None:
-        """Called after a step, or, with metrics, after a validation."""
+        """Updates the display after a step; with `metrics`, prints a line after a validation."""
         if state.steps:
             point = state.steps[-1]
             self._display.detail(f"loss {point['loss']:.3f}, lr {point['rate']:.1e}")

@@ -110,7 +110,7 @@ class Decoder(nn.Module):
         self.conv3 = nn.Conv2d(features // 16, WIDTH, 3, padding=1)
 
     def forward(self, maps: Sequence[Tensor]) -> Tensor:
-        """(B, 128, H / 2, W / 2) features."""
+        """Features (B, 128, H / 2, W / 2) from the encoder's five feature maps of (B, 3, H, W) pictures."""
         half, quarter, eighth, sixteenth, deepest = maps
         found = self.up1(self.conv2(deepest), sixteenth)
         found = self.up2(found, eighth)
@@ -170,14 +170,14 @@ class PatchTransformer(nn.Module):
         self.positional_encodings = nn.Parameter(torch.rand(MOST_PATCHES, WIDTH))
 
     def forward(self, features: Tensor) -> Tensor:
-        """(patches, B, 128) tokens, row by row."""
+        """Tokens (patches, B, 128) of the patches of a feature map, row by row."""
         patches = self.embedding_convPxP(features).flatten(2).permute(2, 0, 1)
         tokens: Tensor = self.transformer_encoder(patches + self.positional_encodings[: len(patches), None])
         return tokens
 
 
 def patches(height: int, width: int) -> int:
-    """Number of transformer tokens for a feature map of this size."""
+    """Number of transformer tokens for a picture of this height and width."""
     rows, columns = (-(-side // 2) // PATCH_PX for side in (height, width))
     return rows * columns
 

@@ -52,12 +52,14 @@ def silog(
 
 
 def adabins_silog(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
-    """AdaBins' pixel loss: 10 * sqrt(variance + 0.15 * squared mean) of the logarithms' differences."""
+    """AdaBins' pixel loss: 10 * sqrt(variance + 0.15 * mean^2) of the differences between logarithms of depth;
+    see `silog`.
+    """
     return silog(predicted_m, depth_m, balance=0.85, scale=10.0, cap_m=cap_m)
 
 
 def log_l1(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
-    """Mean absolute difference of logarithms: a relative error that is robust to outliers."""
+    """Mean absolute difference between the logarithms of depth: a relative error that is robust to outliers."""
     mask = known(depth_m, cap_m)
     return _log_errors(predicted_m, depth_m, mask).abs().sum() / mask.sum().clamp_min(1)
 

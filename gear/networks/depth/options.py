@@ -12,7 +12,7 @@ STAGES = 4
 """Number of stages of a mix transformer."""
 
 HEADS = (1, 2, 5, 8)
-"""Attention heads of the stages of a mix transformer of any size."""
+"""Number of attention heads in each stage of a mix transformer, which is the same for all sizes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

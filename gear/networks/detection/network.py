@@ -185,7 +185,7 @@ OFFICIAL_CATEGORIES = tuple(number if number in CATEGORY_NAMES else None for num
 
 
 def size_of(pictures: Tensor) -> Size:
-    """Height and width of (..., H, W) pictures."""
+    """Height and width of a tensor of pictures (..., H, W)."""
     return int(pictures.shape[-2]), int(pictures.shape[-1])
 
 

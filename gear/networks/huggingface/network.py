@@ -144,12 +144,16 @@ class FolderSegmenter(FolderNetwork):
         return {LOGITS: self.restored(torch.stack(ours, dim=1), pictures, "bilinear")}
 
     def their_logits(self, seen: Tensor) -> Tensor:
-        """(B, classes, h, w) logits over the network's own classes, for inputs of the graph."""
+        """(B, classes, h, w) logits over the network's own classes.
+
+        Args:
+            seen: (B, 3, h, w) input of the graph, from `seen`.
+        """
         logits: Tensor = self.said(seen).logits
         return logits
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Cross-entropy over the pixels whose class the network has."""
+        """Cross-entropy over the pixels whose true class the network has."""
         ids = train_ids(targets, self.device)
         known = torch.tensor([train_id for train_id, indexes in enumerate(self._indexes) if indexes])
         is_known = torch.isin(ids, known.to(self.device))
@@ -192,7 +196,7 @@ class FolderDepth(FolderNetwork):
         return {DEPTH: said.clamp(min=NEAREST_M)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Mean absolute difference of logarithms over pixels with ground truth."""
+        """Mean absolute difference between the logarithms of depth, over pixels with ground truth."""
         truth = torch.from_numpy(np.stack([sample.depth_m for sample in targets])).to(self.device)
         is_known = torch.isfinite(truth)
         error = (outputs[DEPTH].log() - truth.where(is_known, 1.0).log()).abs()

@@ -29,13 +29,15 @@ class SpatialPath(nn.Module):
         self.conv_1x1 = ConvBnRelu(64, PLANES, 1)
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """(B, 3, H, W) to (B, 128, H / 8, W / 8)."""
+        """Converts (B, 3, H, W) pictures to (B, 128, H / 8, W / 8) features."""
         features: Tensor = self.conv_1x1(self.conv_3x3_2(self.conv_3x3_1(self.conv_7x7(pictures))))
         return features
 
 
 class AttentionRefinement(nn.Module):
-    """A 3x3 convolution whose output channels are weighted by their global averages (attention refinement module)."""
+    """Attention refinement module: a 3x3 convolution; a factor for each output channel is computed from the
+    channels' global averages.
+    """
 
     def __init__(self, inputs: int) -> None:
         super().__init__()
@@ -45,7 +47,7 @@ class AttentionRefinement(nn.Module):
         )
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, inputs, H, W) to (B, 128, H, W)."""
+        """Converts (B, inputs, H, W) features to (B, 128, H, W)."""
         mixed: Tensor = self.conv_3x3(features)
         weights: Tensor = self.channel_attention(mixed)
         return mixed * weights
@@ -66,7 +68,7 @@ class FeatureFusion(nn.Module):
         )
 
     def forward(self, spatial: Tensor, context: Tensor) -> Tensor:
-        """Two maps (B, 128, H, W) to one map (B, 256, H, W)."""
+        """Joins two feature maps (B, 128, H, W) to one (B, 256, H, W)."""
         fused: Tensor = self.conv_1x1(torch.cat([spatial, context], dim=1))
         weights: Tensor = self.channel_attention(fused)
         return fused + fused * weights
@@ -81,7 +83,7 @@ class Head(nn.Module):
         self.conv_1x1 = nn.Conv2d(planes, classes, 1)
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, inputs, H, W) to (B, classes, H, W)."""
+        """Converts (B, inputs, H, W) features to (B, classes, H, W) logits."""
         maps: Tensor = self.conv_1x1(self.conv_3x3(features))
         return maps
 

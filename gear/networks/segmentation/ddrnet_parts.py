@@ -37,7 +37,7 @@ class BasicBlock(nn.Module):
         self.rectify = rectify
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, inputs, H, W) to (B, planes, H / stride, W / stride)."""
+        """Converts (B, inputs, H, W) features to (B, planes, H / stride, W / stride)."""
         hidden = functional.relu(self.bn1(self.conv1(features)), inplace=True)
         total = self.bn2(self.conv2(hidden)) + (features if self.downsample is None else self.downsample(features))
         return functional.relu(total, inplace=True) if self.rectify else total
@@ -60,7 +60,7 @@ class Bottleneck(nn.Module):
         self.downsample = shortcut(inputs, outputs, stride)
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, inputs, H, W) to (B, 2 planes, H / stride, W / stride)."""
+        """Converts (B, inputs, H, W) features to (B, 2 planes, H / stride, W / stride)."""
         hidden = functional.relu(self.bn1(self.conv1(features)), inplace=True)
         hidden = functional.relu(self.bn2(self.conv2(hidden)), inplace=True)
         total: Tensor = self.bn3(self.conv3(hidden)) + (
@@ -77,7 +77,7 @@ def shortcut(inputs: int, outputs: int, stride: int) -> nn.Sequential | None:
 
 
 def stage(inputs: int, planes: int, stride: int = 1) -> nn.Sequential:
-    """Two basic blocks; no ReLU follows the last one."""
+    """A stage of the network: two basic blocks; no ReLU follows the last one."""
     return nn.Sequential(BasicBlock(inputs, planes, stride), BasicBlock(planes, planes, rectify=False))
 
 
@@ -105,7 +105,7 @@ class Dappm(nn.Module):
         self.shortcut = pre_activated(conv1x1(inputs, outputs))
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, inputs, H, W) to (B, outputs, H, W)."""
+        """Converts (B, inputs, H, W) features to (B, outputs, H, W)."""
         scales = [self.scale0(features)]
         for pool, process in (
             (self.scale1, self.process1),
@@ -129,7 +129,7 @@ class Head(nn.Module):
         self.conv2 = nn.Conv2d(planes, channels, 1)
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, inputs, H, W) to (B, channels, H, W)."""
+        """Converts (B, inputs, H, W) features to (B, channels, H, W) output maps."""
         hidden = self.conv1(functional.relu(self.bn1(features), inplace=True))
         maps: Tensor = self.conv2(functional.relu(self.bn2(hidden), inplace=True))
         return maps

@@ -15,7 +15,7 @@ EXPANSION = 4
 
 
 class ConvBnRelu(nn.Module):
-    """A convolution without bias, then optional batch normalisation and optional ReLU."""
+    """A convolution without bias, with optional batch normalisation and optional ReLU after it."""
 
     def __init__(
         self, inputs: int, outputs: int, kernel: int, stride: int = 1, *, norm: bool = True, rectify: bool = True
@@ -26,7 +26,7 @@ class ConvBnRelu(nn.Module):
         self.rectify = rectify
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, inputs, H, W) to (B, outputs, H / stride, W / stride)."""
+        """Converts (B, inputs, H, W) features to (B, outputs, H / stride, W / stride)."""
         hidden: Tensor = self.conv(features)
         if self.bn is not None:
             hidden = self.bn(hidden)
@@ -34,7 +34,7 @@ class ConvBnRelu(nn.Module):
 
 
 class Separable(nn.Module):
-    """A depth-wise 3x3 convolution, then a 1x1 convolution with batch normalisation."""
+    """A separable convolution: a depth-wise 3x3 convolution, then a 1x1 convolution with batch normalisation."""
 
     def __init__(self, inputs: int, outputs: int, stride: int = 1, *, rectify: bool = True) -> None:
         super().__init__()
@@ -42,7 +42,7 @@ class Separable(nn.Module):
         self.point_wise_cbr = ConvBnRelu(inputs, outputs, 1, rectify=rectify)
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, inputs, H, W) to (B, outputs, H / stride, W / stride)."""
+        """Converts (B, inputs, H, W) features to (B, outputs, H / stride, W / stride)."""
         mixed: Tensor = self.point_wise_cbr(self.conv1(features))
         return mixed
 
@@ -59,7 +59,7 @@ class Block(nn.Module):
         )
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, inputs, H, W) to (B, 4 planes, H / stride, W / stride)."""
+        """Converts (B, inputs, H, W) features to (B, 4 planes, H / stride, W / stride)."""
         short = features if self.proj is None else self.proj(features)
         return functional.relu(short + self.residual_branch(features), inplace=True)
 

@@ -55,7 +55,7 @@ class StereoCentreShape:
 
 
 def conv(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential:
-    """A convolution without bias and a batch normalisation."""
+    """A layer: convolution without bias, then batch normalisation."""
     return nn.Sequential(
         nn.Conv2d(inputs, outputs, size, stride, size // 2, bias=False),
         nn.BatchNorm2d(outputs),
@@ -63,7 +63,7 @@ def conv(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential
 
 
 def conv_relu(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential:
-    """A convolution without bias, a batch normalisation and ReLU."""
+    """A layer: convolution without bias, batch normalisation, then ReLU."""
     return nn.Sequential(conv(inputs, outputs, size, stride), nn.ReLU(inplace=True))
 
 
@@ -110,7 +110,7 @@ class Head(nn.Module):
         nn.init.constant_(self.out.bias, value)
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, C, h, w) to (B, outputs, h, w)."""
+        """Converts (B, C, h, w) features to (B, outputs, h, w) output maps."""
         raw: Tensor = self.out(self.hidden(features))
         return raw
 
@@ -253,10 +253,16 @@ def _exp(raw: Tensor) -> Tensor:
 
 
 def fit_to_network(picture: Tensor, scale: float) -> tuple[Tensor, tuple[float, float]]:
-    """Reduces (B, 3, H, W) pictures and pads them at the right and the bottom to multiples of 32.
+    """Converts pictures to the network's input: resized by `scale` and padded at the right and the bottom to multiples
+    of 32.
+
+    Args:
+        picture: (B, 3, H, W).
+        scale: factor on H and W.
 
     Returns:
-        The network's input, and the number of the given picture's pixels for each pixel of the input, in x and in y.
+        The network's input (B, 3, h, w), and how many pixels of the given picture one pixel of the input is, in x and
+        in y.
     """
     height, width = picture.shape[-2:]
     size = (max(1, round(height * scale)), max(1, round(width * scale)))

@@ -25,7 +25,7 @@ class Block(nn.Module):
             self.skip = nn.Sequential(nn.AvgPool2d(stride), conv(inputs, outputs, 1))
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, C, H, W) to (B, C', H / stride, W / stride)."""
+        """Converts (B, C, H, W) features to (B, C', H / stride, W / stride)."""
         inner = functional.relu(self.bn1(self.conv1(features)))
         return functional.relu(self.bn2(self.conv2(inner)) + self.skip(features))
 

@@ -14,7 +14,7 @@ MOST_GROWTH = 4.135
 
 
 def sides(boxes: Tensor) -> Tensor:
-    """(…, 2) width and height in pixels."""
+    """(…, 2) widths and heights of (…, 4) boxes, in pixels."""
     return boxes[..., 2:] - boxes[..., :2] + 1
 
 
@@ -41,13 +41,13 @@ def decode(codes: Tensor, anchors: Tensor) -> Tensor:
 
 
 def clip(boxes: Tensor, size_px: tuple[int, int]) -> Tensor:
-    """Boxes clipped to a picture of (height, width)."""
+    """Clips boxes to a picture of size (height, width)."""
     most = boxes.new_tensor([size_px[1] - 1, size_px[0] - 1] * 2)
     return torch.minimum(boxes.clamp(min=0), most)
 
 
 def overlaps(a: Tensor, b: Tensor) -> Tensor:
-    """(N, M) intersection over union of (N, 4) and (M, 4)."""
+    """(N, M) intersection over union of each of (N, 4) boxes with each of (M, 4) boxes."""
     low = torch.maximum(a[:, None, :2], b[None, :, :2])
     high = torch.minimum(a[:, None, 2:], b[None, :, 2:])
     shared = (high - low + 1).clamp(min=0).prod(dim=-1)

@@ -70,7 +70,7 @@ class Bottleneck(nn.Module):
             )
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, C, H, W) to (B, 4 width, H / stride, W / stride)."""
+        """Converts (B, C, H, W) features to (B, 4 width, H / stride, W / stride)."""
         inner = functional.relu(self.bn1(self.conv1(features)))
         inner = functional.relu(self.bn2(self.conv2(inner)))
         past = features if self.downsample is None else self.downsample(features)

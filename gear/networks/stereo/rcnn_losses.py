@@ -56,7 +56,7 @@ class CarTargets:
     ignored: Tensor
 
     def to(self, device: torch.device) -> CarTargets:
-        """A copy on a device."""
+        """A copy of the targets on another torch device."""
         return CarTargets(**{field.name: getattr(self, field.name).to(device) for field in fields(self)})
 
 

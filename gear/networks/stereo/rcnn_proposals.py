@@ -1,4 +1,4 @@
-"""Converts outputs of the proposal network to pairs of boxes."""
+"""Selects pairs of boxes from the outputs of Stereo R-CNN's region proposal network."""
 
 from __future__ import annotations
 

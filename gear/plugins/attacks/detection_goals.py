@@ -39,7 +39,7 @@ class DetectionGoal:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """The losses against the rewritten labels; all of them are minimised."""
+        """The detector's losses against the wanted labels, one term for each; the attack minimises all of them."""
         wanted = [self.rewritten(sample) for sample in samples]
         losses = model.forward(views, wanted)
         return {name: Term(value=-loss) for name, loss in losses.items() if name not in self.left_out}

@@ -123,7 +123,7 @@ class SurestObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One term, named `objectness`."""
+        """One term, `objectness`: it grows as the highest score in each picture falls."""
         from gear.contracts.attacks import Term
 
         return {"objectness": Term(value=-surest(model.forward(views)).mean())}

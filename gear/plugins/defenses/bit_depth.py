@@ -33,7 +33,7 @@ class BitDepthConfig:
 
 
 class BitDepth(PerPicture):
-    """Rounds each value to the nearest of 2^bits evenly spaced levels."""
+    """A defense that rounds each value to the nearest of 2^bits evenly spaced levels."""
 
     def __init__(self, config: BitDepthConfig) -> None:
         steps = 2**config.bits - 1
@@ -44,7 +44,7 @@ class BitDepth(PerPicture):
         return self._table[picture], None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The values with fewer bits; the gradient passes as if nothing had been done (BPDA)."""
+        """The pictures with fewer bits, (B, 3, H, W); the gradient passes as if nothing had been done (BPDA)."""
         return straight_through(pictures, each_as_uint8(pictures, lambda picture: self._table[picture]))
 
 

@@ -35,7 +35,7 @@ class FpdaConfig(DetectorConfig):
 
 
 def build(config: FpdaConfig) -> Defense:
-    """Builds the detector."""
+    """Makes the detector from its options."""
     from torch.nn import functional
 
     from gear.plugins.defenses.activations.score_detector import Detector

@@ -36,7 +36,7 @@ class GaussianConfig:
 
 
 class Gaussian(PerPicture):
-    """A separable blur of the sRGB values; borders are mirrored without repeating the edge."""
+    """A defense that blurs sRGB values with a separable kernel; borders are mirrored without repeating the edge."""
 
     def __init__(self, config: GaussianConfig) -> None:
         radius = max(1, math.ceil(3 * config.sigma_px))
@@ -52,7 +52,7 @@ class Gaussian(PerPicture):
         return np.clip(np.rint(blurred), 0, 255).astype(np.uint8), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The same convolution in torch."""
+        """The blurred pictures, (B, 3, H, W), by the same convolution in torch."""
         import torch
         from torch.nn import functional
 

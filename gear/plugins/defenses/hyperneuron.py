@@ -1,4 +1,4 @@
-"""HyperNeuron (Co et al., 2021): patches drive a network's neurons to unusual values."""
+"""HyperNeuron (Co et al., 2021): detects patches by unusual values of a network's neurons."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class HyperNeuronConfig(DetectorConfig):
 
 
 def build(config: HyperNeuronConfig) -> Defense:
-    """Builds the detector."""
+    """Makes the detector from its options."""
     from gear.plugins.defenses.activations.score_detector import Detector
 
     def compress(features: Tensor) -> Tensor:

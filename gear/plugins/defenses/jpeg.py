@@ -34,17 +34,17 @@ class JpegConfig:
 
 
 class Jpeg(PerPicture):
-    """Compresses and decompresses every picture."""
+    """A defense that compresses and decompresses every picture."""
 
     def __init__(self, config: JpegConfig) -> None:
         self._parameters = [cv2.IMWRITE_JPEG_QUALITY, config.quality]
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The decoded picture; no mask."""
+        """The picture after compression; no mask."""
         return self._recode(picture), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The decoded values; the gradient passes as if nothing had been done (BPDA)."""
+        """The pictures after compression, (B, 3, H, W); the gradient passes as if nothing had been done (BPDA)."""
         return straight_through(pictures, each_as_uint8(pictures, self._recode))
 
     def _recode(self, picture: UInt8Image) -> UInt8Image:

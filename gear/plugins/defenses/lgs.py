@@ -23,11 +23,11 @@ LEAST_SPREAD = 1e-7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LgsConfig:
-    """Options, with the paper's values as defaults.
+    """Options; the defaults are the paper's values.
 
     Attributes:
-        window_px: side of the windows.
-        overlap_px: overlap of neighbouring windows.
+        window_px: side of the windows, pixels.
+        overlap_px: overlap of neighbouring windows, pixels.
         threshold: a window is processed if its mean normalised gradient exceeds this value, 0 to 1.
         strength: factor lambda on the gradient.
     """
@@ -92,7 +92,9 @@ class Lgs(PerPicture):
         return np.arange(count) * self._stride_px
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The same operation in torch; the choice of windows has no gradient."""
+        """The darkened pictures, (B, 3, H, W), by the same operation in torch; the choice of windows has no
+        gradient.
+        """
         import torch
 
         grey = (pictures * pictures.new_tensor(GREY).view(1, 3, 1, 1)).sum(1, keepdim=True)

@@ -34,7 +34,7 @@ class MedianConfig:
 
 
 class Median(PerPicture):
-    """The median of each channel over a square window; borders are replicated."""
+    """A defense that replaces each value by the median of its channel over a square window; borders are replicated."""
 
     def __init__(self, config: MedianConfig) -> None:
         self._side_px = 2 * config.radius_px + 1
@@ -44,7 +44,9 @@ class Median(PerPicture):
         return np.asarray(cv2.medianBlur(np.ascontiguousarray(picture), self._side_px), np.uint8), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The filtered values. The median takes one pixel of its window; the gradient goes to that pixel."""
+        """The filtered pictures, (B, 3, H, W). The median is one of the pixels of its window; the gradient goes
+        to that pixel.
+        """
         from torch.nn import functional
 
         batch, channels, height, width = pictures.shape

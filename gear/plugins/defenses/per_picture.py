@@ -50,7 +50,7 @@ class PerPicture(ABC):
     def apply(
         self, views: Mapping[str, UInt8Image], model: Model | None, state: Any, rng: np.random.Generator
     ) -> DefenseResult:
-        """Cleans the picture of each view."""
+        """Cleans the picture of each camera."""
         cleaned: dict[str, UInt8Image] = {}
         masks: dict[str, Mask] = {}
         for name, picture in views.items():
@@ -61,11 +61,11 @@ class PerPicture(ABC):
         return DefenseResult(views=cleaned, mask=masks or None, score=score)
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Cleans the batch of each view."""
+        """Cleans a batch of pictures for each camera."""
         return {name: self.clean_tensor(pictures) for name, pictures in views.items()}
 
     def wrap(self, model: Model) -> Model:
-        """Returns the model unchanged."""
+        """Returns the model unchanged, because these defenses only change pictures."""
         return model
 
 
@@ -75,7 +75,9 @@ def straight_through(pictures: Tensor, cleaned: Tensor) -> Tensor:
 
 
 def each_as_uint8(pictures: Tensor, clean: Any) -> Tensor:
-    """Applies a uint8 NumPy function to every picture of a batch, without a gradient."""
+    """Applies a NumPy function for one uint8 picture to every picture of a (B, 3, H, W) batch in 0..1, without a
+    gradient.
+    """
     import torch
 
     levels = (pictures.detach().clamp(0, 1) * 255).round().to(torch.uint8).permute(0, 2, 3, 1).cpu().numpy()

@@ -102,7 +102,7 @@ class AssetInstances:
     """Makes instances of assets in a composition; the file of each asset is attached once."""
 
     def __init__(self, root: mjcf.RootElement, files: Mapping[AssetFile, SplitAsset]) -> None:
-        """Prepares instances in the tree of a town.
+        """Stores the tree of a town, to which instances are added, and the MJCF of the assets.
 
         Args:
             root: the tree.

@@ -1,4 +1,4 @@
-"""Compiles the two models of a composition: the render model and the placement model."""
+"""Compiles the two models of a composed world: the render model and the placement model."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def align_normal_maps(model: mujoco.MjModel) -> None:
 
 
 def tangents(normals: Array) -> tuple[Array, Array]:
-    """The directions in which red and green of a normal map tilt a normal in Filament.
+    """The directions in which the red and the green channel of a normal map tilt a normal, as Filament computes them.
 
     Args:
         normals: (..., 3) unit vectors in a mesh's frame.

@@ -18,7 +18,7 @@ class Junctions:
     """
 
     def __init__(self, graph: LaneGraph) -> None:
-        """Takes the lane graph of the town."""
+        """Stores the lane graph of the town; no pair of lanes is measured yet."""
         self._graph = graph
         self._conflicts: dict[tuple[str, str], bool] = {}
         self._points: dict[str, Array] = {}

@@ -66,7 +66,7 @@ class Polyline:
         return float(headings @ np.clip(within_m, 0.0, None) / (2 * reach_m))
 
     def sample(self, s_m: Array, lateral_m: float = 0.0) -> tuple[Array, Array]:
-        """The same as `at` for (N,) arc lengths: (N, 3) points in metres and (N,) headings in radians."""
+        """The same as `at` for several arc lengths (N,): (N, 3) points in metres and (N,) headings in radians."""
         index = np.clip(np.searchsorted(self.s_m, s_m, side="right") - 1, 0, len(self.s_m) - 2)
         steps = self.points_m[index + 1] - self.points_m[index]
         lengths_m = np.hypot(steps[:, 0], steps[:, 1])

@@ -61,7 +61,7 @@ class Route:
         )
 
     def lane_at(self, s_m: float) -> int:
-        """Index of the lane at an arc length."""
+        """Index in `lanes` of the lane at an arc length on the route."""
         return max(0, int(np.searchsorted(self.starts_m, s_m, side="right")) - 1)
 
     def speed_at(self, s_m: float) -> float:

@@ -148,7 +148,7 @@ class Spawner:
     """Draws positions on the lanes, walks and parking bays of one town."""
 
     def __init__(self, lanes: LaneGraph) -> None:
-        """Cuts the lanes and walks of a town into pieces that can be drawn."""
+        """Cuts the lanes and walks of a town into pieces, from which positions are drawn."""
         self.lanes = lanes
         self.lane_table = LineTable.of(
             (lane.name, lane.line, JUNCTION_WEIGHT if lane.is_junction else 1.0) for lane in lanes.lanes.values()

@@ -33,7 +33,7 @@ DENSEST_FOG_PER_M = 0.05
 """Extinction coefficient for CARLA's fog density of 100 percent, 1/m: objects at 60 m can no longer be recognised."""
 
 RAIN_PER_M = 0.0035
-"""Extinction coefficient of the veil of rain for 100 percent precipitation, 1/m."""
+"""Extinction coefficient of the veil of rain (the haze of distant drops) for 100 percent precipitation, 1/m."""
 
 RAIN_FROM_M, RAIN_FALLOFF = 0.75, 0.1
 """Start distance (metres) and falloff of the veil of rain, as in the fog of CARLA's presets for rain."""

@@ -134,7 +134,7 @@ class Problem:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Seen:
-    """A batch of samples with the patches in their pictures.
+    """A batch of samples whose pictures show the textures.
 
     Attributes:
         views: (B, 3, H, W) pictures by camera name, differentiable with respect to the textures.
@@ -287,7 +287,7 @@ def one_gradient(
 
 
 def unit(gradient: Tensor) -> Tensor:
-    """Scales a tensor to length 1 over all of its values; zeros stay zeros."""
+    """Divides a tensor by its length (2-norm over all values); a tensor of zeros stays as it is."""
     norm = gradient.norm()
     return gradient / norm if norm > 0 else gradient
 

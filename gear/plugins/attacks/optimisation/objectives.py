@@ -89,7 +89,7 @@ class SemsegObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """Two terms, `correct` and `wrong`; or one, `target`."""
+        """Two terms, `correct` (pixels in Y) and `wrong` (pixels in N); for a targeted attack one term, `target`."""
         logits, labels, counts = self._outputs(model, views, samples)
         if self.target is not None:
             return self._targeted(logits, labels, counts)

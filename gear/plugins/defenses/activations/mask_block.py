@@ -15,11 +15,11 @@ LEARNING_RATE, BATCH, CELLS = 0.01, 15, 4096
 NUMBERS = 8
 
 COVERED_FROM = 0.5
-"""Value of the mask from which on a cell is covered."""
+"""Cells whose mask has at least this value are covered."""
 
 LEAST_GAIN, LEAST_IOU = 0.95, 0.05
-"""Limits for a fit: a block whose loss exceeds this share of the best constant's loss, or whose IoU is lower than this,
-has learnt nothing.
+"""Limits that tell whether the training has succeeded. It has not if the block's loss is above this share of the
+best constant prediction's loss, or if its IoU is below this value.
 """
 
 
@@ -71,14 +71,15 @@ class MaskBlock:
 
 
 def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> MaskBlock:
-    """Fits a block by Adam on the cross-entropy with the true masks, from parameters drawn from U(0, 1), as published.
+    """Trains a block with Adam on the cross-entropy with the true masks; initial parameters are drawn from U(0, 1), as
+    published.
 
     Each step uses a random subset of each picture's cells, which is enough for eight parameters and ten times as fast.
 
     Args:
-        examples: at least one, on one grid.
+        examples: training examples, at least one, all on the same grid.
         steps: number of steps, each over 15 pictures, or over all if there are fewer.
-        rng: generator of the initial parameters and of the subsets.
+        rng: random generator of the initial parameters and of the subsets.
     """
     numbers = torch.tensor(rng.uniform(0, 1, NUMBERS), dtype=torch.float32, requires_grad=True)
     optimiser = torch.optim.Adam([numbers], lr=LEARNING_RATE)

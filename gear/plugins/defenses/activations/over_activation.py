@@ -19,10 +19,10 @@ Cells = tuple[int, int]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ChannelStatistics:
-    """Mean and standard deviation of the channels of a feature map on clean pictures.
+    """Mean and standard deviation of each channel of a feature map, on clean pictures.
 
     Attributes:
-        mean, deviation: (C,) mean and standard deviation over the cells of a picture.
+        mean, deviation: (C,) mean and standard deviation over the cells of the feature map.
     """
 
     mean: Tensor
@@ -35,8 +35,9 @@ class ChannelStatistics:
 
 
 def channel_statistics(features: Tensor, grid: Cells) -> ChannelStatistics:
-    """Statistics of one (C, h, w) map on the grid: each cell is weighted by the number of grid places whose nearest
-    cell it is.
+    """Mean and standard deviation of each channel of one (C, h, w) feature map, measured on a grid.
+
+    Each cell of the map has as much weight as there are places on the grid whose nearest cell it is.
     """
     down, across = (_nearest(*sizes).sum(dim=0) for sizes in zip(features.shape[1:], grid, strict=True))
     times, count = down[:, None] * across, grid[0] * grid[1]
@@ -46,7 +47,9 @@ def channel_statistics(features: Tensor, grid: Cells) -> ChannelStatistics:
 
 
 def mean_of(many: Sequence[ChannelStatistics]) -> ChannelStatistics:
-    """Averages the means and deviations of at least one picture, as published."""
+    """The mean of the statistics of several pictures (at least one): means and deviations are averaged, as
+    published.
+    """
     return ChannelStatistics(
         mean=torch.stack([one.mean for one in many]).mean(dim=0),
         deviation=torch.stack([one.deviation for one in many]).mean(dim=0),

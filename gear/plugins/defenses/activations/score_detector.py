@@ -41,7 +41,7 @@ class Learnt:
         layer: name of the tap that is read.
         usual: statistics of the features of clean pictures.
         level: raw score above which the alarm is raised.
-        report: the fit report.
+        report: facts about the calibration, for the user.
     """
 
     layer: str
@@ -50,12 +50,12 @@ class Learnt:
     report: FitReport
 
     def fit_report(self) -> FitReport:
-        """The alarm level, and the rate at which clean pictures of the same kind exceed it."""
+        """Facts about the calibration: the alarm level, and how often clean pictures of the same kind exceed it."""
         return self.report
 
 
 class Detector:
-    """A `Defense` that does not change pictures and returns a score that the sample is attacked.
+    """A `Defense` that does not change pictures; its score says how likely it is that a sample is attacked.
 
     Args:
         layer: name of the tap to read; "" for the deepest.

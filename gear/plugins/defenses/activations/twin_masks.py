@@ -10,13 +10,15 @@ from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
 LEAST_CHANGE = 12
-"""Smallest change of a channel in levels that counts; light from a patch changes its surroundings by less."""
+"""A pixel has changed if one of its channels differs by at least this (of 255). Light that a patch throws on its
+surroundings changes them by less.
+"""
 
 CLOSING_PX = 5
-"""Largest holes in pixels that are filled, where the patch has the colour of the covered pixels."""
+"""Largest size in pixels of holes that are filled. There are holes where the patch has the colour of what it covers."""
 
 MOST_CHANGED = 0.5
-"""Share of changed pixels above which the pictures are considered different scenes."""
+"""If a larger share of the pixels has changed, the pictures are considered different scenes."""
 
 
 def patch_area(clean: UInt8Image, patched: UInt8Image, number: int) -> npt.NDArray[np.bool_]:

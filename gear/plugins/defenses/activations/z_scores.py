@@ -33,10 +33,10 @@ class Usual:
     deviation: Tensor
 
     def z_scores(self, values: Tensor) -> Tensor:
-        """(values - mean) / deviation.
+        """Z-scores of features: (values - mean) / deviation.
 
         Raises:
-            GearError: the shape of the features differs from the calibration's, because the pictures have another size.
+            GearError: the features have another shape than in the calibration, because the pictures have another size.
         """
         if values.shape != self.mean.shape:
             here, there = (" x ".join(map(str, one.shape)) for one in (values, self.mean))
@@ -48,12 +48,12 @@ class Usual:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Moments:
-    """Sums over samples from which means and deviations are computed.
+    """Count, mean and sum of squared deviations of samples, from which standard deviations are computed.
 
     Attributes:
         count: number of samples.
         mean: mean of each feature, float64.
-        squares: sum of squared deviations from the mean, of each feature.
+        squares: sum of squared deviations from the mean, for each feature, float64.
     """
 
     count: int
@@ -90,10 +90,10 @@ NO_MOMENTS = Moments(count=0, mean=torch.zeros(()), squares=torch.zeros(()))
 
 
 def moments(samples: Iterable[Tensor]) -> Moments:
-    """Computes the moments of samples of equal shape in one pass.
+    """Count, mean and sum of squared deviations over tensors of one shape, computed in one pass.
 
     Raises:
-        GearError: shapes differ.
+        GearError: the shapes differ.
     """
     total = NO_MOMENTS
     for sample in samples:
@@ -103,10 +103,10 @@ def moments(samples: Iterable[Tensor]) -> Moments:
 
 
 def usual(samples: Iterable[Tensor]) -> Usual:
-    """Computes means and standard deviations of samples of equal shape in one pass.
+    """Mean and standard deviation of each feature over tensors of one shape, computed in one pass.
 
     Raises:
-        GearError: there are fewer than two samples, or their shapes differ.
+        GearError: there are fewer than two tensors, or their shapes differ.
     """
     return moments(samples).usual()
 
@@ -150,7 +150,9 @@ def _rank(count: int, false_alarms: float) -> int:
 
 
 def sureness(raw: float, level: float) -> float:
-    """A score in 0..1 that grows with `raw` (0 or more) and is 0.5 at `level`."""
+    """Converts a raw score (0 or more) to a score in 0..1: it grows with the raw score and is 0.5 at the alarm
+    level.
+    """
     if not math.isfinite(raw):
         return 1.0
     return raw / (raw + max(level, LEAST_LEVEL))

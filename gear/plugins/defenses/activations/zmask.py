@@ -36,7 +36,7 @@ from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
 LEAST_AUROC = 0.75
-"""Smallest AUROC over the cells of a layer's heat map with which the layer is used."""
+"""A layer is used if its heat map separates patches from other cells with at least this area under the ROC curve."""
 
 LAYER_PICTURES = 12
 """Largest number of patched pictures by which layers are chosen."""
@@ -69,12 +69,14 @@ class Learnt:
     report: FitReport
 
     def fit_report(self) -> FitReport:
-        """The loss and the mask IoU of the fusion block on the calibration data, and the alarm level."""
+        """Facts about the calibration: loss and mask IoU of the fusion block on the calibration data, and the
+        alarm level.
+        """
         return self.report
 
 
 class ZMask:
-    """The defense. Its statistics and its fusion block are fitted to pictures of the reference camera."""
+    """The defense Z-Mask. Its statistics and its fusion block are fitted to pictures of the reference camera."""
 
     def __init__(self, settings: ZMaskConfig) -> None:
         self._settings = settings
@@ -138,7 +140,7 @@ class ZMask:
         raise ValueError("Z-Mask looks into the model: it has `forward_fitted`")
 
     def forward_fitted(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> Mapping[str, Tensor]:
-        """The pictures of `defend_batch`."""
+        """The cleaned pictures; those of `defend_batch`."""
         return self.defend_batch(views, model, state).views
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> DefendedBatch:

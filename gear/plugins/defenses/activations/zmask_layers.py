@@ -1,4 +1,4 @@
-"""The inputs of Z-Mask: the layers that it reads, and the pictures of a rig."""
+"""What Z-Mask reads: the layers of a network, and the pictures of a camera rig."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ LEFT, RIGHT = "left", "right"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layers:
-    """The feature maps that are read.
+    """The feature maps that Z-Mask reads.
 
     Attributes:
-        shallow, deep: names of the taps.
+        shallow, deep: names of the taps with shallow and with deep feature maps.
     """
 
     shallow: tuple[str, ...]
     deep: tuple[str, ...]
 
     def all(self) -> tuple[str, ...]:
-        """All names without repetitions."""
+        """Names of all taps that are read, each once."""
         return tuple(dict.fromkeys((*self.shallow, *self.deep)))
 
 
