@@ -214,3 +214,16 @@ def test_a_false_alarm_of_any_height_counts() -> None:
 
 def test_every_metric_is_a_share() -> None:
     assert evaluator().range_of("ap") == (0.0, 1.0)
+
+
+def test_a_false_alarm_counts_among_the_sizes_of_its_own_box() -> None:
+    """190 x 10 px are 1900 px2, medium as the car is; 150 x 100 px are large, and no alarm among medium objects."""
+    for box, precision in (((0, 185, 190, 195), 0.5), ((50, 85, 200, 185), 1.0)):
+        metric = evaluator()
+        metric.update(picture(0, CAR), [found(0.5), found(0.9, box)])
+        assert metric.result()["ap_medium"] == pytest.approx(precision)
+
+
+def test_a_box_without_width_or_height_is_a_detection_that_finds_nothing() -> None:
+    for box in ((50, 20, 50, 80), (20, 50, 120, 50)):
+        assert evaluator().update(picture(0, CAR), [found(0.9, box)]) == {"found_share": 0, "false_alarms": 1}

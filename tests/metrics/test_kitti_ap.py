@@ -360,3 +360,9 @@ def test_without_labels_nothing_is_known_and_nothing_has_a_ceiling() -> None:
     assert evaluator.ceilings() == {}
     curve = perfect_curve([])
     assert curve.shape == (41,) and np.isnan(curve).all()
+
+
+@pytest.mark.parametrize("box", [(100, 100, 100, 160), (100, 160, 200, 160)])
+def test_a_box_without_width_or_height_is_measured(box: tuple[float, float, float, float]) -> None:
+    evaluator: KittiEvaluator[list[KittiLabel]] = KittiEvaluator(lambda labels: labels)
+    assert evaluator.update([CAR], [replace(CAR, score=0.9, box_px=box)]) == {"found_share": 0, "false_alarms": 1}
