@@ -101,3 +101,11 @@ def test_a_crowd_is_not_outvoted_by_what_stands_behind_it() -> None:
 def test_coarse_ties_stay() -> None:
     checker = (np.indices((20, 20)).sum(axis=0) // 10 % 2).astype(np.uint16) + 11
     np.testing.assert_array_equal(coarsen(checker, 3)[12:18, 12:18], checker[12:18, 12:18])
+
+
+def test_a_single_pixel_goes_to_what_surrounds_it() -> None:
+    for row, column in ((4, 6), (0, 0), (8, 12)):
+        instances = np.full((9, 13), 11, dtype=np.uint16)
+        instances[row, column] = 20
+        assert (coarsen(instances, 3) == 11).all()
+        np.testing.assert_array_equal(coarsen(instances, 1), instances)

@@ -348,8 +348,10 @@ def test_draws_are_evaluated_at_moderate_difficulty_each_for_itself() -> None:
     evaluator: KittiEvaluator[list[KittiLabel]] = KittiEvaluator(lambda labels: labels)
     evaluator.update([], [])
     evaluator.update([CAR, replace(CAR, occluded=1, box_px=(500, 100, 600, 160))], [replace(CAR, score=0.9)])
-    values = evaluator.resampled(np.array([[0] * 60, [1] * 60]))["car_2d_moderate_r40"]
-    assert math.isnan(values[0])
+    spread = evaluator.resampled(np.array([[0] * 60, [1] * 60]))
+    values = spread["car_2d_moderate_r40"]
+    assert math.isnan(values[0]) and math.isnan(spread["ap_3d_moderate"][0])
+    assert spread["ap_3d_moderate"][1] == spread["car_3d_moderate_r40"][1] > 0, "the mean of the one class there is"
     assert values[1] == pytest.approx(0.5), "half of the labels are found, at recalls up to 20 of 40"
 
 
