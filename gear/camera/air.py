@@ -110,7 +110,7 @@ class Air:
         rays, glow = self._directions(camera)
         planes = [np.empty(depth_m.shape, np.uint16) for _ in range(3)]
         colours = cv2.split(linear_rgb)
-        # Strips stay in the processor's cache: half the time of whole pictures.
+        # Strips of rows stay in the processor's cache, which takes half the time of whole pictures.
         for top in range(0, len(depth_m), _STRIP_ROWS):
             rows = slice(top, top + _STRIP_ROWS)
             through = self._through(depth_m[rows], rays[:, rows], float(camera.world_from_camera.position_m[2]))

@@ -136,7 +136,7 @@ class LampGlare:
         result = np.zeros(size_px, np.float32)
         for place, size, strength in zip(self.places_px, self.size_px, self.strength, strict=True):
             sigma = max(_LEAST_SIGMA_PX, size)
-            # A lamp smaller than the smallest spot has a darker spot.
+            # A lamp that is smaller than the smallest spot gets that spot, but darker.
             peak = strength * min(1.0, size / sigma)
             for width, height in ((1.0, peak), (_GLARE_WIDTH, _GLARE_SHARE * peak)):
                 _add_spot(result, place, (width * sigma, width * sigma), height)

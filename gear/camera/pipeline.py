@@ -142,12 +142,12 @@ class CameraPipeline:
             is_ground = np.append(np.isin(geoms.label_code, GROUND_CODES), False)
             linear_rgb = self.contact_shadows.apply(linear_rgb, raw.depth_m, is_ground[raw.geom_id], camera, record)
         if self.water.share > 0 or reflection is not None:
-            # Index -1, nothing, finds the last entry.
+            # The appended entry is found by id -1 (no geom).
             holds_water = np.append(np.isin(geoms.label_code, OPEN_GROUND_CODES), False)
             linear_rgb = self.water.apply(linear_rgb, raw.depth_m, holds_water[raw.geom_id], camera, reflection)
         if lamps is not None:
             linear_rgb = lamps.apply_reflections(linear_rgb)
-            del lamps  # much memory
+            del lamps  # frees much memory
         linear_rgb = self.air.apply(linear_rgb, raw.depth_m, camera)
         if self.rain.intensity > 0:
             rng = derive_rng(record.seed, "rain", record.index, camera.name)

@@ -116,7 +116,7 @@ def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
         [columns.ravel(), rows.ravel() * (pinhole.fx_px / pinhole.fy_px), np.full(columns.size, pinhole.fx_px)]
     )
     rays = (world_from_camera.rotation @ (rays / np.linalg.norm(rays, axis=0))).T
-    # Including the horizon, which lies between two rays.
+    # The horizon lies between two rays, so the rays just above it are included.
     step = max(camera.width_px / (_RAYS[0] - 1) / pinhole.fx_px, camera.height_px / (_RAYS[1] - 1) / pinhole.fy_px)
     seen = rays[rays[:, 2] < step]
     if not (rays[:, 2] < 0).any() or world_from_camera.translation_m[2] <= height_m:

@@ -29,7 +29,7 @@ class Parser(argparse.ArgumentParser):
         flag = next((word.partition("=")[0] for word in unknown if word.startswith("-")), None)
         if flag is None:
             self.error(f"does not know what to do with {' '.join(unknown)!r}")
-        # Compared without the dashes: they are half of a short flag, so that --resume would resemble --set.
+        # Flags are compared without dashes; with them --resume would resemble --set.
         flags = {known.lstrip("-"): known for known in self._option_string_actions}
         close = difflib.get_close_matches(flag.lstrip("-"), flags, n=1)
         self.error(f"no flag {flag}" + (f"; did you mean {flags[close[0]]}?" if close else ""))

@@ -77,7 +77,7 @@ class HomographyCompositor(BaseCompositor):
         truths = [self._truth(sample, s.name, view) for s in record.surfaces]
         units = [unit_from_image(t, s, camera) for t, s in zip(truths, record.surfaces, strict=True)]
 
-        # Four samples per pixel; with a lens, four of each of the pinhole's pixels that it mixes.
+        # Four samples per pixel; with a lens, four for each pinhole pixel that a pixel mixes.
         scheme = replace(_FOUR_SAMPLES, effects=recorded_effects(camera))
         exposure = Exposure(camera=camera, scene=record)
 

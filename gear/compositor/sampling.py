@@ -154,7 +154,7 @@ def _smoothed(x: Array, y: Array, mask: Mask) -> tuple[Array, Array, Array]:
     neighbours that show the surface.
     """
     padded = np.pad(mask, 1)
-    inner = np.pad(mask, 1, mode="edge")  # the picture's border is no edge
+    inner = np.pad(mask, 1, mode="edge")  # the border of the picture does not count as an edge
     column, row = x[:, 0].astype(int), y[:, 0].astype(int)
 
     def shows(grid: Mask, dx: int, dy: int) -> Mask:
@@ -174,5 +174,5 @@ def _smoothed(x: Array, y: Array, mask: Mask) -> tuple[Array, Array, Array]:
             weights.append(np.where(plain, float(dx == 0 and dy == 0), smooth))
     weight = np.stack(weights, axis=1)
     lost = weight.sum(axis=1) <= 0
-    weight[lost, 4] = 1.0  # the middle
+    weight[lost, 4] = 1.0  # the pixel itself
     return np.stack(xs, axis=1), np.stack(ys, axis=1), weight

@@ -63,7 +63,7 @@ class _Product(torch.autograd.Function):
 def _csr(matrix: Any, device: torch.device) -> Tensor:
     matrix.sort_indices()
     with warnings.catch_warnings():
-        # torch warns once per process that sparse CSR tensors are in beta.
+        # Hides torch's warning that sparse CSR tensors are in beta.
         warnings.filterwarnings("ignore", "Sparse", UserWarning)
         return torch.sparse_csr_tensor(
             torch.from_numpy(matrix.indptr.astype(np.int32)),

@@ -94,13 +94,13 @@ def _load(path: Path) -> Any:
     """
     try:
         with torch.serialization.safe_globals(PLAIN_GLOBALS), warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # about newer protocols of pickle
+            warnings.simplefilter("ignore", UserWarning)  # torch warns of newer pickle protocols
             return torch.load(path, map_location="cpu", weights_only=True)
     except pickle.UnpicklingError as error:
         found = re.search(r"GLOBAL ([\w.]+)", str(error))
         wanted = found[1] if found else _foreign_global(path)
         if wanted is None:
-            # torch's message suggests to read the file unsafely; the reason alone is passed on.
+            # torch's message suggests reading the file unsafely, so only the reason is taken from it.
             reason = re.search(r"WeightsUnpickler error: *(\S.*)", str(error))
             why = reason[1] if reason else "it is no plain pickle of tensors"
             raise GearError(f"{path}: not a checkpoint that can be read safely ({why})") from error

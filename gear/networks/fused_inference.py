@@ -52,7 +52,7 @@ class KeptCopy(Generic[Made]):
         with _MAKING:
             if self._made is None or self._marks != marks:
                 self._made, self._marks = make(), marks
-                # Holding the tensors keeps their memory from being used by others.
+                # Holding the tensors prevents other tensors from using their memory.
                 self._held = [tensor.detach() for tensor in tensors]
             return self._made
 

@@ -176,7 +176,7 @@ def _channels_first(pictures: Sequence[UInt8Image]) -> npt.NDArray[np.uint8]:
     height, width, channels = size = pictures[0].shape
     stacked = np.empty((len(pictures), channels, height, width), np.uint8)
     for planes, picture in zip(stacked, pictures, strict=True):
-        if picture.shape != size or picture.dtype != np.uint8:  # OpenCV may use another memory layout
+        if picture.shape != size or picture.dtype != np.uint8:  # otherwise OpenCV would not write into `planes`
             raise ValueError(f"a batch has uint8 pictures of one size: {size} and {picture.dtype} {picture.shape}")
         cv2.split(picture, list(planes))
     return stacked

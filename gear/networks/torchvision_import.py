@@ -83,7 +83,7 @@ def _import_again() -> None:
     for name in [name for name in sys.modules if name.split(".")[0] == NAME]:
         del sys.modules[name]
     importlib.import_module(NAME)
-    # It asks this before every use of an operator. While it was imported the answer had to be no: it would have
-    # registered gradients for operators that are not there.
+    # torchvision calls `_has_ops` before every use of an operator. During the import it had to return False; otherwise
+    # torchvision would have registered gradients for operators that do not exist.
     for module in (f"{NAME}.extension", f"{NAME}.ops.roi_align"):
         sys.modules[module].__dict__["_has_ops"] = lambda: True

@@ -34,7 +34,7 @@ def nms(boxes: Tensor, scores: Tensor, iou_threshold: float) -> Tensor:
         shared = np.prod(np.maximum(high - low, 0), axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             iou = shared / (areas[best] + areas[rest] - shared)
-        order = rest[~(iou > iou_threshold)]  # boxes without area have no IoU and stay
+        order = rest[~(iou > iou_threshold)]  # boxes without area have no IoU and are kept
     return torch.tensor(kept, dtype=torch.int64, device=boxes.device)
 
 

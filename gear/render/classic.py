@@ -208,7 +208,7 @@ class ClassicRenderer:
         depth = np.empty((camera.height_px, camera.width_px), np.float32)
         self._render_and_read(camera, pixels, depth, seen=(_FLAGS.mjRND_SEGMENT, _FLAGS.mjRND_IDCOLOR))
         geoms = self._scene.geoms[: self._scene.ngeom]
-        # Pixels hold the geom's position in the scene plus one; index -1, nothing, finds the last entry.
+        # Pixels hold the geom's position in the scene plus one; 0 (no geom) becomes -1, the last entry.
         geom_of_place = np.full(self._scene.ngeom + 1, -1, np.int32)
         for geom in geoms:
             if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM:

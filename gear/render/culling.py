@@ -44,7 +44,7 @@ def in_frustum(frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
         (frustum.up_world, frustum.half_height_m, frustum.centre_up_m),
     ):
         slope, middle = half_size_m / NEAR_M, centre_m / NEAR_M
-        # Distance beyond the side's plane, measured along its normal; both sides at once, with the longer normal.
+        # Distance outside a side plane, along its normal. Both sides are tested at once, with the longer normal.
         beyond = (np.abs(towards @ axis - middle * ahead) - slope * ahead) / np.hypot(1.0, slope + abs(middle))
         seen &= beyond < radii_m
     return np.asarray(seen)

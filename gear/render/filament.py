@@ -90,7 +90,7 @@ class FilamentRenderer:
         self._face_textures: OrderedDict[bytes, Any] = OrderedDict()
         self._retired_textures: list[Any] = []
         self._closed = False
-        with native_output():  # the driver's thread writes its messages before the first frame is done
+        with native_output():  # the driver's thread writes its messages while the first frames are drawn
             for _ in range(_FRAMES_TO_SETTLE):
                 self._geom_id(_FIRST_LOOK)
 
@@ -263,7 +263,7 @@ def _start() -> tuple[Any, list[str], dict[str, bool]]:
         except VulkanUnavailableError as error:
             raise BackendError("filament", str(error), _REMEDY) from error
         try:
-            import mujoco.studio._studio  # registers Filament's materials
+            import mujoco.studio._studio  # the import registers Filament's materials
             from mujoco import mjrf
         except ImportError as error:
             problem = f"this MuJoCo {mujoco.__version__} has no Filament ({error})"

@@ -12,9 +12,9 @@ from contextlib import ExitStack, contextmanager
 
 _CHATTER = re.compile(
     r"Using 'soft' CircularBuffer|FEngine |Backend feature level|Vulkan device driver|Selected physical device"
-    # Small frames follow each other faster than it measures them.
+    # Printed if small frames follow each other faster than Filament measures them.
     r"|FrameInfo's circular queue is full"
-    # A large world outgrows Filament's pool of handles; it says so with a stack trace and takes them from the heap.
+    # Printed with a stack trace if a large world needs more handles than Filament's pool has; it then uses the heap.
     r"|^PanicLog$|in allocateHandleSlow|HandleAllocator arena is full|^#\d+\s+\S+\s+0x[0-9a-f]+\s|^#\d+\s.*unknown"
 )
 

@@ -167,7 +167,7 @@ def distort(view: RawView, lens: Lens, pinhole: Intrinsics) -> RawView:
     Raises:
         ValueError: the distortion folds the picture over.
     """
-    import cv2  # not at the top: configs are read without OpenCV
+    import cv2  # imported here, so that configs can be read without OpenCV
 
     found = lens_map(lens, pinhole)
     assert view.linear_rgb is not None

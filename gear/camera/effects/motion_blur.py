@@ -100,7 +100,7 @@ class MotionBlur(Effect):
         """For each moment: (H, W) float32 columns and rows of the sharp picture that the pixels read."""
         pinhole, depth_m = exposure.camera.intrinsics, truth.depth_m
         if exposure.geoms is not None:
-            # The ego car's own parts move with the camera: as sharp as what is endlessly far.
+            # The ego car's own parts move with the camera. With infinite depth they stay sharp.
             is_ego = np.append(exposure.geoms.object_id == exposure.scene.ego.id, False)[truth.geom_id]
             depth_m = np.where(is_ego, np.float32(np.inf), depth_m)
         inverse = np.nan_to_num(1 / depth_m, nan=0.0).astype(np.float32)

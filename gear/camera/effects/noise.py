@@ -70,7 +70,7 @@ class Noise(Effect):
     def _noisy(self, light: Tensor, normal: Tensor) -> Tensor:
         """The light plus noise; `normal` holds standard normal draws of the same shape."""
         variance = light * (self.shot_noise / 100) ** 2 + (self.read_noise / 100) ** 2
-        # The root has no finite slope at 0.
+        # The square root has no finite gradient at 0.
         return light + variance.clamp_min(1e-12).sqrt() * normal
 
 

@@ -40,7 +40,7 @@ class Vignette(Effect):
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
         """The view with darker corners, rounded."""
-        import cv2  # not at the top: configs are read without OpenCV
+        import cv2  # imported here, so that configs can be read without OpenCV
 
         assert view.linear_rgb is not None
         share = vignette_map(self.vignette, view.linear_rgb.shape[1], view.linear_rgb.shape[0])

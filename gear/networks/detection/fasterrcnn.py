@@ -61,7 +61,7 @@ class FasterRcnnDetector(Detector):
         (proposals,) = self._proposals(trunk)
         logits, deltas = self._box_heads(trunk, [proposals])
         missing = graph.rpn.post_nms_top_n() - len(proposals)
-        nothing = logits.new_zeros(1, logits.shape[1])  # a picture may have no proposals
+        nothing = logits.new_zeros(1, logits.shape[1])  # fills the missing proposals; a picture may have none
         nothing[:, 0] = SURE_BACKGROUND
         shrinkage = self.shrinkage(size_of(picture))
         return {

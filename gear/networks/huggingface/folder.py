@@ -51,7 +51,7 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
     try:
         with _quietly(), _offline():
             graph, found = _opened(options, auto)
-    except Exception as error:  # transformers passes on any exception that a damaged file causes
+    except Exception as error:  # a damaged file may cause any exception in transformers
         raise _refused(folder, auto, error) from error
     _check(graph, found, folder)
     if options.weights not in (FOLDER, NONE):
@@ -78,7 +78,7 @@ def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, 
     import transformers
 
     kind: Any = getattr(transformers, auto)
-    # If left open, transformers asks the user, and runs the folder's code after a "y".
+    # By default transformers would ask the user, and run the folder's code after a "y".
     common: dict[str, Any] = {"local_files_only": True, "trust_remote_code": False}
     said = read_mapping(Path(options.folder) / "config.json")
     described = _with_backbone(said)
@@ -88,14 +88,14 @@ def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, 
         else transformers.AutoConfig.for_model(**described)
     )
     if options.weights == FOLDER:
-        # In the file's own precision, the default of transformers, the network does not accept gear's pictures.
+        # By default transformers loads the file's own precision, in which the network does not accept float32 pictures.
         loaded: tuple[nn.Module, Mapping[str, Any]] = kind.from_pretrained(
             options.folder,
             config=config,
             use_safetensors=True,
             dtype=torch.float32,
             output_loading_info=True,
-            ignore_mismatched_sizes=True,  # `_check` names them; transformers refers to a table of its own
+            ignore_mismatched_sizes=True,  # `_check` reports them by name
             **common,
         )
         return loaded

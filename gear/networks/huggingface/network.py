@@ -189,7 +189,7 @@ class FolderDepth(FolderNetwork):
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """`depth_m` (B, H, W) in metres at the picture's size."""
         said = self.said(self.seen(pictures)).predicted_depth.float()
-        said = self.restored(said[:, None], pictures, "bicubic")[:, 0]  # as in transformers
+        said = self.restored(said[:, None], pictures, "bicubic")[:, 0]  # transformers uses bicubic interpolation too
         if self.options.inverse_scale:
             inverse = self.options.inverse_scale * said + self.options.inverse_shift
             said = 1 / inverse.clamp(min=1e-3)
@@ -250,7 +250,7 @@ class FolderDetector(FolderNetwork):
             scores = self._scores(logits)
             edges = torch.cat([boxes[:, :2] - boxes[:, 2:] / 2, boxes[:, :2] + boxes[:, 2:] / 2], dim=1) * scale
             edges = edges.clamp(min=0).minimum(scale)
-            surest, places = scores.flatten().topk(len(scores))  # as many as queries, of any class
+            surest, places = scores.flatten().topk(len(scores))  # as many detections as queries, of any class
             found = [
                 Detection(category_id=self._categories[index], box_px=(box[0], box[1], box[2], box[3]), score=score)
                 for score, index, box in zip(

@@ -156,12 +156,12 @@ _EDGES = {"shortest_edge", "longest_edge"}
 def _processor(name: str, facts: _Facts, needed_px: int, *, resizes: bool) -> Processor:
     does_resize = facts.flag("do_resize")
     if resizes and facts.flag("do_center_crop"):
-        # The part outside would have no prediction, but predictions are compared with labels of the whole picture.
+        # The part outside the crop would have no prediction, but labels cover the whole picture.
         raise facts.refuse("do_center_crop", "false (or set input_size to picture), for gear scores whole pictures")
     size = facts.size() if does_resize and name != "GLPN" else None
     scale = 255 * facts.number("rescale_factor") if facts.flag("do_rescale") else 255.0
     mean, std = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-    if facts.flag("do_normalize") and name != "MobileViT":  # whose class never pads
+    if facts.flag("do_normalize") and name != "MobileViT":  # the image processor of MobileViT never normalises
         mean, std = facts.channels("image_mean", is_positive=False), facts.channels("image_std", is_positive=True)
     multiple_px = _multiple_px(name, facts, size) if does_resize else 1
     pads_to_px = facts.pixels("size_divisor") if name == "DPT" and facts.flag("do_pad") else 0

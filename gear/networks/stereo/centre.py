@@ -86,8 +86,8 @@ def _band(left: Tensor, right: Tensor, disparities: int) -> Tensor:
     batch, channels, height, width = left.shape
     one = functional.normalize(left, dim=1).permute(0, 2, 3, 1).reshape(batch * height, width, channels)
     two = functional.normalize(right, dim=1).permute(0, 2, 1, 3).reshape(batch * height, channels, width)
-    # All pairs of columns in a row are one matrix product, of which a band is kept: faster than one
-    # product for each shift. With one more column a row, the band's rows lie one apart in memory.
+    # One matrix product gives all pairs of columns in a row; only a band of it is kept. This is faster than one product
+    # for each shift. One additional column per row makes each row of the band start one element later in memory.
     all_pairs = functional.pad(torch.bmm(one, two), (disparities - 1, 1))
     rows, _, step = all_pairs.stride()
     band = all_pairs.as_strided((batch * height, width, disparities), (rows, width + disparities + step, step)).flip(2)

@@ -62,7 +62,7 @@ def decode_cars(
     corner_px = (best % cells) * width / cells + start
     borders_px = borders * width[:, None] / cells + start[:, None]
     found = []
-    # In pixels of the original pictures, as in the authors' code: there a side's last pixel has more weight.
+    # In pixels of the original pictures, as in the authors' code. There the last pixel of a side has more weight.
     for i in legacy_nms(left / scale, scores, SAME_OVERLAP).tolist():
         box = [float(value) / scale for value in left[i]]
         width_m, height_m, length_m, sine, cosine = (float(value) for value in body[i])

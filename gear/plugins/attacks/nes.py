@@ -90,7 +90,9 @@ class Nes:
             indexes = batch_of(done, len(dataset), config.batch, seed)
             slope, seen = np.zeros_like(grid), list[float]()
             for _ in range(config.pairs):
-                if oracle.left < oracle.cost(indexes) + oracle.cost(()):  # clean answers are paid for once
+                if oracle.left < oracle.cost(indexes) + oracle.cost(
+                    ()
+                ):  # outputs on clean pictures are queried only once
                     break
                 change = self._change(draws, grid.shape)
                 ahead = oracle.harm(self._spread_out(np.clip(grid + change, 0, 1)), indexes)

@@ -83,7 +83,7 @@ class Square:
             textures, seed, done = saved["textures"].copy(), int(saved["seed"]), int(saved["done"])
             best = float(saved["best"])
             oracle.restore(saved)
-        turn = max(1, min(budget.steps, whole // oracle.cost(())) // config.turns)  # a step asks every model once
+        turn = max(1, min(budget.steps, whole // oracle.cost(())) // config.turns)  # a step queries every model once
         while done < budget.steps:
             indexes = batch_of(done // turn, len(dataset), config.batch, seed)
             if oracle.left < oracle.cost(indexes):

@@ -50,7 +50,7 @@ class Jpeg(PerPicture):
     def _recode(self, picture: UInt8Image) -> UInt8Image:
         _, data = cv2.imencode(".jpg", picture[..., ::-1], self._parameters)
         decoded = cv2.imdecode(data, cv2.IMREAD_COLOR)
-        assert decoded is not None  # it was encoded a line above
+        assert decoded is not None  # the data were encoded just above, so decoding succeeds
         return np.ascontiguousarray(decoded[..., ::-1], np.uint8)
 
 

@@ -57,7 +57,7 @@ bisenet_x39: ModelSpec[SegmentationOptions] = ModelSpec(
             data="Cityscapes, 19 classes (validation mIoU 70.3)",
             source="github.com/ycszen/TorchSeg, README, Google Drive 1hb_qk3QLwZtQUmevZUFOHNiRHhRr0IQB",
             licence="code MIT; Cityscapes' terms: trained models may be shared, no commercial use",
-            size_mb=7.5,  # of the network's tensors; the file may also hold an optimiser's state
+            size_mb=7.5,  # size of the network's tensors; the file may also contain an optimiser's state
         ),
     ),
     normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",

@@ -57,7 +57,7 @@ ddrnet23_slim: ModelSpec[SegmentationOptions] = ModelSpec(
             data="Cityscapes, 19 classes (validation mIoU 77.8)",
             source="github.com/ydhongHIT/DDRNet, README, Google Drive 1d_K3Af5fKHYwxSo8HkxpnhiekhwovmiP",
             licence="code MIT; Cityscapes' terms: trained models may be shared, no commercial use",
-            size_mb=23.0,  # of the network's tensors
+            size_mb=23.0,  # size of the network's tensors alone
         ),
     ),
     normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",

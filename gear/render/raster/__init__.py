@@ -46,7 +46,7 @@ def open_raster(model: mujoco.MjModel, *, quality: Quality = "film") -> RasterRe
         raise BackendError("raster", problem, f"{remedy}, or {_OTHERS}")
     context = open_context(backend, "raster")
     try:
-        # PyOpenGL takes whatever platform is chosen when it is imported first: the context's.
+        # PyOpenGL keeps the platform that is set at its first import, so it is imported after the context is opened.
         from gear.render.raster.renderer import RasterRenderer
 
         return RasterRenderer(model, context, quality=quality)

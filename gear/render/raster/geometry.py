@@ -131,7 +131,7 @@ def _texture_repeats(model: mujoco.MjModel, geom: int) -> Array:
     repeat: Array = model.mat_texrepeat[material].astype(np.float64)
     if model.mat_texuniform[material]:
         half_m = model.geom_size[geom, :2].astype(np.float64)
-        # Planes without a size have no end, and what is round has no second side.
+        # Planes of size 0 are infinite, and round primitives have no second size.
         instead = FAR_M if int(model.geom_type[geom]) == _PLANE else half_m[0]
         repeat = repeat * 2 * np.where(half_m > 0, half_m, instead)
     return repeat

@@ -54,7 +54,7 @@ class RasterRenderer:
             name="raster", backend="egl", driver=driver, device=name, is_software=is_software(name)
         )
         self._scene = Scene(model)
-        # The geom of each piece; index -1, nothing, finds the last entry.
+        # The geom of each piece; the appended entry is found by piece id -1 (nothing).
         self._geom_of_piece = np.append(self._scene.geom_of_piece, -1).astype(np.int32)
         self._ids_program = gl.Program("positions.vert", "ids.frag")
         self._sky_program = gl.Program("fullscreen.vert", "sky.frag")

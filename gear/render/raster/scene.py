@@ -163,7 +163,7 @@ class Scene:
             flags: preprocessor definitions for all shaders.
         """
         geoms = self.geom_of_piece[selection]
-        # A geom with a face is a group of its own.
+        # Each geom that shows a patch is a group of its own.
         kinds = np.where(np.isin(geoms, list(self._face_of_geom)), -1 - geoms, self._batch_of_geom[geoms])
         groups = [selection[kinds == kind] for kind in dict.fromkeys(kinds.tolist())]
         self._submit([(group, (matrix, flags)) for group in groups])

@@ -120,7 +120,7 @@ def view_cascades(frustum: Frustum, towards_sun: Array) -> tuple[Cascade, ...]:
     height_m = frustum.half_height_m + abs(frustum.centre_up_m)
     slope2 = (width_m**2 + height_m**2) / NEAR_M**2
     for end_m in CASCADE_ENDS_M:
-        # The smallest sphere about the part of the view between its two distances.
+        # The smallest sphere around the part of the view between the two distances.
         middle_m = min((begin_m + end_m) / 2 * (1 + slope2), end_m)
         half_side_m = _MARGIN * math.sqrt((end_m - middle_m) ** 2 + slope2 * end_m**2)
         centre_m = frustum.position_world_m + frustum.forward_world * middle_m

@@ -71,7 +71,7 @@ def linear_cubes(model: mujoco.MjModel) -> dict[int, Array]:
     for texture in range(model.ntex):
         width = int(model.tex_width[texture])
         if int(model.tex_type[texture]) != _FLAT and int(model.tex_nchannel[texture]) == 3:
-            # One picture may stand for all six faces.
+            # A texture with one picture uses it for all six faces.
             faces = np.broadcast_to(_texels(model, texture).reshape(-1, width, width, 3), (6, width, width, 3))
             is_srgb = int(model.tex_colorspace[texture]) == _SRGB
             cubes[texture] = (_LINEAR if is_srgb else np.arange(256) / 255)[faces]

@@ -29,7 +29,7 @@ def asset_files(library: AssetLibrary) -> dict[str, Path]:
         for path in root.rglob("*") if root.is_dir() else [root]:
             if (path.suffix.lower() in ASSET_SUFFIXES or path == library.town) and path.is_file():
                 files[f"{root.name}/{path.relative_to(root).as_posix()}"] = path
-    # gear's own files refer to no others. There are many, and resolving their paths would take most of the time.
+    # gear's own files refer to no other files. There are many, and resolving their paths would take most of the time.
     others = [
         path
         for path in files.values()
@@ -47,11 +47,11 @@ def _referred(path: Path) -> Iterator[tuple[str, Path]]:
     """The existing files to which an MJCF file and its includes refer: each name as written, and its path."""
     elements: list[tuple[Path, ET.Element]] = []
     files, folders = [path], dict[str, str]()
-    for file in files:  # grows by the files that are included
+    for file in files:  # `files` grows by the files that are included
         try:
             root = read_xml(file)
         except TownError:
-            continue  # reported where the file is read
+            continue  # the error is reported when the file is read for the world
         for compiler in root.iter("compiler"):
             folders.update({key: value for key, value in compiler.items() if key.endswith("dir")})
         elements += [(file, element) for element in root.iter()]

@@ -45,7 +45,12 @@ def read_xml(path: Path) -> ET.Element:
     """
     try:
         return ET.parse(check_regular(path)).getroot()
-    except (ET.ParseError, OSError, LookupError, ValueError) as error:  # the last two: an unknown encoding
+    except (
+        ET.ParseError,
+        OSError,
+        LookupError,
+        ValueError,
+    ) as error:  # LookupError and ValueError: an unknown encoding
         raise TownError(path, f"cannot be read as MJCF: {error}") from error
 
 
@@ -162,7 +167,7 @@ def _with_included(path: Path) -> Iterator[ET.Element]:
         TownError: one of the files is not XML, or cannot be read.
     """
     files = [path]
-    for file in files:  # grows by the files that are included
+    for file in files:  # the list grows by the files that are included
         root = read_xml(file)
         yield root
         included = [file.parent / name for include in root.iter("include") if (name := include.get("file"))]
@@ -204,7 +209,7 @@ class AssetLibrary:
         try:
             paths = [Path(text), Path(f"{text}.xml")] if is_path else [towns / f"{text}.xml"]
             found = next((path for path in (path.expanduser() for path in paths) if path.is_file()), None)
-        except (OSError, RuntimeError) as error:  # no such user's home, no permission, too long a name
+        except (OSError, RuntimeError) as error:  # unknown user in `~user`, no permission, or name too long
             problem = getattr(error, "strerror", None) or error
             raise UnknownNameError("town", text, hint=f"(cannot look there: {problem})") from error
         if found is None:
@@ -263,7 +268,7 @@ class AssetLibrary:
 def _is_there(path: Path) -> bool:
     try:
         return path.is_file()
-    except OSError:  # too long a name, or no permission
+    except OSError:  # the name is too long, or no permission
         return False
 
 

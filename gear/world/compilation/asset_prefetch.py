@@ -96,5 +96,5 @@ def _read(files: list[str]) -> None:
         else:
             ET.SubElement(assets, "mesh", name=str(number), file=file, inertia=_INERTIA)
     spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
-    spec.compiler.usethread = False  # the readers are the threads
+    spec.compiler.usethread = False  # this function already runs in several threads
     spec.compile()

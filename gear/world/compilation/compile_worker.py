@@ -42,7 +42,7 @@ def main(folder: str) -> None:
     key covers every file that was read. It does not cover a town that refers to files outside its assets, or a file
     that was edited in the meantime.
     """
-    gc.disable()  # the half million objects of the MJCF all live to the end; collecting took a third of the time
+    gc.disable()  # half a million objects live to the end; collecting garbage took a third of the time
     sys.setswitchinterval(_SWITCH_S)
     key = json.loads(sys.stdin.readline())
     library = AssetLibrary(Path(key["town"]))
@@ -74,7 +74,7 @@ def _lighting_in_process(weather: Weather) -> Callable[[], Lighting] | None:
     receiver, sender = fork.Pipe(duplex=False)
 
     def work() -> None:
-        receiver.close()  # so that sending fails, and this process ends, when its parent is gone
+        receiver.close()  # if the parent ends, sending fails and this process ends too
         sender.send(lighting_of(weather))
 
     fork.Process(target=work, daemon=True).start()

@@ -62,7 +62,7 @@ def load_mjcf(
             root = mjcf.from_xml_string(text, model_dir=str(path.parent), assets=mesh_paths)
     except (KeyError, ValueError, OSError, AttributeError, SyntaxError, RecursionError) as error:
         if text is not None:
-            load_mjcf(path)  # fails too, with the line numbers of the file
+            load_mjcf(path)  # raises the same error with the file's line numbers
         if isinstance(error, KeyError):
             what = f"{error.args[0]} is not known here"
             if what.endswith(tuple(f"'{tag}' is not known here" for tag in _UNREAD)):
@@ -74,7 +74,7 @@ def load_mjcf(
             what = without_breaks(error)
         raise TownError(path, f"cannot be read as MJCF: {what}") from error
     root.model = name or path.stem
-    # For each element without a name dm_control would count all elements in front of it, in quadratic time.
+    # For each element without a name dm_control would count all earlier elements, in quadratic time.
     for tag in ("geom", "site", "body"):
         for index, element in enumerate(root.find_all(tag)):
             if getattr(element, "name", "") is None:
@@ -144,7 +144,7 @@ class AssetInstances:
         dm_control.
         """
         plates = {geom: plate.full_identifier for geom, plate in self._next_plates(file).items()}
-        frame = self._model(file).full_identifier  # of the empty body that dm_control puts behind the first instance
+        frame = self._model(file).full_identifier  # names the empty body that dm_control puts after the first instance
         self._copies[frame].append(Copy(name=name, original=self._originals[file], plates=plates))
 
     def _fill(self, file: AssetFile, body: Any) -> None:
@@ -180,7 +180,7 @@ class AssetInstances:
         face = faces[0]
         if model.find("site", "surface") is None or face.material is None:
             raise TownError(file.path, f"face {face.name!r} needs a material, and a site `surface` in its middle")
-        if isinstance(face.material, str):  # dm_control leaves what it does not find as it is written
+        if isinstance(face.material, str):  # dm_control keeps names that it cannot resolve as text
             raise TownError(file.path, f"face {face.name!r} has the material {face.material!r}, which is not there")
         geom = self._root.find("geom", f"{body.name}_{face.name}")
         geom.material = self._own_material(face.material, geom.name)

@@ -109,7 +109,7 @@ def _from_cache(cache_dir: Path, plan: WorldPlan) -> CompiledWorld:
                     compiled = _load(scratch, plan)
                     if (scratch / MAY_CACHE).exists():
                         _store(scratch, entry)
-    # What failed in the subprocess fails here too, with an error that says why.
+    # If the subprocess failed, compiling here fails too, with an error that says why.
     return compiled or compile_world(plan)
 
 
@@ -153,7 +153,7 @@ def _compiled_in_subprocess(key: dict[str, Json], folder: Path) -> Iterator[bool
     The subprocess reports success before it ends, because freeing its memory takes a tenth of a second; in that time
     this process can already load the world.
     """
-    # os._exit leaves out the end of the interpreter, which would free half a million objects one by one.
+    # os._exit skips the shutdown of the interpreter, which would free half a million objects one by one.
     code = "import os, sys; from gear.world.compilation.compile_worker import main; main(sys.argv[1]); os._exit(0)"
     search_path = os.pathsep.join(path for path in sys.path if path)
     with subprocess.Popen(
@@ -161,7 +161,7 @@ def _compiled_in_subprocess(key: dict[str, Json], folder: Path) -> Iterator[bool
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        # The subprocess renders nothing, and MuJoCo's renderers take their time to be imported.
+        # The subprocess does not render, and importing MuJoCo's renderers takes time.
         env={**os.environ, "PYTHONPATH": search_path, "PYTHONSAFEPATH": "1", "MUJOCO_GL": "disabled"},
     ) as compiler:
         assert compiler.stdin is not None and compiler.stdout is not None
@@ -186,7 +186,7 @@ def _locked(entry: Path) -> Iterator[None]:
     import fcntl
 
     with entry.with_suffix(".lock").open("w") as lock:
-        with contextlib.suppress(OSError):  # a network file system
+        with contextlib.suppress(OSError):  # network file systems may not support locks
             fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 

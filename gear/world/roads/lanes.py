@@ -178,7 +178,7 @@ class LaneGraph:
             s_m, lateral_m, distance_m = lane.line.project(position_m)
             if best is None or distance_m < best[0]:
                 best = (distance_m, LanePoint(lane=lane.name, s_m=s_m, lateral_m=lateral_m))
-        assert best is not None  # a graph without lanes cannot be made
+        assert best is not None  # there is no graph without lanes
         return best[1]
 
 

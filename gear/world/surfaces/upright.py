@@ -38,7 +38,7 @@ def texture_problem(model: mujoco.MjModel, geom_id: int, surface_from_geom: Rigi
 def _wrong_box(rotation: Array) -> str:
     side = int(np.abs(rotation[2]).argmax())
     u, v = _BOX_TEXTURE[side]
-    # Rows are the surface's axes in the box's frame.
+    # The rows of `rotation` are the surface's axes in the box's frame.
     if rotation[0, u] > 0.999 and rotation[1, abs(v)] < -0.999:
         return ""
     return (

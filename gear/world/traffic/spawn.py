@@ -194,7 +194,7 @@ class Spawner:
         room_m = max(0.0, road.width_m / 2 - actor_type.half_width_m - 0.2)
         lateral_m = float(np.clip(rng.normal(0.0, 0.12), -room_m, room_m))
         vehicle = actor_type.vehicle
-        assert vehicle is not None  # people are drawn on walks
+        assert vehicle is not None  # people are never placed on lanes
         if vehicle.is_two_wheeler:
             lateral_m = -room_m * float(rng.uniform(0.3, 0.8))
         point, yaw_rad = vehicle_pose(road.line, s_m, actor_type.half_length_m, lateral_m)

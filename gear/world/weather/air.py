@@ -155,7 +155,7 @@ def fogs_of(weather: Weather) -> tuple[Fog, ...]:
         from_m=weather.fog_distance_m,
         thinning_per_m=_thinning(weather.fog_falloff),
     )
-    # One fog takes half of the time of two.
+    # One fog takes half the time of two.
     if (own.from_m, own.thinning_per_m) == (usual.from_m, usual.thinning_per_m):
         both = dataclasses.replace(own, per_m=float(weather.scattering_intensity * (fog + rain)))
         return tuple(one for one in (both,) if one.per_m > 0)

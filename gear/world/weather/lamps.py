@@ -213,7 +213,7 @@ def _quads(corners: Array, uv: Array) -> tuple[Array, Array]:
 
     is_fan = meet(0, 0) & meet(2, 1)
     fits = is_fan | (meet(1, 0) & meet(2, 2))
-    # No triangle belongs to two quads: of consecutive pairs every other one counts.
+    # No triangle may belong to two quads, so of consecutive pairs only every other one is used.
     places = np.arange(len(fits))
     fits &= (places - np.maximum.accumulate(np.where(fits, -1, places))) % 2 == 1
 

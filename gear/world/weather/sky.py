@@ -94,7 +94,7 @@ class Sky:
         )
         cover = weather.cloud_cover
         turbidity = float(np.clip(2.5 + 40 * (weather.mie_scattering_scale - 0.03), 2.0, 9.0))
-        # Twilight: the sun's last light goes within a few degrees.
+        # Twilight: the light of the sun vanishes within a few degrees.
         daylight = float(_smooth_step(math.radians(-8), math.radians(3), np.array(altitude)))
         through_clouds = 1 - 0.97 * float(_smooth_step(0.15, 0.95, np.array(cover)))
         return Sky(

@@ -73,7 +73,7 @@ def _is_open(class_name: str) -> bool:
 
 def _inherited_material(default: Any) -> Any:
     """The material that a default class, or a class around it, assigns to geoms."""
-    # A class that went around dm_control is known by name alone; such classes name no material.
+    # Of a class that did not pass dm_control only the name is known; such classes name no material.
     while default is not None and not isinstance(default, str) and default.tag == "default":
         if default.geom is not None and default.geom.material is not None:
             return default.geom.material

@@ -28,6 +28,6 @@ def vary(appearance: Appearance, patch: Tensor, rng: np.random.Generator) -> Ten
 def _box_blurred(patch: Tensor, side: int) -> Tensor:
     before, after = (side - 1) // 2, side // 2
     padded = functional.pad(patch[None], (before, after, before, after), mode="replicate")
-    # A convolution of each channel is some three times as fast as pooling with a stride of one.
+    # A depth-wise convolution is about three times as fast as pooling with stride one.
     box = patch.new_full((len(patch), 1, side, side), 1 / side**2)
     return functional.conv2d(padded, box, groups=len(patch))[0]

@@ -28,7 +28,7 @@ def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequ
     total = value(asked)
     gradients = torch.autograd.grad(total, asked, allow_unused=True) if total.requires_grad else [None] * len(asked)
     found = [torch.zeros_like(p) if g is None else g for p, g in zip(asked, gradients, strict=True)]
-    # Towards the middle only: a step that leaves 0..1 would be cut off.
+    # Only values whose step stays inside 0..1 are changed; other steps would be clipped.
     inside = [g * _room(p, g) for p, g in zip(asked, found, strict=True)]
     size = torch.stack([g.square().mean() for g in inside]).mean().sqrt()
     if size == 0:
@@ -37,7 +37,7 @@ def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequ
     with torch.no_grad():
         ahead = [(p + s / 2).clamp(0, 1) for p, s in zip(asked, steps, strict=True)]
         behind = [(p - s / 2).clamp(0, 1) for p, s in zip(asked, steps, strict=True)]
-        # Of the way that is gone: where few values carry the gradient, their share of the step is long and cut off.
+        # The predicted change uses the step after clipping: if few values carry the gradient, their steps are long.
         ways = [(g * (a - b)).sum() for g, a, b in zip(found, ahead, behind, strict=True)]
         return float(torch.stack(ways).sum()), float(value(ahead) - value(behind))
 

@@ -57,7 +57,7 @@ def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> d
 
     def keep(name: str) -> Callable[[nn.Module, Any, Any], None]:
         def hook(_: nn.Module, __: Any, output: Any) -> None:
-            # A copy: what comes after the tap may rectify it in place. A tap that runs more than once is taken first.
+            # The output is copied, because a later layer may change it in place. Of several runs the first is kept.
             if isinstance(output, Tensor):
                 seen.setdefault(name, output[:count].to("cpu", torch.float32, copy=True))
 
