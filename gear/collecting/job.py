@@ -31,6 +31,9 @@ from gear.values.serial import Json, to_json
 from gear.world.assets.asset_hash import assets_digest
 from gear.world.scene_spec import SceneSpec
 
+KINDS = ("probes", "scans")
+"""Further files of samples that a config may ask for. One that is not asked for is no part of a plan."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Job:
@@ -115,7 +118,7 @@ def resolve(config: CollectionConfig) -> Job:
         patch={"label": patch.label, "sha256": patch.digest},
         info=info,
         samples=split.samples * split.frames,
-        auxiliary=("probes",) if config.probes else (),
+        auxiliary=tuple(kind for kind in KINDS if getattr(config, kind)),
         recipe=recipe_of(config),
     )
     return Job(
@@ -134,7 +137,8 @@ def resolve(config: CollectionConfig) -> Job:
 def recipe_of(config: CollectionConfig) -> Json:
     """A collection's config without what belongs to one machine: its paths."""
     recipe: Json = to_plain(config)
-    for name in ("root", "patch", "town", "scenes", "simulation", *(() if config.probes else ("probes",))):
+    unused = [kind for kind in KINDS if not getattr(config, kind)]
+    for name in ("root", "patch", "town", "scenes", "simulation", *unused):
         recipe.pop(name)
     return recipe
 

@@ -15,6 +15,8 @@ from gear.contracts.rendering import RawView, Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
 from gear.dataset.output_checks import check_encoded
 from gear.dataset.probe_files import AuxiliaryFiles, probe_files
+from gear.dataset.scan_files import scan_files
+from gear.groundtruth.laser_scan import scan_cameras, scan_points
 from gear.plugins.build import blamed, build, find
 from gear.plugins.catalogue import PluginEntry
 from gear.render.registry import open_renderer
@@ -39,6 +41,7 @@ class Shot:
         below: reflections of wet ground, one per camera; None for dry ground.
         geoms, objects: tables of geoms and objects, as in `Frame`.
         probes: renders with black and white surfaces, where probes are collected.
+        scan: depth views of a laser scan, where scans are collected; else empty.
     """
 
     record: SceneRecord
@@ -47,6 +50,7 @@ class Shot:
     geoms: GeomTable
     objects: Mapping[int, SceneObject]
     probes: ProbeShot | None = None
+    scan: tuple[RawView, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -73,7 +77,18 @@ class Session:
         below = render_mirror_view(self.world, self.renderer, placed, record, self.pipeline)
         is_probed = self.job.config.probes
         probes = shoot_probes(self.world, self.renderer, placed, record, raw) if is_probed else None
-        return Shot(record=record, raw=raw, below=below, geoms=placed.geoms, objects=placed.objects, probes=probes)
+        scan: tuple[RawView, ...] = ()
+        if self.job.config.scans:
+            scan = self.renderer.render(placed.stage, scan_cameras(record.cameras[0]), colour=False)
+        return Shot(
+            record=record,
+            raw=raw,
+            below=below,
+            geoms=placed.geoms,
+            objects=placed.objects,
+            probes=probes,
+            scan=scan,
+        )
 
     def to_frame(self, shot: Shot) -> Frame:
         """Turns renders into pictures. It needs neither world nor renderer, so that it can run in parallel
@@ -98,10 +113,18 @@ class Session:
         with blamed(self.plugin, f"sample {shot.record.index}"):
             sample = self.task.ground_truth(frame, shot.record)
             encoded = check_encoded(self.task.encode(sample, self.job.plan.info), "encode")
-        if shot.probes is None:
-            return sample, encoded, {}
-        probes = compute_probes(self.pipeline, shot.probes, shot.record, shot.geoms, reflections)
-        return sample, encoded, probe_files(probes, self.job.plan.info.split, shot.record.index)
+        return sample, encoded, self._further_files(shot, reflections)
+
+    def _further_files(self, shot: Shot, reflections: Sequence[Reflection | None]) -> AuxiliaryFiles:
+        """Probes and laser scan, where the job asks for them."""
+        split, index = self.job.plan.info.split, shot.record.index
+        found: AuxiliaryFiles = {}
+        if shot.probes is not None:
+            probes = compute_probes(self.pipeline, shot.probes, shot.record, shot.geoms, reflections)
+            found = probe_files(probes, split, index)
+        if shot.scan:
+            found = {**found, **scan_files(scan_points([view.depth_m for view in shot.scan]), split, index)}
+        return found
 
 
 @contextlib.contextmanager

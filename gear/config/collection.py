@@ -125,6 +125,7 @@ class CollectionConfig:
         mix: factors on the frequency of kinds of vehicles, such as `{bus: 3}`.
         patch_seed: seed of random patches, separate from the split's, so that all splits show the same patch.
         probes: whether to store renders with each surface black and white, which the exact compositor needs.
+        scans: whether to store a laser scan (Velodyne HDL-64E) of each sample, for `gear export --layout kitti`.
         simulation: name or path of the simulation config.
         options: the task's own options (`gear plugins show TASK`).
         places: file, line and column of each given value, by key.
@@ -147,6 +148,7 @@ class CollectionConfig:
     mix: dict[str, float] = field(default_factory=dict)
     patch_seed: int = 0
     probes: bool = False
+    scans: bool = False
     simulation: str = "default"
     options: Node = field(default_factory=lambda: Mapping({}, Place("defaults")))
     places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)

@@ -60,13 +60,13 @@ def load_sealed(path: Path) -> Json:
 
 def is_whole(data: bytes) -> bool:
     """Whether a file matches its seal; true of files that have none."""
-    if _is_sealed(data):
+    if is_sealed(data):
         body = data[:-LENGTH] + END
         return data[-LENGTH:] == HEAD + hashlib.sha256(body).hexdigest().encode() + TAIL
-    return not _is_sealed(data.rstrip() + b"\n")  # else blanks at its end were lost or added
+    return not is_sealed(data.rstrip() + b"\n")  # else blanks at its end were lost or added
 
 
-def _is_sealed(data: bytes) -> bool:
+def is_sealed(data: bytes) -> bool:
     """Whether a file ends with a seal, perhaps a damaged one."""
     seal = data[-LENGTH:]
     frame, wanted = seal[: len(HEAD)] + seal[-len(TAIL) :], HEAD + TAIL

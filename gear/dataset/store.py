@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
+from gear.dataset.cards import write_cards
 from gear.dataset.claims import clear_claims
 from gear.dataset.closing import SidecarStream
 from gear.dataset.failures import clear_failures
@@ -249,8 +250,9 @@ class Store:
         return {"patches": {_relative(self.root, path): sha256(read_bytes(path)) for path in paths}} if paths else {}
 
     def close(self, task: Task[Any, Any], facts: Mapping[str, Json]) -> None:
-        """Writes the index files of the format and then the manifest. Does nothing when a run with more samples has
-        started meanwhile: that run closes the split.
+        """Writes the index files of the format, then the manifest, then the dataset's card.
+
+        Does nothing when a run with more samples has started meanwhile: that run closes the split.
 
         Args:
             task: the task, which makes the index files.
@@ -295,6 +297,7 @@ class Store:
         remove_empty_folders(self.root, _relative(self.root, notes))
         clear_claims(self.root, self.split)
         clear_failures(self.root, self.split)
+        write_cards(self.root)
         clear_scratch(self.root)
         sync_folder(target.parent)
 
@@ -350,7 +353,8 @@ def _remove_idle(root: Path, split: str) -> None:
 
 def remove_split(root: Path, split: str) -> None:
     """Deletes what gear wrote for a split, and nothing else: the files that its sidecars, its manifest and the notes of
-    what was being written name, and the copy of its patches, unless another split shows them.
+    what was being written name, and the copy of its patches, unless another split shows them. The dataset's card is
+    written anew.
 
     All paths are checked before the first file is deleted. A sample's sidecar is deleted before its files, so that no
     sample without its files is taken for whole when the deletion is interrupted. The files of a sample whose sidecar is
@@ -385,6 +389,7 @@ def remove_split(root: Path, split: str) -> None:
     if label and label not in others:
         remove_files(root, [_relative(root, path) for path in copies.glob("patch_*.png")])
         remove_empty_folders(root, _relative(root, copies))
+    write_cards(root)
 
 
 def _relative(root: Path, path: Path) -> str:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from gear.values.geometry import Array, Intrinsics
 from gear.values.ground_truth import BoxPx
@@ -208,6 +209,24 @@ def format_calibration(calibration: Calibration) -> bytes:
     ]
     lines = [f"{name}: " + " ".join(f"{v + 0.0:.12e}" for v in matrix.reshape(-1)) for name, matrix in rows]
     return ("\n".join(lines) + "\n").encode()
+
+
+SCAN = "scan/velodyne"
+"""Name of a laser scan among the auxiliary files of a sample."""
+
+
+def format_points(points: npt.NDArray[np.float32]) -> bytes:
+    """The bytes of a laser scan, (N, 4): x forward, y left, z up in metres, intensity 0..1; little-endian float32."""
+    return np.ascontiguousarray(points, dtype="<f4").tobytes()
+
+
+def parse_points(data: bytes) -> npt.NDArray[np.float32]:
+    """(N, 4) float32 points of a laser scan.
+
+    Raises:
+        ValueError: the bytes are no whole number of points.
+    """
+    return np.frombuffer(data, dtype="<f4").reshape(-1, 4).astype(np.float32)
 
 
 def parse_calibration(text: str) -> dict[str, Array]:

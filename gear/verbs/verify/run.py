@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gear.collecting.run import executor_of, run_job
+from gear.dataset.cards import damaged_cards, own_cards, write_cards
 from gear.dataset.guarded_paths import refuse_links, remove_files
 from gear.dataset.layout import sidecar_path, split_folder
 from gear.dataset.locks import is_at_work, turn
@@ -68,7 +69,7 @@ def _verified(
     checks = {name: check_split(root, name, callbacks.on_progress if name in chosen else None) for name in names}
     findings = _findings(root, checks, chosen)
     if sources is None or not findings:
-        return VerifyReport(root=root, files=_count(checks, chosen), findings=tuple(findings))
+        return VerifyReport(root=root, files=_count(root, checks, chosen), findings=tuple(findings))
     refuse_links(root)
     unrepaired: list[str] = []
     leftovers = any(one.detail for one in findings if one.problem == "unexpected")
@@ -78,12 +79,13 @@ def _verified(
                 _repair(root, checks[name], sources, workers, callbacks)
             except DatasetError as error:
                 unrepaired.append(str(error))
+    write_cards(root, is_repair=True)
     checks |= {name: check_split(root, name) for name in chosen}
     left = _findings(root, checks, chosen)
     paths = {one.path for one in left}
     return VerifyReport(
         root=root,
-        files=_count(checks, chosen),
+        files=_count(root, checks, chosen),
         findings=tuple(left),
         repaired=tuple(one for one in findings if one.path not in paths),
         unrepaired=tuple(unrepaired),
@@ -91,8 +93,11 @@ def _verified(
 
 
 def _findings(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) -> list[Finding]:
-    """The findings of the chosen splits. Files that belong to no split are found only if all splits are checked."""
+    """The findings of the chosen splits and of the cards. Files that belong to no split are found only if all splits are
+    checked.
+    """
     found = [finding for name in chosen for finding in checks[name].findings]
+    found += [Finding(path=path, problem=problem) for path, problem in damaged_cards(root).items()]
     unexpected = unexpected_files(root, checks.values())
     if len(chosen) < len(checks):
         folders = tuple({f"{Path(path).parent}/" for name in chosen for path in checks[name].known})
@@ -100,8 +105,8 @@ def _findings(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) 
     return list(dict.fromkeys([*found, *unexpected]))
 
 
-def _count(checks: dict[str, SplitCheck], chosen: Sequence[str]) -> int:
-    return len({path for name in chosen for path in checks[name].known})
+def _count(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) -> int:
+    return len({path for name in chosen for path in checks[name].known} | own_cards(root))
 
 
 def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callbacks: Callbacks) -> None:

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from gear.formats.exports.kitti import kitti_tree
+from gear.contracts.tasks import Auxiliary
+from gear.formats.exports.kitti import kitti_tree, labels_of
 from gear.formats.exports.layout import NoOptions
-from gear.formats.kitti_object import parse_labels
+from gear.formats.kitti_object import SCAN, parse_labels
 from gear.plugins.tasks.stereo3d import stereo3d
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.task_contract import INFO
@@ -34,7 +35,8 @@ def test_kitti_is_one_pool_with_lists(tmp_path: Path) -> None:
     assert files["ImageSets/trainval.txt"] == b"000000\n000001\n000002\n"
     assert files["training/image_3/000002.png"] == (tmp_path / "val/image_3/000001.png").read_bytes()
     assert len(parse_labels(files["training/label_2/000001.txt"].decode())) > 3
-    assert len(files) == 3 * 4 + 3
+    assert files["ImageSets/test.txt"] == b""
+    assert len(files) == 3 * 4 + 4
 
 
 def test_every_file_comes_from_its_own_split_and_index() -> None:
@@ -44,24 +46,49 @@ def test_every_file_comes_from_its_own_split_and_index() -> None:
         for name, indices in (("val", (0, 3)), ("test", (5,)), ("train", (1, 2)))
     ]
     files = dict(kitti_tree(splits, str.encode, NoOptions()))
-    sources = ["val/{}/000000", "val/{}/000003", "test/{}/000005", "train/{}/000001", "train/{}/000002"]
+    places = {
+        "training/{}/000000": "val/{}/000000", "training/{}/000001": "val/{}/000003",
+        "testing/{}/000000": "test/{}/000005",
+        "training/{}/000002": "train/{}/000001", "training/{}/000003": "train/{}/000002",
+    }  # fmt: skip
     expected = {
-        f"training/{folder}/{number:06d}.{suffix}": f"{source.format(folder)}.{suffix}".encode()
-        for number, source in enumerate(sources)
+        f"{place.format(folder)}.{suffix}": f"{source.format(folder)}.{suffix}".encode()
+        for place, source in places.items()
         for folder, suffix in (("image_2", "png"), ("image_3", "png"), ("calib", "txt"), ("label_2", "txt"))
     }
     lists = {
         "ImageSets/val.txt": b"000000\n000001\n",
-        "ImageSets/test.txt": b"000002\n",
-        "ImageSets/train.txt": b"000003\n000004\n",
-        "ImageSets/trainval.txt": b"000000\n000001\n000003\n000004\n",
+        "ImageSets/test.txt": b"000000\n",
+        "ImageSets/train.txt": b"000002\n000003\n",
+        "ImageSets/trainval.txt": b"000000\n000001\n000002\n000003\n",
     }
     assert files == expected | lists
 
 
-def test_one_list_alone_makes_no_trainval() -> None:
-    for name in ("train", "val"):
+def test_all_lists_of_the_benchmark_are_there() -> None:
+    """Converters read all four."""
+    for name in ("train", "val", "debug"):
         split = split_of(replace(INFO, split=name), "stereo3d", *records((0,)))
-        assert [path for path, _ in kitti_tree([split], str.encode, NoOptions()) if "ImageSets" in path] == [
-            f"ImageSets/{name}.txt"
-        ]
+        lists = {path: data for path, data in kitti_tree([split], str.encode, NoOptions()) if "ImageSets" in path}
+        wanted = {name, "trainval"} if name != "debug" else {name}
+        assert {path: bool(data) for path, data in lists.items()} == {
+            f"ImageSets/{one}.txt": one in wanted for one in ("train", "val", "trainval", "test", name)
+        }
+
+
+def test_scans_come_along_and_night_tests_are_tests() -> None:
+    split = split_of(replace(INFO, split="test_night"), "stereo3d", *records((2,)))
+    scan = Auxiliary(path="gear/test_night/scans/000002_velodyne.bin", facts={})
+    sidecar = replace(split.sidecars[0], auxiliary={SCAN: scan})
+    files = dict(kitti_tree([replace(split, sidecars=(sidecar,))], str.encode, NoOptions()))
+    assert files["testing/velodyne/000000.bin"] == scan.path.encode()
+    assert files["ImageSets/test_night.txt"] == b"000000\n" and files["ImageSets/test.txt"] == b""
+
+
+def test_regions_come_last_and_no_label_file_is_empty() -> None:
+    car = "Car 0.00 0 1.00 1.00 2.00 3.00 4.00 1.50 1.60 4.00 1.00 1.60 9.00 0.10\n"
+    region = "DontCare -1 -1 -10 1.00 2.00 3.00 4.00 -1 -1 -1 -1000 -1000 -1000 -10\n"
+    other = region.replace("1.00 2.00", "0.00 2.00")
+    assert labels_of(f"{region}{car}{other}{car}".encode()).decode() == f"{car}{car}{region}{other}"
+    (only,) = parse_labels(labels_of(b"").decode())
+    assert only.type == "DontCare" and only.box_px == (0, 0, 0, 0)

@@ -1,0 +1,177 @@
+"""The two files in a dataset's root that describe it: `README.md`, a dataset card, and `croissant.json`.
+
+They follow from the manifests of the finished splits, so that every run that finishes a split writes the same bytes.
+Both carry the hash of their own content. A file without one is the user's own and is neither changed nor deleted.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+from gear.dataset.files import inside, read_bytes, sha256, write_whole
+from gear.dataset.guarded_paths import owned, remove_file
+from gear.dataset.layout import GEAR, manifest_path, split_folder
+from gear.dataset.locks import turn
+from gear.dataset.plan import read_plan
+from gear.dataset.sealed_json import is_sealed, is_whole, load_sealed, sealed_json
+from gear.formats.croissant import FilePattern, croissant
+from gear.formats.dataset_card import SplitFacts, card
+from gear.formats.sample_parts import Part, column_of, parts
+from gear.values.errors import DatasetError
+from gear.values.serial import Json
+
+CARD, CROISSANT = "README.md", "croissant.json"
+CARDS = (CARD, CROISSANT)
+
+FIRST = ("leftimg8bit", "images", "image_2")
+"""Names of files that show what the camera sees; a card names them first."""
+
+STRUCTURE = (
+    "Files lie as the task's benchmark has them. `gear/<split>/samples/` holds the complete scene and ground truth of "
+    "each sample, `gear/<split>/manifest.json` versions, configuration and the SHA-256 of every file. gear checks all "
+    "of them with `gear verify`, reads them with `gear.open_dataset` and writes other layouts with `gear export`. "
+    "`croissant.json` describes the same in the Croissant format."
+)
+
+NOTE = re.compile(
+    rb"\n<!-- Written by gear; without this line gear leaves the file alone. sha256: ([0-9a-f]{64}) -->\n\Z"
+)
+MARK, END = b"<!-- Written by gear", re.compile(rb"sha256: [0-9a-f]{64} -->")
+"""Where one of them is damaged, the other one still says that gear wrote the card."""
+
+
+def write_cards(root: Path, *, is_repair: bool = False) -> None:
+    """Writes both files of a dataset, or removes them where no split is finished.
+
+    Args:
+        root: of the dataset.
+        is_repair: whether damaged files are written anew; otherwise files that were changed stay.
+
+    Raises:
+        DatasetError: the disk refuses, or a file is a link.
+    """
+    folder = owned(root, GEAR)
+    if not folder.is_dir():
+        return
+    with turn(folder):  # and not of the root, which the caller may have locked
+        wanted = cards(root)
+        for relative in CARDS:
+            path = owned(root, relative)
+            there = read_bytes(path) if path.exists() else None
+            is_free = there is None or _is_as_written(relative, there) or (is_repair and is_own(relative, there))
+            if not is_free or there == wanted.get(relative):
+                continue
+            if relative in wanted:
+                write_whole(root, relative, wanted[relative])
+            else:
+                remove_file(root, relative)
+
+
+def cards(root: Path) -> dict[str, bytes]:
+    """Both files by path; empty where no split is finished."""
+    finished = list(_finished(root))
+    if not finished:
+        return {}
+    facts = [one for one, _ in finished]
+    patterns = _patterns(finished)
+    configs = {
+        name: {split: sorted(globs) for split, globs in by_split.items()} for name, (_, by_split) in patterns.items()
+    }
+    files = [
+        FilePattern(name=name, suffix=suffix, globs=sorted(glob for globs in by_split.values() for glob in globs))
+        for name, (suffix, by_split) in patterns.items()
+    ]
+    files.append(
+        FilePattern(name="samples", suffix="json", globs=[f"{split_folder(one.name)}/samples/*.json" for one in facts])
+    )
+    hashes: dict[str, str] = {}
+    for one, manifest in finished:
+        hashes |= manifest["indexes"]
+        hashes[manifest_path(one.name)] = sha256(read_bytes(inside(root, manifest_path(one.name))))
+    return {
+        CARD: _noted(card(facts, configs, STRUCTURE).encode()),
+        CROISSANT: sealed_json(croissant(facts, files, hashes)),
+    }
+
+
+def damaged_cards(root: Path) -> dict[str, Literal["missing", "damaged"]]:
+    """What is wrong with the files, `missing` or `damaged`, by path. The user's own files are right."""
+    found: dict[str, Literal["missing", "damaged"]] = {}
+    is_finished = any(True for _ in _finished(root))
+    for relative in CARDS:
+        path = inside(root, relative)
+        if not path.is_file():
+            if is_finished:
+                found[relative] = "missing"
+        elif is_own(relative, data := read_bytes(path)) and not _is_as_written(relative, data):
+            found[relative] = "damaged"
+    return found
+
+
+def own_cards(root: Path) -> set[str]:
+    """Those of the two files that are there and are not the user's own."""
+    paths = {relative: inside(root, relative) for relative in CARDS}
+    return {relative for relative, path in paths.items() if path.is_file() and is_own(relative, read_bytes(path))}
+
+
+def is_own(relative: str, data: bytes) -> bool:
+    """Whether gear wrote a file, perhaps before it was damaged; else it is the user's own. An empty one is damaged."""
+    if not data:
+        return True
+    if relative == CARD:
+        return MARK in data or END.search(data) is not None
+    return is_sealed(data)
+
+
+def _is_as_written(relative: str, data: bytes) -> bool:
+    """Whether a file is one that gear wrote, to the byte."""
+    if relative == CROISSANT:
+        return is_sealed(data) and is_whole(data)
+    note = NOTE.search(data)
+    return note is not None and sha256(data[: note.start()]).encode() == note[1]
+
+
+def _noted(text: bytes) -> bytes:
+    """The text of a card with the hash of its content."""
+    line = f"\n{MARK.decode()}; without this line gear leaves the file alone. sha256: {sha256(text)} -->\n"
+    return text + line.encode()
+
+
+def _finished(root: Path) -> Iterator[tuple[SplitFacts, Json]]:
+    """The finished splits whose plan and manifest are whole, by name."""
+    for path in sorted((root / GEAR).glob("*/manifest.json")):
+        split = path.parent.name
+        try:
+            plan, manifest = read_plan(root, split), load_sealed(inside(root, manifest_path(split)))
+        except DatasetError:
+            continue
+        if plan is None or not isinstance(manifest, dict) or not _is_listed(manifest):
+            continue
+        yield SplitFacts.of(plan.info, plan.task["name"], len(manifest["samples"]), manifest), manifest
+
+
+def _is_listed(manifest: dict[str, Json]) -> bool:
+    samples, indexes = manifest.get("samples"), manifest.get("indexes")
+    return (
+        isinstance(samples, list)
+        and isinstance(indexes, dict)
+        and all(isinstance(one, dict) and isinstance(one.get("files"), dict) for one in samples)
+    )
+
+
+def _patterns(finished: list[tuple[SplitFacts, Json]]) -> dict[str, tuple[str, dict[str, set[str]]]]:
+    """For each kind of file its suffix, and by split the patterns that find the files; the camera's pictures first."""
+    found: dict[tuple[str, str], dict[str, set[str]]] = {}
+    for one, manifest in finished:
+        for part in _parts(one.name, manifest):
+            found.setdefault((part.name, part.suffix), {}).setdefault(one.name, set()).add(part.glob)
+    names = sorted(found, key=lambda kind: (kind[0] not in FIRST, kind))
+    return {column_of(*kind, names): (kind[1], found[kind]) for kind in names}
+
+
+def _parts(split: str, manifest: Json) -> Iterator[Part]:
+    for sample in manifest["samples"]:
+        yield from parts([path for path in sample["files"] if not path.startswith(f"{GEAR}/")], split)
