@@ -27,7 +27,8 @@ class Plan:
         patch: label and sha256 of the patch's pictures.
         info: names and seed for the format's index files.
         samples: number of frames of the split.
-        auxiliary: kinds of auxiliary files of each sample, `probes` and `scans`. Pictures and labels do not depend on them.
+        auxiliary: kinds of auxiliary files of each sample (`probes`, `scans`). Pictures and labels do not depend on
+            them.
         recipe: the collection's config without paths, from which damaged files can be made again; None in datasets of
             earlier versions. `content` already decides all bytes.
     """

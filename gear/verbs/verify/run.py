@@ -93,8 +93,9 @@ def _verified(
 
 
 def _findings(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) -> list[Finding]:
-    """The findings of the chosen splits and of the cards. Files that belong to no split are found only if all splits are
-    checked.
+    """The findings of the chosen splits and of the cards.
+
+    Files that belong to no split are found only if all splits are checked.
     """
     found = [finding for name in chosen for finding in checks[name].findings]
     found += [Finding(path=path, problem=problem) for path, problem in damaged_cards(root).items()]
