@@ -16,7 +16,7 @@ from gear.contracts.models import Recipe
 from gear.values.errors import FieldError
 
 SCALES, CROPS_PX = (0.1, 100.0), (16, 8192)
-"""Largest sides of crops and pictures; larger ones need more memory than machines have."""
+"""Ranges of scale factors and of the sides of crops in pixels; larger pictures need more memory than machines have."""
 
 MOST_RATE = 1e6
 """Largest learning rate. No network learns at this rate, and optimisers fail at rates that single precision cannot

@@ -19,10 +19,7 @@ import numpy as np
 import pytest
 
 import gear
-from gear.collecting.job import resolve
 from gear.collecting.run import CollectReport
-from gear.config.load import load_collection
-from gear.dataset.files import sha256
 from gear.dataset.sealed_json import sealed_json
 from gear.formats import rle
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
@@ -30,10 +27,8 @@ from gear.values.errors import (
     BackendError,
     ConfigError,
     DatasetError,
-    PatchError,
     SamplesFailedError,
     TownError,
-    UnknownNameError,
 )
 from tests.dataset.splits import tree
 from tests.verbs.conftest import Copy
@@ -226,126 +221,6 @@ def test_ctrl_c_while_workers_start_is_one_line(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(
-    ("changes", "error", "message"),
-    [
-        ({"task": "stereo3"}, UnknownNameError, "no task named 'stereo3'; did you mean stereo3d"),
-        ({"scene": "bord"}, UnknownNameError, "no scene of tiny named 'bord'; did you mean board"),
-        ({"town": "town1"}, UnknownNameError, "no town named 'town1'; did you mean town10"),
-        ({"weather": "ClearNon"}, UnknownNameError, "no weather named 'ClearNon'; did you mean ClearNoon"),
-        ({"split": "tset"}, UnknownNameError, "no split named 'tset'; did you mean test"),
-        ({"patch": "nowhere.png"}, PatchError, "is not there"),
-        ({"patch": "random", "scene": "no_billboard"}, PatchError, "random: the scene has no surface for a patch"),
-        ({"settings": ["optoins.width_px=3"]}, ConfigError, r"optoins: unknown key \(did you mean 'options'\?\)"),
-        ({"settings": ["options.width=3"]}, ConfigError, r"options.width: unknown key \(did you mean 'width_px'\?\)"),
-        ({"settings": ["options.width_px=3cm"]}, ConfigError, "options.width_px: expected int, got '3cm'"),
-        ({"settings": ["weather.cloudiness=-1"]}, ConfigError, "is a percentage"),
-    ],
-)
-def test_bad_input_gets_one_line_and_leaves_nothing(
-    changes: dict[str, Any], error: type[Exception], message: str, tmp_path: Path, collect_small: Collect
-) -> None:
-    with pytest.raises(error, match=message) as caught:
-        collect_small(changes.pop("task", "depth"), tmp_path / "out", **changes)
-    assert "\n" not in str(caught.value)
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("task: stereo3", r"c.yml:2:7: task: no task named 'stereo3'; did you mean stereo3d"),
-        ("scene: bord", r"c.yml:2:8: scene: no scene of tiny named 'bord'; did you mean board"),
-        ("scene: my.yml:bord", r"c.yml:2:8: scene: no scene of tiny named 'bord'"),
-        ("town: tinny", r"c.yml:2:7: town: no town named 'tinny'"),
-        ("scenes: tyny", r"c.yml:2:9: scenes: no scene library for town named 'tyny'; there are: harbour"),
-        ("weather: ClearNon", r"c.yml:2:10: weather.preset: no weather named 'ClearNon'; did you mean ClearNoon"),
-        ("weather: {wetness: 3, preset: Wet}", r"c.yml:2:31: weather.preset: no weather named 'Wet'"),
-        ("split: tset", r"c.yml:2:8: split: no split named 'tset'; did you mean test"),
-        ("simulation: defalt", r"c.yml:2:13: simulation: no simulation config named 'defalt'; did you mean default"),
-        ("patch: nowhere.png", r"c.yml:2:8: patch: patch nowhere.png: is not there"),
-    ],
-)
-def test_a_name_in_a_file_is_told_with_its_line(line: str, message: str, tmp_path: Path) -> None:
-    """A flag that gives another one is named as a flag's is: without a place."""
-    key = line.partition(":")[0]
-    usual = {"task": "depth", "town": str(TINY_TOWN), "scenes": str(TINY_SCENES), "scene": "board"}
-    (tmp_path / "my.yml").write_bytes(Path(TINY_SCENES).read_bytes())
-    line = line.replace("my.yml", str(tmp_path / "my.yml"))
-    file = tmp_path / "c.yml"
-    file.write_text(f"# mine\n{line}\n")
-    others = {name: value for name, value in usual.items() if name != key}
-    with pytest.raises(ConfigError, match=message):
-        resolve(load_collection(str(file), others))
-    with pytest.raises((UnknownNameError, PatchError)):
-        resolve(load_collection(str(file), others, [f"{key}=nonsense"]))
-
-
-def test_a_file_that_is_gone_or_damaged_is_named_with_its_remedy(
-    tmp_path: Path, collect_small: Collect, copy_small: Copy
-) -> None:
-    copy_small("semseg", tmp_path)
-    dataset = gear.open_dataset(tmp_path)
-    picture = next(iter(tmp_path.glob("leftImg8bit/*/*/*.png")))
-    whole = picture.read_bytes()
-    for damage, what in ((whole[:90], "is damaged: .*"), (None, "is gone")):
-        picture.unlink()
-        if damage is not None:
-            picture.write_bytes(damage)
-        with pytest.raises(DatasetError, match=rf"{picture.name}: {what}; `gear verify DIR --repair`") as caught:
-            list(dataset)
-        assert "\n" not in str(caught.value)
-    (tmp_path / "gear/debug/samples/000000.json").unlink()
-    collect_small("semseg", tmp_path)
-    assert picture.read_bytes() == whole
-
-
-@pytest.mark.parametrize("task", ["semseg", "depth", "stereo3d", "detect2d"])
-def test_a_picture_of_another_size_or_kind_is_named_with_its_remedy(
-    task: str, tmp_path: Path, copy_small: Copy
-) -> None:
-    copy_small(task, tmp_path)
-    dataset = gear.open_dataset(tmp_path)
-    camera = dataset.sidecar(0).record.cameras[0]
-    width, height = camera.width_px, camera.height_px
-    files = [tmp_path / name for name in dataset.sidecar(0).files]
-    sidecar = tmp_path / "gear/debug/samples/000000.json"
-    written = sidecar.read_bytes()
-    content = json.loads(written)
-    for path in (path for path in files if path.suffix in (".png", ".tiff")):
-        if path.name.endswith("_color.png") or (path.suffix == ".png" and path.parent.parent.name == "gtFine"):
-            continue  # written for other people's loaders alone
-        whole = path.read_bytes()
-        read_as = cv2.imdecode(np.frombuffer(whole, np.uint8), cv2.IMREAD_UNCHANGED)
-        damages = [np.zeros((height // 2, *read_as.shape[1:]), read_as.dtype)]
-        if read_as.ndim == 2:
-            damages += [np.full((height, width), 200, np.uint8), np.zeros((height, width, 3), np.uint8)]
-        for damage in damages:
-            path.write_bytes(cv2.imencode(path.suffix, damage)[1].tobytes())
-            with pytest.raises(DatasetError, match=rf"{path.name}: is damaged: .*; `gear verify DIR --repair`"):
-                dataset[0]
-            hashes = {**content["files"], path.relative_to(tmp_path).as_posix(): sha256(path.read_bytes())}
-            sidecar.write_text(json.dumps(content | {"files": hashes}))  # as somebody would who edits data
-            with pytest.raises(DatasetError, match=rf"{path.name}: is .* (px|pixel).*; `gear verify DIR --repair`"):
-                dataset[0]
-            sidecar.write_bytes(written)
-        path.write_bytes(whole)
-    assert len(list(dataset)) == 2
-
-
-@pytest.mark.parametrize("task", ["stereo3d", "detect2d"])
-@pytest.mark.parametrize("objects", [None, 3, "x", [{}], [None], float("nan")])
-def test_facts_that_somebody_changed_are_one_line(task: str, objects: Any, tmp_path: Path, copy_small: Copy) -> None:
-    copy_small(task, tmp_path)
-    path = tmp_path / "gear/debug/samples/000000.json"
-    sidecar = json.loads(path.read_text())
-    sidecar["facts"]["objects"] = objects
-    path.write_text(json.dumps(sidecar))
-    with pytest.raises(DatasetError, match=r"000000.json: is not (a sidecar|JSON)") as caught:
-        gear.open_dataset(tmp_path)[0]
-    assert "\n" not in str(caught.value)
-
-
 def test_another_configuration_needs_force(tmp_path: Path, collect_small: Collect, copy_small: Copy) -> None:
     copy_small("depth", tmp_path)
     before = tree(tmp_path)
@@ -397,24 +272,6 @@ def test_limits_that_are_too_tight_say_which(tmp_path: Path, collect_small: Coll
     )
     with pytest.raises(SamplesFailedError, match=r"2 of 2 samples .*scene far: "):
         collect_small("depth", tmp_path / "out", scene="far", settings=[f"scenes={library}"])
-
-
-def test_a_scene_can_be_a_file_with_a_name_in_it(tmp_path: Path, collect_small: Collect) -> None:
-    collect_small("depth", tmp_path / "a", samples=1, scene=f"{TINY_SCENES}:double", settings=[])
-    assert gear.open_dataset(tmp_path / "a")[0].record.scene == "double"
-    with pytest.raises(UnknownNameError, match=r"\(say which: --scene .*tiny.yml:board\)"):
-        collect_small("depth", tmp_path / "b", scene=str(TINY_SCENES))
-    with pytest.raises(UnknownNameError, match="did you mean double"):
-        collect_small("depth", tmp_path / "b", scene=f"{TINY_SCENES}:dubble")
-
-
-def test_a_scenes_name_leads_nowhere(tmp_path: Path) -> None:
-    """A library may be somebody else's."""
-    scenes = tmp_path / "my.yml"
-    scenes.write_text(TINY_SCENES.read_text().replace("  board:", "  ../../../board:", 1))
-    flags = {"task": "depth", "town": str(TINY_TOWN), "scene": f"{scenes}:../../../board", "renderer": "classic"}
-    job = resolve(load_collection(None, flags))
-    assert job.root == Path("data/depth/tiny-..-..-..-board-ClearNoon/none")
 
 
 def test_a_worker_that_dies_is_reported(
