@@ -18,7 +18,7 @@ from gear.contracts.specs import KINDS
 from gear.values.errors import GearError, UnknownNameError
 from gear.verbs.scaffold.write import new_package
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.parametrize("kind", KINDS)

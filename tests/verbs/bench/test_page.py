@@ -1,0 +1,31 @@
+"""Parts of the report page of a bench."""
+
+from __future__ import annotations
+
+import base64
+import re
+
+import cv2
+import numpy as np
+
+from gear.verbs.bench.page import _figure, _rows
+
+
+def test_names_are_escaped_in_tables() -> None:
+    text = _rows(["<b>"], [(True, ["a & b"]), (False, ["'c'"])])
+    assert "<th>&lt;b&gt;</th>" in text
+    assert "<tr class=first><td>a &amp; b</td></tr>" in text
+    assert "<tr><td>&#x27;c&#x27;</td></tr>" in text
+
+
+def test_a_figure_holds_its_picture_at_the_given_width() -> None:
+    picture = np.zeros((40, 80, 3), np.uint8)
+    picture[..., 0] = 200  # red
+    text = _figure(picture, 'a "caption"', 20)
+    assert 'width="20" height="10"' in text
+    assert "a &quot;caption&quot;" in text
+    found = re.search(r"base64,([^\"]+)", text)
+    assert found is not None
+    decoded = cv2.imdecode(np.frombuffer(base64.b64decode(found[1]), np.uint8), cv2.IMREAD_COLOR)
+    assert decoded.shape == (10, 20, 3)
+    np.testing.assert_allclose(decoded[..., ::-1].mean((0, 1)), [200, 0, 0], atol=4)

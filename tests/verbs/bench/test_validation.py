@@ -1,0 +1,45 @@
+"""Checks of the networks, defenses and the attack of a bench."""
+
+from __future__ import annotations
+
+import pytest
+
+from gear.config.nodes import parse_text
+from gear.config.reader import read_node
+from gear.plugins.catalogue import PluginEntry
+from gear.values.errors import ConfigError
+from gear.verbs.bench.config import BenchConfig
+from gear.verbs.bench.validation import Contest, contests, find_attack
+
+TASK = "tasks: {semseg: {models: {net: {plugin: ddrnet23_slim, set: {weights: none}}}%s}}\nplaces: {town10: []}\n"
+
+
+def checked(rest: str = "", defenses: str = "") -> tuple[PluginEntry, tuple[Contest, ...]]:
+    node = parse_text(TASK % defenses + rest, "b.yml")
+    config = read_node(BenchConfig, node)
+    attack = find_attack(config, node)
+    return attack, contests(config, node, attack=attack, surfaces=1, device="cpu")
+
+
+def test_entrants_keep_their_names_and_order() -> None:
+    attack, (contest,) = checked("attack: {plugin: eot}\n", ", defenses: {squeeze: {plugin: jpeg}, median: {}}")
+    assert attack.spec.name == "eot"
+    assert contest.name == "semseg"
+    assert [(one.label, one.plugin) for one in contest.models] == [("net", "ddrnet23_slim")]
+    assert [one.label for one in contest.defenses] == ["squeeze", "median"]
+    assert [None if one is None else one.label for one in contest.guards] == [None, "squeeze", "median"]
+    assert not contest.defenses[0].learns
+
+
+@pytest.mark.parametrize(
+    ("rest", "defenses", "message"),
+    [
+        ("attack: {plugin: eott}\n", "", r"b.yml:3:\d+: attack.plugin: no attack named 'eott'; did you mean eot"),
+        ("attack: {plugin: eot, set: {shar: 1}}\n", "", r"b.yml:3:\d+: attack.set.*shar"),
+        ("", ", defenses: {jpg: {}}", r"b.yml:1:\d+: .*jpg"),
+        ("", ", defenses: {fpda: {}}", r"calibrat"),
+    ],
+)
+def test_mistakes_have_their_place_in_the_file(rest: str, defenses: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        checked(rest, defenses)
