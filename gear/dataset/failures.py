@@ -21,13 +21,13 @@ def note_failure(root: Path, split: str, outcome: Outcome, tries: int) -> None:
     """Writes the note on a sample that could not be made.
 
     Args:
-        root: of the dataset.
-        split: its name.
-        outcome: of the sample.
-        tries: how often a run has tried to make it.
+        root: root of the dataset.
+        split: name of the split.
+        outcome: outcome of the sample.
+        tries: number of attempts of a run to make the sample.
 
     Raises:
-        DatasetError: the disk refuses.
+        DatasetError: the note cannot be written.
     """
     trace = outcome.trace.encode(errors="backslashreplace").decode()
     note = {"index": outcome.index, "tries": tries, "error": outcome.error, "traceback": trace.splitlines()}
@@ -45,15 +45,15 @@ def noted_failures(root: Path, split: str) -> set[int]:
 
 
 def clear_failures(root: Path, split: str, indices: Iterable[int] | None = None) -> None:
-    """Removes the notes on samples that are there by now, and their folder when it is empty.
+    """Removes the notes on samples that exist, and the folder of notes if it is empty.
 
     Args:
-        root: of the dataset.
-        split: its name.
-        indices: of the samples; all that are noted by default.
+        root: root of the dataset.
+        split: name of the split.
+        indices: indices of the samples; all that have notes by default.
 
     Raises:
-        DatasetError: a note is a link, or the disk refuses.
+        DatasetError: a note is a link, or cannot be deleted.
     """
     chosen = noted_failures(root, split) if indices is None else indices
     remove_files(root, [failed_path(split, index) for index in chosen])

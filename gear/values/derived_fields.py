@@ -16,10 +16,10 @@ HEADING = "Attributes:"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DerivedField:
-    """One field that a class is given.
+    """One additional field of a class.
 
     Attributes:
-        name: of the field.
+        name: name of the field.
         kind: its type; a real one, not its text.
         field: default and metadata, as `dataclasses.field` makes them.
     """
@@ -42,11 +42,11 @@ def with_fields(fields: Iterable[DerivedField], attributes: str) -> Callable[[ty
     The class's own fields come first, except those whose metadata is not empty (such as `places`), which come last.
 
     Args:
-        fields: in their order.
-        attributes: their documents, as in an `Attributes:` section.
+        fields: the additional fields in order.
+        attributes: lines of their descriptions, as in an `Attributes:` section.
 
     Raises:
-        TypeError: a name is there twice.
+        TypeError: two fields have the same name.
     """
     more = tuple(fields)
 

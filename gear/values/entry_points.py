@@ -15,8 +15,8 @@ class DamagedDistribution:
     """A distribution whose entry points cannot be read.
 
     Attributes:
-        name, version: of the distribution.
-        error: what reading raised.
+        name, version: name and version of the distribution.
+        error: the exception that reading raised.
     """
 
     name: str

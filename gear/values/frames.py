@@ -91,7 +91,7 @@ class SceneObject:
     """A countable object: an actor, or an object of the town such as a traffic light or a bench.
 
     Attributes:
-        id: as in `GeomTable.object_id`.
+        id: object id, as in `GeomTable.object_id`.
         asset: name of its MJCF; for objects of the town the body's name.
         label_code: label of its main part: a cyclist is a bicycle that has geoms of a rider.
         kitti_type: KITTI's type of the whole, or None.
@@ -125,8 +125,8 @@ class Frame:
     """All views of one sample, with the tables that explain their ids.
 
     Attributes:
-        views: by camera name.
-        geoms: what each geom id is.
+        views: views by camera name.
+        geoms: label, object and surface of each geom.
         objects: countable objects by object id, visible or not.
     """
 

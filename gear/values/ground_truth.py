@@ -1,4 +1,4 @@
-"""Measured ground truth: what of an object or a surface is visible, and where it is."""
+"""Measured ground truth: the visible parts of objects and surfaces in one view, and their positions."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ class ObjectTruth:
 
     Attributes:
         object_id: as in `GeomTable.object_id`.
-        label_code: of the part that was measured.
-        visible_px: pixels of it in the id buffer.
+        label_code: label code of the measured part.
+        visible_px: number of its pixels in the id buffer.
         visible_box: tight box of those pixels, None if there are none.
-        amodal_px: pixels that it would cover alone, inside and outside the picture.
-        amodal_in_image_px: those of them inside the picture.
+        amodal_px: number of pixels of the whole silhouette, inside and outside the picture, as if nothing covered it.
+        amodal_in_image_px: number of these pixels inside the picture.
         amodal_box: tight box of the whole silhouette, may exceed the picture.
-        pictured_box: tight box of the silhouette inside the picture, to a fraction of a pixel; None if nothing of it
-            lies there.
+        pictured_box: tight box of the silhouette inside the picture, to a fraction of a pixel; None if no part is
+            inside.
         mask: (h, w) bool of the visible pixels inside `visible_box`.
     """
 
@@ -77,11 +77,11 @@ class SurfaceTruth:
             where one lies behind the camera.
         image_from_unit: homography as 9 row-major numbers from patch coordinates (u right, v down, 0..1 over the
             face) to index pixels; None where a corner lies behind the camera.
-        visible_px: pixels of the face in the id buffer.
-        visible_fraction: of the face's silhouette, inside and outside the picture.
-        distance_m: camera to the middle of the face.
-        incidence_deg: between the face's outward normal and the way to the camera; 0 is head-on, above 90 is seen
-            from behind.
+        visible_px: number of pixels of the face in the id buffer.
+        visible_fraction: visible share of the face's silhouette inside and outside the picture.
+        distance_m: distance from the camera to the middle of the face.
+        incidence_deg: angle between the face's outward normal and the direction to the camera; 0 is head-on, above 90
+            is behind the face.
         mask_rle: COCO run-length encoding of the visible mask, compressed string, for size (H, W).
     """
 

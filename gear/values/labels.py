@@ -112,4 +112,4 @@ OPEN_GROUND_CODES = tuple(LABEL_BY_NAME[name].code for name in ("road", "road_ma
 """Level ground under the sky: it gets wet, and water stands on it."""
 
 GROUND_CODES = (*OPEN_GROUND_CODES, *(LABEL_BY_NAME[name].code for name in ("sidewalk", "terrain")))
-"""What road users stand on."""
+"""Label codes of the ground on which road users stand."""

@@ -1,4 +1,4 @@
-"""Objects of one picture with the detections of a network, and what became of each of them."""
+"""Objects and detections of one picture, and the outcome of each of them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class PictureObject:
     """An object that a detector should find.
 
     Attributes:
-        object_id: the same in every sample of a sequence and in twins.
+        object_id: id of the object, the same in every sample of a sequence and in twins.
         label: name of its class.
         box_px: in edge pixels.
         position_m: middle of the object in the camera's frame (x right, y down, z forward).
@@ -40,7 +40,7 @@ class PictureDetection:
     Attributes:
         label: name of its class.
         box_px: in edge pixels.
-        score: confidence; higher is surer.
+        score: confidence; higher is more certain.
     """
 
     label: str
@@ -50,7 +50,7 @@ class PictureDetection:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PictureObjects:
-    """What a detector should find in a picture, and what it said.
+    """The objects that a detector should find in a picture, and its detections.
 
     Attributes:
         camera: name of the view that boxes and positions belong to.
@@ -70,7 +70,7 @@ class PictureObjects:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PatchDistance:
-    """How far something is from the patch.
+    """The distance of an object or a detection from the patch.
 
     Attributes:
         is_on_patch: whether the centre of its box, or more than half of the box, lies on visible pixels of a patch.
@@ -86,7 +86,7 @@ class PatchDistance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectOutcome:
-    """What became of one object.
+    """The outcome for one object.
 
     Attributes:
         object_id, label, box_px: as in `PictureObject`.
@@ -107,7 +107,7 @@ class ObjectOutcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectionOutcome:
-    """What one confident detection is.
+    """The outcome for one confident detection.
 
     Attributes:
         label, box_px, score: as in `PictureDetection`.
@@ -126,11 +126,11 @@ class DetectionOutcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureOutcomes:
-    """What became of the objects of one picture, and what its confident detections are; JSON-ready.
+    """The outcomes of the objects and the confident detections of one picture; JSON-ready.
 
     Attributes:
-        objects: in the order of the ground truth.
-        detections: surest first.
+        objects: outcomes of the objects, in the order of the ground truth.
+        detections: outcomes of the detections, by decreasing score.
     """
 
     objects: tuple[ObjectOutcome, ...]

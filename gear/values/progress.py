@@ -1,4 +1,4 @@
-"""The callbacks that every long-running verb takes: how far it is, and settings that may be unintended."""
+"""The callbacks that every long-running verb takes, for progress and for warnings."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 Progress = Callable[[int, int], None]
-"""Called with (done, total), first with what an earlier run finished; a total of 0 means that it is not known."""
+"""Called with (done, total). The first call counts the items that an earlier run finished; a total of 0
+means unknown.
+"""
 
 Warn = Callable[[str], None]
-"""Called with one line about something that is allowed and that the user may not have meant."""
+"""Called with one line about a setting that is allowed but may be unintended."""
 
 
 def _no_progress(done: int, total: int) -> None: ...
@@ -20,7 +22,7 @@ def _no_warning(line: str) -> None: ...
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Callbacks:
-    """What a running verb reports to; by default nothing listens.
+    """The callbacks of a running verb; by default they do nothing.
 
     Attributes:
         on_progress: called after every sample, or step of an optimisation.
@@ -40,7 +42,9 @@ class Callbacks:
         on_fit_progress: Progress | None = None,
         on_warning: Warn | None = None,
     ) -> Callbacks:
-        """From the keywords of a verb, of which any may be None; a repeated warning is passed on once."""
+        """Makes callbacks from the arguments of a verb, of which any may be None; a repeated warning is
+        passed on once.
+        """
         warned: set[str] = set()
 
         def warn_once(line: str) -> None:
@@ -55,7 +59,7 @@ class Callbacks:
         )
 
     def and_also(self, others: Callbacks) -> Callbacks:
-        """Callbacks that report to these and to the others."""
+        """Callbacks that call both these and the others."""
 
         def both_progress(done: int, total: int) -> None:
             self.on_progress(done, total)

@@ -1,6 +1,6 @@
-"""Reading files that a user or a stranger names: regular files only.
+"""Reads files whose paths come from users or data; refuses everything but regular files.
 
-A device, a FIFO or a socket in the place of a file makes `open` or `read` wait for ever or fill the memory.
+For a device, a FIFO or a socket, `open` or `read` could wait for ever or fill the memory.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ def check_regular(path: str | Path) -> Path:
     """Checks that a path is a regular file, or a link to one, and returns it.
 
     Raises:
-        NotAFileError: it is a folder, a device, a FIFO or a socket.
-        OSError: it does not exist or cannot be reached.
+        NotAFileError: the path is a folder, a device, a FIFO or a socket.
+        OSError: the path does not exist or cannot be reached.
     """
     checked = Path(path)
     _refuse_other_kinds(checked, checked.stat().st_mode)
@@ -44,11 +44,11 @@ def read_regular(path: str | Path, *, most_bytes: int | None = None) -> bytes:
 
     Args:
         path: the file, or a link to one.
-        most_bytes: at most so many bytes are read, when given.
+        most_bytes: largest number of bytes to read; None for all.
 
     Raises:
         NotAFileError: it is a folder, a device, a FIFO or a socket.
-        OSError: it does not exist or cannot be read.
+        OSError: the path does not exist or cannot be read.
     """
     checked = check_regular(path)  # before it is opened: opening some devices has effects
     descriptor = os.open(checked, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)

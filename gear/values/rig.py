@@ -12,7 +12,9 @@ from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, Intrinsics, RigidTransf
 from gear.values.scene import CameraRecord, Pose, Vec3
 
 LEAST_FOCAL, MOST_FOCAL = 0.043, 58.0
-"""Focal lengths in sizes of the picture: of fields of view of 170 and of 1 degree."""
+"""Smallest and largest focal length as a share of the picture's width: those of fields of view of 170 and
+of 1 degree.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,8 +29,8 @@ class CameraMount:
         focal_y_px: vertical focal length fy; None for the same as the horizontal one.
         principal_px: principal point (cx, cy) in index pixels; None for the middle of the picture.
         position_m: in the ego frame: x forward, y left, z up, the origin on the ground.
-        yaw_deg, pitch_deg, roll_deg: turned to the left, downwards, and clockwise as seen from behind the camera; 0 is
-            straight ahead and level.
+        yaw_deg, pitch_deg, roll_deg: rotation to the left, downwards, and clockwise as seen from behind the camera; 0
+            is straight ahead and level.
     """
 
     name: str
@@ -87,8 +89,8 @@ class Rig:
 
     Attributes:
         cameras: the first one is the reference camera, which must have the boards in view.
-        follows_road: False keeps the rig level (yaw only), as the CARLA-GeAR loaders demand; True takes the car's
-            pitch and roll.
+        follows_road: False keeps the rig level (yaw only), as the loaders of CARLA-GeAR require; True gives it the
+            car's pitch and roll.
     """
 
     cameras: tuple[CameraMount, ...]

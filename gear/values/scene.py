@@ -83,7 +83,7 @@ RAIN_EXPOSURE_COVER = 0.8
 
 
 MOST = 1_000_000
-"""CARLA's amounts have no upper end; the 32-bit numbers of pictures do."""
+"""Upper limit of amounts that are not percentages; CARLA has no limit, but 32-bit numbers in pictures do."""
 
 
 def _bounded(default: float, low: int, high: int, unit: str = "") -> Any:
@@ -99,7 +99,7 @@ class Weather:
     it. A new parameter is a new field with its range, and a line below.
 
     Attributes:
-        name: of the preset; with `*` behind it where parameters were changed.
+        name: name of the preset, followed by `*` if parameters were changed.
         cloudiness: share of the sky under clouds, percent, 0 to 100.
         precipitation: strength of the rain, percent, 0 to 100.
         precipitation_deposits: puddles on open ground, percent, 0 to 100.
@@ -108,8 +108,8 @@ class Weather:
         sun_altitude_deg: height of the sun above the horizon, -90 to 90 degrees; 90 is the zenith.
         fog_density: thickness of the fog, percent, 0 to 100.
         fog_distance_m: distance from the camera at which the fog begins, metres, 0 to 1000000.
-        fog_falloff: how quickly fog thins with height, 0 to 1000000; 0 is no thinning.
-        wetness: how wet open ground is, percent, 0 to 100.
+        fog_falloff: rate at which fog thins with height, 0 to 1000000; 0 is no thinning.
+        wetness: wetness of open ground, percent, 0 to 100.
         scattering_intensity: strength of all light scattering in the air, 0 to 1000000.
         mie_scattering_scale: strength of scattering by dust and vapour, 0 to 1000000.
         rayleigh_scattering_scale: strength of scattering by molecules, 0 to 1000000.
@@ -178,10 +178,11 @@ class ActorRecord:
     """One vehicle or pedestrian.
 
     Attributes:
-        id: stable within a sequence, >= 1.
+        id: id of the actor, at least 1, the same in all frames of a sequence.
         asset: name of its MJCF.
         role: `ego` carries the cameras, `carrier` carries a surface; `npc` drives, `parked` stands, `pedestrian` walks.
-        world_from_actor: its frame is x forward, y left, z up, origin on the ground in the middle of the footprint.
+        world_from_actor: its pose; its frame is x forward, y left, z up, with the origin on the ground in the middle of
+            the footprint.
         velocity_world_mps: linear velocity in the world, m/s.
         paint_rgb: linear albedo, 0..1, of its `.paint` geoms; None for the asset's colours.
     """
@@ -238,7 +239,7 @@ class CameraRecord:
         name: key of its view: `left`, `right`, ….
         width_px, height_px: size of the picture.
         focal_px: horizontal focal length fx of the pinhole.
-        world_from_camera: pose; camera axes are x right, y down, z forward.
+        world_from_camera: its pose; camera axes are x right, y down, z forward.
         lens: distortion of colour, depth and ids; None for none. Projections with `intrinsics` are the pinhole's.
         focal_y_px: vertical focal length fy; None for the same as `focal_px`.
         principal_px: principal point (cx, cy) in index pixels; None for the middle of the picture.
@@ -269,7 +270,7 @@ class SceneRecord:
     """The complete description of one sample, without its patch.
 
     Attributes:
-        version: of this data model.
+        version: version of this data model.
         town, scene, split: names.
         seed, index: the draw; `index` counts all frames of a split.
         sequence, frame, time_s: the frame's number in its driving sequence, and its time in seconds; a sequence of

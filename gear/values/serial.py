@@ -15,11 +15,12 @@ Json = Any
 T = TypeVar("T")
 
 PLACES = {"places": True}
-"""Metadata of a field that holds file, line and column of the given values, by key. The config reader fills it; it is
-no key of the config and is not written."""
+"""Key in the metadata of a field that holds file, line and column of each given value. The config reader fills this
+field; it is no key of the config and is not written.
+"""
 
 SHOWN = 60
-"""Characters of a wrong value that an error message quotes."""
+"""Largest number of characters of a wrong value in an error message."""
 
 
 def to_json(value: Any) -> Json:
@@ -57,7 +58,7 @@ def from_json(kind: type[T], value: Json, where: str = "") -> T:
     Args:
         kind: a dataclass, or any type that its fields may have.
         value: the JSON.
-        where: the key of `value`, for errors.
+        where: key of `value`, for errors.
 
     Raises:
         FieldError: a key is unknown or missing, or a value has another type; names the key.

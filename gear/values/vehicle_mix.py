@@ -1,4 +1,4 @@
-"""A vehicle mix: for some kinds of vehicles, the factor by which they are more frequent than usual."""
+"""A vehicle mix: factors on the usual frequencies of some kinds of vehicles."""
 
 from __future__ import annotations
 

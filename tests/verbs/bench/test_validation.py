@@ -18,7 +18,7 @@ def checked(rest: str = "", defenses: str = "") -> tuple[PluginEntry, tuple[Cont
     node = parse_text(TASK % defenses + rest, "b.yml")
     config = read_node(BenchConfig, node)
     attack = find_attack(config, node)
-    return attack, contests(config, node, attack=attack, surfaces=1, device="cpu")
+    return attack, tuple(contests(config, node, attack=attack, surfaces=1, device="cpu"))
 
 
 def test_entrants_keep_their_names_and_order() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gear.camera.noise import TILE_PX, periodic_noise, sampled, smooth_step
+from gear.camera.fractal import TILE_PX, periodic_noise, sampled, smooth_step
 
 
 def test_noise_is_uniform_periodic_and_follows_its_generator() -> None:
