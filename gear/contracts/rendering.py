@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     import mujoco
 
 Quality = Literal["film", "fast"]
-"""`film`: 2x2 supersampling, averaged in linear light. `fast`: one sample per pixel with gear's own edge filter."""
+"""`film`: 2x2 supersampling, averaged in linear light; `raster` takes one sample where four show the same.
+
+`fast`: one sample per pixel with gear's own edge filter.
+"""
 
 FULL_SCALE_LUX = 38400.0
 """Radiance, in cd/m², that is full scale at Filament's fixed exposure (f/16, 1/125 s, ISO 100)."""
@@ -69,7 +72,7 @@ class RawView:
     """What a renderer returns for one camera: aligned arrays, row 0 at the top.
 
     Attributes:
-        linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`, linear in the albedo of every surface; None where no
+        linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`, linear in the albedo of every face; None where no
             colour was requested.
         depth_m: (H, W) float32 distance along the optical axis; NaN where there is nothing.
         geom_id: (H, W) int32 MuJoCo geom ids; -1 where there is nothing.

@@ -212,6 +212,21 @@ def upload_table(content: npt.NDArray[Any]) -> int:
     return texture
 
 
+class Mask:
+    """A texture of one byte per pixel that is filled again for each frame."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self._size = (width, height)
+        self.handle = _plain_texture(width, height, GL.GL_R8)
+
+    def upload(self, content: npt.NDArray[np.uint8]) -> None:
+        """Replaces the content, (height, width) uint8; shaders read 0..1."""
+        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
+        GL.glTextureSubImage2D(
+            self.handle, 0, 0, 0, *self._size, GL.GL_RED, GL.GL_UNSIGNED_BYTE, np.ascontiguousarray(content)
+        )
+
+
 def shadow_map(width: int, height: int) -> int:
     """Makes a depth texture with comparison: a read returns the lit share, and 1 outside the borders. Returns
     its OpenGL name.

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from OpenGL import GL  # type: ignore[import-untyped]
 
 from gear.contracts.rendering import Quality, RawView, RendererInfo, Stage
-from gear.render.culling import in_frustum, near_to_far
+from gear.render.culling import Mask, in_frustum, near_to_far
 from gear.render.face_textures import checked_faces
 from gear.render.glcontext import driver_and_device, is_software
 from gear.render.linear_samples import smooth_edges
@@ -19,6 +19,7 @@ from gear.render.occlusion import openness, shade
 from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
 from gear.render.raster import gl
 from gear.render.raster.lights import lights_of
+from gear.render.raster.many_samples import LOD_BIAS, at_contrasts, at_edges_and_faces
 from gear.render.raster.scene import Scene, Selection
 from gear.render.raster.sun_shadows import SunShadows
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, IdImage, UInt16Image
@@ -27,6 +28,7 @@ from gear.values.scene import CameraRecord
 
 _VISIBLE_UNIT = 6
 _FULL = 65535
+_MASK_UNIT = 1
 
 
 class RasterRenderer:
@@ -59,7 +61,9 @@ class RasterRenderer:
         self._ids_program = gl.Program("positions.vert", "ids.frag")
         self._sky_program = gl.Program("fullscreen.vert", "sky.frag")
         self._downsample_program = gl.Program("fullscreen.vert", "downsample.frag")
+        self._open_program = gl.Program("fullscreen.vert", "open_samples.frag")
         self._shadows: SunShadows | None = None
+        self._masks: dict[tuple[int, int], gl.Mask] = {}
         self._targets: dict[tuple[str, int, int], gl.RenderTarget] = {}
         GL.glClipControl(GL.GL_UPPER_LEFT, GL.GL_ZERO_TO_ONE)
         GL.glEnable(GL.GL_DEPTH_TEST)
@@ -125,7 +129,10 @@ class RasterRenderer:
         linear_rgb = None
         if colour:
             self._update_lights(stage, frustum, spheres)
-            drawn = self._render_colour(size, seen, frustum, truth)
+            drawn, pieces = self._render_colour(size, seen, frustum, truth)
+            if self._quality == "film":
+                many = at_edges_and_faces(geom_id, depth_m, stage.faces) | at_contrasts(_pixels(drawn))
+                self._supersample(drawn, self._among(seen, pieces[many]), frustum, many)
             # Computed while the driver draws.
             open_share = openness(depth_m, camera.focal_px) * np.float32(LINEAR_FULL_SCALE / _FULL)
             linear_rgb = shade(_pixels(drawn), open_share)
@@ -137,12 +144,17 @@ class RasterRenderer:
         """Draws ids of pieces, and depth, at a size in pixels; the returned target is current."""
         target = self._target("truth", size, GL.GL_R32I)
         target.bind()
-        _depth_state(GL.GL_GREATER, writes=True)
         GL.glClearBufferiv(GL.GL_COLOR, 0, np.full(4, -1, np.int32))
+        GL.glDepthMask(True)
         GL.glClearBufferfv(GL.GL_DEPTH, 0, np.zeros(1, np.float32))
+        self._draw_ids(seen, frustum)
+        return target
+
+    def _draw_ids(self, seen: Selection, frustum: Frustum) -> None:
+        """Draws ids of pieces and depth over the current target."""
+        _depth_state(GL.GL_GREATER, writes=True)
         self._ids_program.use(clip_from_relative=_clip_matrix(frustum))
         self._scene.draw_depth(seen)
-        return target
 
     def _read_ids(self, truth: gl.RenderTarget) -> tuple[IdImage, FloatImage]:
         width, height = truth.width, truth.height
@@ -162,34 +174,85 @@ class RasterRenderer:
 
     def _render_colour(
         self, size: tuple[int, int], seen: Selection, frustum: Frustum, truth: gl.RenderTarget | None
-    ) -> gl.RenderTarget:
-        """Draws colour. The returned target is current, and the device may still be drawing.
+    ) -> tuple[gl.RenderTarget, npt.NDArray[np.int32]]:
+        """Draws colour with one sample per pixel.
 
         Args:
             size: width and height of the picture in pixels.
             seen: pieces to draw, near ones first.
             frustum: the camera's view volume.
             truth: ids and depth of this picture if they have just been drawn, otherwise None.
+
+        Returns:
+            The target, which is current and which the device may still be drawing; and the (H, W) ids of pieces.
         """
-        is_film = self._quality == "film"
-        samples = (2 * size[0], 2 * size[1]) if is_film else size
-        if is_film or truth is None:
-            truth = self._render_ids(samples, seen, frustum)
+        truth = truth or self._render_ids(size, seen, frustum)
         truth.bind()
-        is_seen = np.zeros(len(self._geom_of_piece), np.bool_)
-        is_seen[_pieces(truth)] = True
-        target = self._target("colour", samples, GL.GL_RGBA16, truth.depth)
+        pieces = _pieces(truth)
+        target = self._target("colour", size, GL.GL_RGBA16, truth.depth)
+        flags = (f"LOD_BIAS {LOD_BIAS}",) if self._quality == "film" else ()
+        self._shade(target, truth, self._among(seen, pieces), frustum, flags)
+        GL.glFlush()
+        return target, pieces
+
+    def _among(self, seen: Selection, pieces: npt.NDArray[np.int32]) -> Selection:
+        """Those of the pieces to draw that some pixels show."""
+        is_shown = np.zeros(len(self._geom_of_piece), np.bool_)
+        is_shown[pieces] = True
+        return seen[is_shown[seen]]
+
+    def _shade(
+        self,
+        target: gl.RenderTarget,
+        truth: gl.RenderTarget,
+        pieces: Selection,
+        frustum: Frustum,
+        flags: tuple[str, ...],
+    ) -> None:
+        """Draws colour where ids and depth say what is visible."""
         target.bind()
         # Only visible samples are shaded. Of two surfaces at equal depth, the shader keeps the piece that the ids name.
         _depth_state(GL.GL_EQUAL, writes=False)
         GL.glBindTextureUnit(_VISIBLE_UNIT, truth.colour)
         GL.glClearBufferfv(GL.GL_COLOR, 0, np.zeros(4, np.float32))
-        self._scene.draw_shaded(seen[is_seen[seen]], _clip_matrix(frustum), ("MANY_SAMPLES",) if is_film else ())
+        self._scene.draw_shaded(pieces, _clip_matrix(frustum), flags)
         self._draw_sky(frustum)
-        if is_film:
-            target = self._downsampled(target)
+
+    def _supersample(self, target: gl.RenderTarget, pieces: Selection, frustum: Frustum, is_supersampled: Mask) -> None:
+        """Replaces pixels of a picture by the mean of 2 x 2 samples; the target is current in the end.
+
+        All other samples have the nearest depth, so that nothing is drawn there.
+
+        Args:
+            target: the picture with one sample per pixel.
+            pieces: pieces to draw, near ones first.
+            frustum: the camera's view volume.
+            is_supersampled: (H, W) bool.
+        """
+        width, height = size = target.width, target.height
+        if size not in self._masks:
+            self._masks[size] = gl.Mask(*size)
+        self._masks[size].upload(is_supersampled.view(np.uint8) * np.uint8(255))
+        GL.glBindTextureUnit(_MASK_UNIT, self._masks[size].handle)
+        truth = self._target("truth", (2 * width, 2 * height), GL.GL_R32I)
+        truth.bind()
+        GL.glClearBufferiv(GL.GL_COLOR, 0, np.full(4, -1, np.int32))
+        _depth_state(GL.GL_ALWAYS, writes=True)
+        GL.glClearBufferfv(GL.GL_DEPTH, 0, np.ones(1, np.float32))
+        GL.glColorMask(False, False, False, False)
+        self._open_program.use()
+        GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
+        GL.glColorMask(True, True, True, True)
+        self._draw_ids(pieces, frustum)
+        samples = self._target("colour", (2 * width, 2 * height), GL.GL_RGBA16, truth.depth)
+        self._shade(samples, truth, pieces, frustum, ("MANY_SAMPLES",))
+        target.bind()
+        _depth_state(GL.GL_ALWAYS, writes=False)
+        GL.glBindTextureUnit(0, samples.colour)
+        GL.glBindTextureUnit(_MASK_UNIT, self._masks[size].handle)
+        self._downsample_program.use()
+        GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
         GL.glFlush()
-        return target
 
     def _draw_sky(self, frustum: Frustum) -> None:
         """Draws the sky where no surface was drawn."""
@@ -203,16 +266,6 @@ class RasterRenderer:
         tangents = np.array([*half_m, frustum.centre_right_m, frustum.centre_up_m]) / NEAR_M
         self._sky_program.use(camera_axes=axes, view_tangents=tangents)
         GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
-
-    def _downsampled(self, samples: gl.RenderTarget) -> gl.RenderTarget:
-        """Averages blocks of 2 x 2 samples; the returned target is current."""
-        half = self._target("half", (samples.width // 2, samples.height // 2), GL.GL_RGBA16, 0)
-        half.bind()
-        _depth_state(GL.GL_ALWAYS, writes=False)
-        GL.glBindTextureUnit(0, samples.colour)
-        self._downsample_program.use()
-        GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
-        return half
 
     def _target(self, purpose: str, size: tuple[int, int], kept_as: int, depth: int | None = None) -> gl.RenderTarget:
         key = (purpose, *size)

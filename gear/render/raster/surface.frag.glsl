@@ -26,6 +26,9 @@ layout(binding = 7) uniform sampler2D split_sum;
 
 layout(location = 0) out vec4 radiance;
 
+#ifndef LOD_BIAS
+#define LOD_BIAS 0.0
+#endif
 const float PI = 3.14159265358979;
 
 #ifdef SHADOWS
@@ -69,10 +72,10 @@ void main() {
     vec3 base = albedo;
     float roughness = surface.x, metallic = surface.y, ambient_occlusion = 1.0;
 #ifdef HAS_BASE
-    base *= texture(base_map, uv).rgb;
+    base *= texture(base_map, uv, LOD_BIAS).rgb;
 #endif
 #ifdef HAS_ORM
-    vec3 orm = texture(orm_map, uv).rgb;
+    vec3 orm = texture(orm_map, uv, LOD_BIAS).rgb;
     ambient_occlusion = orm.r;
     roughness *= orm.g;
     metallic *= orm.b;
@@ -80,7 +83,7 @@ void main() {
     vec3 n = normalize(smooth_normal);
 #ifdef HAS_NORMAL
     vec3 t = normalize(tangent);
-    vec3 relief = texture(normal_map, uv).xyz * 2.0 - 1.0;
+    vec3 relief = texture(normal_map, uv, LOD_BIAS).xyz * 2.0 - 1.0;
     n = normalize(t * relief.x + cross(t, n) * relief.y + n * relief.z);
 #endif
     vec3 v = -normalize(position_m);
@@ -120,7 +123,7 @@ void main() {
         sum += (diffuse / PI + (d * d / PI) * visibility * fresnel * energy_compensation) * arriving * (nl * lit_share);
     }
 #ifdef HAS_EMISSIVE
-    sum += texture(emissive_map, uv).rgb * surface.z;
+    sum += texture(emissive_map, uv, LOD_BIAS).rgb * surface.z;
 #else
     sum += base * surface.z;
 #endif
