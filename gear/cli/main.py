@@ -21,24 +21,24 @@ from gear.values.regular_file import NotAFileError
 
 COMMANDS: dict[str, str] = {
     "collect": "collect a dataset split: pictures with exact ground truth",
-    "sheet": "a contact sheet of a dataset, as one picture",
-    "view": "one self-contained HTML page of a dataset",
+    "sheet": "draw samples of a dataset with their ground truth as one picture",
+    "view": "write one self-contained HTML page that shows a dataset",
     "train": "train a network on collected data",
-    "attack": "make adversarial patches for a scene's surfaces and a model",
-    "gap": "compare patches that are composed into pictures with the same patches rendered",
-    "defend": "write a dataset's pictures after a defense has cleaned them",
-    "evaluate": "run a model, with or without a defense, over datasets: metrics, predictions, twins compared",
-    "bench": "run a whole benchmark, networks x defenses x scenes x patches, with a report",
+    "attack": "optimise adversarial patches for a scene's surfaces against a model",
+    "gap": "measure how far composed patches differ from rendered ones",
+    "defend": "write the pictures of a dataset as a defense cleans them",
+    "evaluate": "measure a model, with or without a defense, on datasets, and compare twins",
+    "bench": "run a benchmark of networks, defenses, scenes and patches, and write a report",
     "verify": "check every file of a dataset, and make damaged samples again",
-    "merge": "join folders with shards of one collection into one dataset",
-    "export": "write a dataset in another layout",
-    "towns": "list towns and their scenes, or draw a map and a picture of every scene",
-    "models": "list the installed networks: size, input, published weights, shipped weights and what is missing",
+    "merge": "join the shards of one collection into one dataset",
+    "export": "write a dataset in the layout of another tool",
+    "towns": "list towns and their scenes, or draw a map of a town and a picture of every scene",
+    "models": "list the installed networks, with their size, input and weights",
     "weights": "convert, average or show weights files",
     "plugins": "list the installed tasks, models, attacks and defenses",
-    "new": "write a small complete package for a new plugin",
+    "new": "write a small, complete Python package for a new plugin",
     "doctor": "check the renderers of this machine: device, driver and time of a reference frame",
-    "show-config": "print the collection config that flags and files result in",
+    "show-config": "print the complete collection config that results from flags and files",
     "completion": "print a script with which a shell completes gear's commands and flags",
 }
 """One-line description of each command; the module `gear.cli.commands.<name>` implements it."""
@@ -137,7 +137,7 @@ def full_parser(wanted: str | None = None) -> Parser:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="store_true", help="print the version and leave")
+    parser.add_argument("--version", action="store_true", help="print the version and exit")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", dest="command")
     for name, summary in COMMANDS.items():
         command = commands.add_parser(

@@ -21,7 +21,7 @@ EXAMPLE = """examples:
   gear attack --model ddrnet23_slim --data data/b01 --out patches/b01 --verify data/b01-val
   gear collect --task semseg --scene billboard01 --split test --patch patches/b01 --out data/b01-patched
 
-The folder holds patch_0.png, …, patch.safetensors, attack.json and figures/.
+The folder --out gets patch_0.png, …, patch.safetensors, attack.json and figures/.
 """
 
 
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--data", required=True, action="append", metavar="DIR", help="dataset with probes, or DIR:SPLIT; repeatable"
     )
-    parser.add_argument("--out", required=True, metavar="DIR", help="the patch folder")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for the patches")
     parser.add_argument("--attack", default="scene_specific", metavar="NAME", help="attack plugin (scene_specific)")
     parser.add_argument("--steps", type=int, metavar="N", help="most optimisation steps (300; with --queries no limit)")
     parser.add_argument(

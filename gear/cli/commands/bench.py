@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 
 EXAMPLE = """examples:
   gear bench quick --out bench/quick                      one scene, one network, a few minutes on two cores
-  gear bench paper --out bench/paper --list               the commands that it comes to, and nothing is done
+  gear bench paper --out bench/paper --list               only prints the commands of the benchmark
   gear bench my.yml --out bench/mine --device cuda --workers 8
   gear bench quick --out bench/long --set samples.measure=96 --set 'places={town10: []}'
 
-report.html, table.txt, bench.csv and bench.json lie under --out. Run it again to go on where it was stopped, or after
-networks, defenses or scenes were added: what is there is not done twice.
+The folder --out gets report.html, table.txt, bench.csv and bench.json. Run the same command again to continue after an
+interruption, or after adding networks, defenses or scenes: existing results are kept.
 """
 
 
@@ -27,15 +27,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("config", metavar="CONFIG", help="name (quick, paper) or path of a bench config")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for data, patches, results and the report")
     parser.add_argument(
-        "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="a key of the config"
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="settings",
+        help="sets a key of the config; repeatable",
     )
     parser.add_argument(
         "--device", choices=("auto", "cpu", "cuda"), help="device of the networks (the one in the config)"
     )
-    parser.add_argument("--workers", type=positive, default=1, metavar="N", help="processes of each collection (1)")
     parser.add_argument(
-        "--list", action="store_true", help="print the commands that the bench consists of, and run none"
+        "--workers", type=positive, default=1, metavar="N", help="number of processes of each collection (1)"
     )
+    parser.add_argument("--list", action="store_true", help="only print the commands of the benchmark")
     parser.add_argument("--json", action="store_true", help="print bench.json, or the steps, in place of the tables")
 
 

@@ -25,15 +25,15 @@ def positive(text: str) -> int:
 def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags that describe a collection; `gear show-config` has the same flags."""
     parser.add_argument("--task", help="task plugin: semseg, detect2d, stereo3d, depth, or an installed one")
-    parser.add_argument("--scene", help="scene of the town's library (billboard01 … 09, truck …), or FILE.yml:NAME")
+    parser.add_argument("--scene", help="name of a scene of the town (billboard01 … 09, truck …), or FILE.yml:NAME")
     parser.add_argument("--town", help="name of a town, or path of its MJCF (town10)")
-    parser.add_argument("--split", help="train, val, test, debug, finetuning, video (test)")
-    parser.add_argument("--samples", metavar="N", help="samples of the split, instead of the simulation config's")
+    parser.add_argument("--split", help="split to collect: train, val, test, debug, finetuning, video (test)")
+    parser.add_argument("--samples", metavar="N", help="number of samples, instead of the simulation config's")
     parser.add_argument("--seed", metavar="N", help="seed of the split, instead of the simulation config's")
     parser.add_argument("--weather", help="weather preset (ClearNoon)")
-    parser.add_argument("--patch", help="none, random, a picture, or a patch folder (none)")
-    parser.add_argument("--renderer", help="raster, filament or classic (raster)")
-    parser.add_argument("--quality", help="film or fast (film)")
+    parser.add_argument("--patch", help="patch to show: none, random, a picture, or a patch folder (none)")
+    parser.add_argument("--renderer", help="renderer: raster, filament or classic (raster)")
+    parser.add_argument("--quality", help="quality of the pictures: film or fast (film)")
     parser.add_argument(
         "--out", metavar="DIR", help="root of the dataset (data/<task>/<town>-<scene>-<weather>/<patch>)"
     )
@@ -44,7 +44,7 @@ def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         dest="settings",
-        help="any key of the config; repeatable",
+        help="sets a key of the config; repeatable",
     )
 
 
@@ -54,18 +54,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_collection_arguments(parser)
     parser.add_argument("--engine", metavar="NAME", help="engine that makes the samples (processes)")
     parser.add_argument(
-        "--workers", type=positive, default=1, metavar="N", help="processes; the result does not depend on them (1)"
+        "--workers",
+        type=positive,
+        default=1,
+        metavar="N",
+        help="number of processes; it does not change the result (1)",
     )
     parser.add_argument(
         "--shard",
         metavar="I/N",
-        help="collect the I-th of N parts, on any machine; a run without --shard, or `gear merge`, closes the split",
+        help="collect only part I of N, on any machine; finish with `gear merge`, or with a run without --shard",
     )
     parser.add_argument(
         "--probes",
         action="store_const",
         const=True,
-        help="also keep probes, with which patches are composed into the pictures; for `gear attack` and `gear gap`",
+        help="also write probes, from which patches can be composed; for `gear attack` and `gear gap`",
     )
     parser.add_argument("--force", action="store_true", help="replace a split that was made with another configuration")
 

@@ -15,7 +15,8 @@ EXAMPLE = """examples:
   gear evaluate --model ddrnet23_slim --defense zmask --calibration data/val --calibration-patched data/val-patched \
     --data data/none data/patch
 
-Predictions, results.json and table.txt lie under --out. Run it again to go on where it was stopped.
+The folder --out gets predictions, results.json and table.txt. Run the same command again to continue after an
+interruption.
 """
 
 
@@ -58,7 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--batch", type=positive, metavar="N", help="samples per forward pass (1 to 4, by picture size)"
     )
-    parser.add_argument("--workers", type=positive, default=2, metavar="N", help="threads that read and measure (2)")
+    parser.add_argument(
+        "--workers", type=positive, default=2, metavar="N", help="number of threads that read and measure (2)"
+    )
     parser.add_argument(
         "--seed",
         type=int,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 EXAMPLE = """examples:
   gear models
   gear models --task semseg
-  gear models show ddrnet23_slim           # input, published weights, shipped weights and what they were measured on
+  gear models show ddrnet23_slim           # its input, published weights and shipped weights
   gear models --json
 
 Nothing is downloaded: fetch published weights yourself, then `gear weights convert MODEL IN OUT`.

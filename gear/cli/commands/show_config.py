@@ -8,7 +8,7 @@ from gear.cli.commands.collect import add_collection_arguments
 
 EXAMPLE = """examples:
   gear show-config --task semseg
-  gear show-config --config old_collection_config.yml     # a CARLA-GeAR config, in gear's words
+  gear show-config --config old_collection_config.yml     # converts a CARLA-GeAR config
 """
 
 

@@ -20,7 +20,7 @@ EXAMPLE = """examples:
       --out runs/ss
 
 DIR is a dataset's root, a folder of roots, or DIR:SPLIT. The folder of --out gets model.safetensors (use it with
---set weights=FILE), train.json, card.md and curves.png; the same command again goes on where it was stopped.
+--set weights=FILE), train.json, card.md and curves.png; run the same command again to continue after an interruption.
 """
 SECONDS = {"s": 1, "m": 60, "h": 3600, "": 60}
 
@@ -44,12 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", required=True, metavar="DIR", help="folder of the results")
     length = parser.add_mutually_exclusive_group()
-    length.add_argument("--epochs", type=positive, metavar="N", help="passes over the data (as the network's recipe)")
+    length.add_argument("--epochs", type=positive, metavar="N", help="passes over the data (from the network's recipe)")
     length.add_argument(
         "--time-budget", type=budget, metavar="TIME", help="training time instead of epochs: 90s, 10m, 1.5h"
     )
-    parser.add_argument("--batch", type=positive, metavar="N", help="samples per step (as the recipe)")
-    parser.add_argument("--lr", type=float, metavar="X", help="peak learning rate (as the recipe)")
+    parser.add_argument("--batch", type=positive, metavar="N", help="samples per step (from the recipe)")
+    parser.add_argument("--lr", type=float, metavar="X", help="peak learning rate (from the recipe)")
     parser.add_argument(
         "--seed", type=int, metavar="N", help="seed of the initial weights, the sample order and the augmentation (0)"
     )
@@ -66,21 +66,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), help="device of the training (auto)")
     parser.add_argument(
-        "--workers", type=positive, metavar="N", help="reading threads; the result does not depend on them (2)"
+        "--workers", type=positive, metavar="N", help="number of reading threads; it does not change the result (2)"
     )
     parser.add_argument(
         "--adversarial",
         metavar="ATTACK",
         help="adversarial patch training: show patches that this attack makes during the training",
     )
-    parser.add_argument("--allow-test-data", action="store_true", help="train on test splits, too")
+    parser.add_argument("--allow-test-data", action="store_true", help="allow test splits in --data")
     parser.add_argument(
         "--set",
         metavar="KEY=VALUE",
         action="append",
         default=[],
         dest="settings",
-        help="any key of the training config; options.KEY for options of the network; repeatable",
+        help="sets a key of the training config; options.KEY for options of the network; repeatable",
     )
 
 

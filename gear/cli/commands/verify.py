@@ -18,11 +18,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split", help="split to check (all)")
     parser.add_argument("--repair", action="store_true", help="make damaged and missing samples again")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
-    parser.add_argument("--patch", help="patch that the dataset shows, where its own copy is damaged")
+    parser.add_argument("--patch", help="patch that the dataset shows, if the dataset's copy of it is damaged")
     parser.add_argument("--town", metavar="FILE", help="MJCF file of the dataset's town, if it is not one of gear's")
     parser.add_argument("--scenes", metavar="FILE", help="scene library of that town")
     parser.add_argument("--simulation", metavar="FILE", help="simulation config, if it is not one of gear's")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes that make samples again (1)")
+    parser.add_argument(
+        "--workers", type=int, default=1, metavar="N", help="number of processes that make samples again (1)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ EXAMPLE = """examples:
   gear view data/twin --split test --samples 200 --out twin.html
   gear view data/big --max-mb 400          # larger pictures; the page takes longer to open
 
-The page is one file; it needs no server and no network. In it: ? lists the keys.
+The page is one file; it needs no server and no network. On the page, press ? for a list of keys.
 """
 
 

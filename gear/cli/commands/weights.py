@@ -17,8 +17,8 @@ EXAMPLE = """examples:
   gear weights show ddrnet.safetensors
   gear weights show ddrnet23_slim --json           the shipped reference weights of a model
 
-A published file is read without running anything in it; one that wants more than numbers is refused.
-gear models says where published weights are found.
+A published file is read without running code in it; files that would run code are refused.
+`gear models show NAME` says where the published weights of a network are.
 """
 
 
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "convert", help="convert a published weights file to safetensors, with all keys checked"
     )
     converting.add_argument("model", metavar="MODEL", help="model plugin; gear models")
-    converting.add_argument("source", metavar="IN", help="the published file: .pth, .pt, .pkl, .safetensors")
+    converting.add_argument("source", metavar="IN", help="the published weights file: .pth, .pt, .pkl, .safetensors")
     converting.add_argument("out", metavar="OUT", help="the file to write; ends in .safetensors")
     converting.add_argument("--half", action="store_true", help="store matrices in float16, half the size")
     converting.add_argument(
@@ -38,18 +38,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="an option of the model that changes its graph; repeatable",
     )  # fmt: skip
     converting.add_argument(
-        "--entry", metavar="NAME", default="", help="the entry of the checkpoint to take, such as ema (one that fits)"
+        "--entry", metavar="NAME", default="", help="entry of the checkpoint to use, such as ema (the one that fits)"
     )
     converting.add_argument("--json", action="store_true", help="print JSON")
     averaging = actions.add_parser(
         "average", help="average two states of one network, such as before and after fine-tuning"
     )
     averaging.add_argument(
-        "first", metavar="FIRST", help="a safetensors file, or a model whose shipped weights are meant"
+        "first", metavar="FIRST", help="a safetensors file, or the name of a model, for its shipped weights"
     )
-    averaging.add_argument(
-        "second", metavar="SECOND", help="the other one: a safetensors file, or a model whose shipped weights are meant"
-    )
+    averaging.add_argument("second", metavar="SECOND", help="the second one, given like the first")
     averaging.add_argument("out", metavar="OUT", help="the file to write; ends in .safetensors")
     averaging.add_argument(
         "--share", type=float, default=0.5, metavar="X", help="share of the second file in the average, 0 to 1 (0.5)"
@@ -57,7 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     averaging.add_argument("--half", action="store_true", help="store matrices in float16, half the size")
     averaging.add_argument("--json", action="store_true", help="print JSON")
     showing = actions.add_parser("show", help="print the metadata of a weights file")
-    showing.add_argument("file", metavar="FILE", help="a safetensors file, or a model whose shipped weights are meant")
+    showing.add_argument(
+        "file", metavar="FILE", help="a safetensors file, or the name of a model, for its shipped weights"
+    )
     showing.add_argument("--json", action="store_true", help="print JSON")
 
 

@@ -47,7 +47,9 @@ class DepthNetwork(Network):
         self.input_scale = input_scale if options.input_scale is None else options.input_scale
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`depth_m` at the picture's size, and further outputs of the network, by name."""
+        """The output `depth_m` (B, H, W) in metres at the picture's size, and further outputs of the network, by
+        name.
+        """
         picture = pictures[VIEW]
         height, width = (int(side) for side in picture.shape[2:])
         outputs = dict(self.estimate(resized(picture, self._seen(height), self._seen(width))))

@@ -137,7 +137,9 @@ class FolderSegmenter(FolderNetwork):
         self._indexes = [[i for i, number in found.items() if number == train_id] for train_id in range(CLASSES)]
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`logits` (B, 19, H, W) at the picture's size."""
+        """The output `logits` (B, 19, H, W) at the picture's size; channels are in the order of Cityscapes train
+        ids.
+        """
         theirs = self.their_logits(self.seen(pictures)).float()
         nothing = torch.full_like(theirs[:, 0], UNKNOWN_LOGIT)
         ours = [theirs[:, indexes].logsumexp(1) if indexes else nothing for indexes in self._indexes]
@@ -187,7 +189,7 @@ class FolderDepth(FolderNetwork):
             )
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`depth_m` (B, H, W) in metres at the picture's size."""
+        """The output `depth_m` (B, H, W) in metres, at the picture's size."""
         said = self.said(self.seen(pictures)).predicted_depth.float()
         said = self.restored(said[:, None], pictures, "bicubic")[:, 0]  # transformers uses bicubic interpolation too
         if self.options.inverse_scale:
@@ -223,7 +225,7 @@ class FolderDetector(FolderNetwork):
         self._categories = self.matched({name: number for number, name in CATEGORY_NAMES.items()}, "COCO")
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`logits` and `pred_boxes`, with one row for each of the N object queries."""
+        """The outputs `logits` and `pred_boxes`, with one row for each of the N object queries."""
         said = self.said(self.seen(pictures))
         return {LOGITS: said.logits, BOXES: said.pred_boxes}
 

@@ -24,7 +24,7 @@ MOST_PX = 1 << 15
 YOLOS_PATCH_PX = 16
 
 DETR_LONGEST_PX = 1333
-"""Longest edge for files without `longest_edge`, which state `max_size` or nothing."""
+"""Longest edge in pixels for files of DETRs that state no `longest_edge` (older files state `max_size` or nothing)."""
 
 
 def read_processor(folder: Path, *, resizes: bool = True, config: object = None) -> Processor:

@@ -71,7 +71,7 @@ class SemsegNetwork(Network):
         return taps
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """`logits` (B, 19, H, W), by Cityscapes train id."""
+        """The output `logits` (B, 19, H, W); channels are in the order of Cityscapes train ids."""
         picture = pictures[VIEW]
         return {LOGITS: self._resized(self._maps(picture, auxiliary=False)[0], picture.shape[2:])}
 

@@ -129,5 +129,5 @@ carla_gear: AttackSpec[CarlaGearConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[CarlaGearConfig]]:
-    """The attack plugin of this module."""
+    """Hook of the plugin system: returns the attack plugin that this module defines."""
     return [carla_gear]

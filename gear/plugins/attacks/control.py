@@ -156,5 +156,5 @@ control: AttackSpec[ControlConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[ControlConfig]]:
-    """The attack plugin of this module."""
+    """Hook of the plugin system: returns the attack plugin that this module defines."""
     return [control]

@@ -101,5 +101,5 @@ eot: AttackSpec[EotConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[EotConfig]]:
-    """The attack plugin of this module."""
+    """Hook of the plugin system: returns the attack plugin that this module defines."""
     return [eot]

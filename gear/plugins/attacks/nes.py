@@ -132,5 +132,5 @@ nes: AttackSpec[NesConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[NesConfig]]:
-    """The attack plugin of this module."""
+    """Hook of the plugin system: returns the attack plugin that this module defines."""
     return [nes]

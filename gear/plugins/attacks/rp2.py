@@ -145,5 +145,5 @@ rp2: AttackSpec[Rp2Config] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[Rp2Config]]:
-    """The attack plugin of this module."""
+    """Hook of the plugin system: returns the attack plugin that this module defines."""
     return [rp2]

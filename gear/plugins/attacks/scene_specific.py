@@ -188,5 +188,5 @@ scene_specific: AttackSpec[SceneSpecificConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[SceneSpecificConfig]]:
-    """The attack plugin of this module."""
+    """Hook of the plugin system: returns the attack plugin that this module defines."""
     return [scene_specific]

@@ -138,5 +138,5 @@ square: AttackSpec[SquareConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[SquareConfig]]:
-    """The attack plugin of this module."""
+    """Hook of the plugin system: returns the attack plugin that this module defines."""
     return [square]

@@ -154,5 +154,5 @@ thys: AttackSpec[ThysConfig] = AttackSpec(
 
 @hookimpl
 def gear_attacks() -> list[AttackSpec[ThysConfig]]:
-    """The attack plugin of this module."""
+    """Hook of the plugin system: returns the attack plugin that this module defines."""
     return [thys]

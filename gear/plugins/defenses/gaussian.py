@@ -87,5 +87,5 @@ spec = DefenseSpec(
 
 @hookimpl
 def gear_defenses() -> list[DefenseSpec[GaussianConfig]]:
-    """The defense plugin of this module."""
+    """Hook of the plugin system: returns the defense plugin that this module defines."""
     return [spec]

@@ -123,5 +123,5 @@ spec = DefenseSpec(
 
 @hookimpl
 def gear_defenses() -> list[DefenseSpec[LgsConfig]]:
-    """The defense plugin of this module."""
+    """Hook of the plugin system: returns the defense plugin that this module defines."""
     return [spec]

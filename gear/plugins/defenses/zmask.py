@@ -29,5 +29,5 @@ spec = DefenseSpec(
 
 @hookimpl
 def gear_defenses() -> list[DefenseSpec[ZMaskConfig]]:
-    """The defense plugin of this module."""
+    """Hook of the plugin system: returns the defense plugin that this module defines."""
     return [spec]

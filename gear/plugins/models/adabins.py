@@ -40,7 +40,7 @@ def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
 
 spec = ModelSpec(
     name=NAME,
-    summary="AdaBins, EfficientNet-B5: monocular depth with adaptive bins (one of the paper's networks).",
+    summary="AdaBins with EfficientNet-B5: monocular depth with adaptive bins (a network of the paper).",
     config=AdaBinsOptions,
     build=build,
     tasks=("depth",),
@@ -56,7 +56,7 @@ spec = ModelSpec(
             size_mb=940.0,
         ),
     ),
-    normalisation="ImageNet's mean and deviation; pictures of more than 500 patches of 32 x 32 are made smaller",
+    normalisation="ImageNet's mean and standard deviation; pictures of more than 500 patches of 32 x 32 are reduced",
     parameters=78_257_328,
     needs=("torchvision", "timm"),
     convert=convert,
@@ -65,5 +65,5 @@ spec = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[AdaBinsOptions]]:
-    """The model plugin of this module."""
+    """Hook of the plugin system: returns the model plugin that this module defines."""
     return [spec]

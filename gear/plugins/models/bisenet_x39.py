@@ -45,7 +45,7 @@ def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
 
 bisenet_x39: ModelSpec[SegmentationOptions] = ModelSpec(
     name=NAME,
-    summary="BiSeNet with Xception39 (Yu et al., 2018): semantic segmentation by a spatial and a context path.",
+    summary="BiSeNet with Xception39 (Yu et al., 2018): semantic segmentation (a network of the paper).",
     config=SegmentationOptions,
     build=build,
     tasks=("semseg",),
@@ -60,7 +60,7 @@ bisenet_x39: ModelSpec[SegmentationOptions] = ModelSpec(
             size_mb=7.5,  # size of the network's tensors; the file may also contain an optimiser's state
         ),
     ),
-    normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",
+    normalisation="RGB in 0..1, minus ImageNet's mean, divided by its standard deviation",
     parameters=1_842_289,
     convert=convert,
 )
@@ -68,5 +68,5 @@ bisenet_x39: ModelSpec[SegmentationOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[SegmentationOptions]]:
-    """The model plugin of this module."""
+    """Hook of the plugin system: returns the model plugin that this module defines."""
     return [bisenet_x39]

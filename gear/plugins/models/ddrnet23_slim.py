@@ -45,7 +45,7 @@ def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
 
 ddrnet23_slim: ModelSpec[SegmentationOptions] = ModelSpec(
     name=NAME,
-    summary="DDRNet-23-slim (Hong et al., 2021): semantic segmentation in two branches, at 1/8 and down to 1/64.",
+    summary="DDRNet-23-slim (Hong et al., 2021): semantic segmentation with two branches (a network of the paper).",
     config=SegmentationOptions,
     build=build,
     tasks=("semseg",),
@@ -60,7 +60,7 @@ ddrnet23_slim: ModelSpec[SegmentationOptions] = ModelSpec(
             size_mb=23.0,  # size of the network's tensors alone
         ),
     ),
-    normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",
+    normalisation="RGB in 0..1, minus ImageNet's mean, divided by its standard deviation",
     parameters=5_734_342,
     convert=convert,
 )
@@ -68,5 +68,5 @@ ddrnet23_slim: ModelSpec[SegmentationOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[SegmentationOptions]]:
-    """The model plugin of this module."""
+    """Hook of the plugin system: returns the model plugin that this module defines."""
     return [ddrnet23_slim]

@@ -31,14 +31,14 @@ def build(options: DepthOptions) -> Model:
 
 spec = ModelSpec(
     name=NAME,
-    summary="DDRNet-23-slim with one channel of log-depth: the fast reference network for depth.",
+    summary="DDRNet-23-slim with one output channel, log-depth: fast reference network for depth.",
     config=DepthOptions,
     build=build,
     tasks=("depth",),
     views=("left",),
     taps=("rb1", "rb2", "rbb1", "rbb2"),
     recipe=Recipe(learning_rate=1e-3, batch=8, epochs=40, scales=(0.8, 1.25)),
-    normalisation="ImageNet's mean and deviation, at half the picture's sides unless input_scale says otherwise",
+    normalisation="ImageNet's mean and standard deviation; half the picture's sides by default (input_scale)",
     parameters=5_694_817,
     input_scale=HABIT,
 )
@@ -46,5 +46,5 @@ spec = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[DepthOptions]]:
-    """The model plugin of this module."""
+    """Hook of the plugin system: returns the model plugin that this module defines."""
     return [spec]

@@ -40,7 +40,7 @@ def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
 
 fasterrcnn: ModelSpec[OfficialDetectorOptions] = ModelSpec(
     name=NAME,
-    summary="Faster R-CNN with ResNet-50 and a feature pyramid (Ren et al., 2015; torchvision's): boxes in two stages.",
+    summary="Faster R-CNN with ResNet-50 and FPN, from torchvision: two-stage 2D detection (a network of the paper).",
     config=OfficialDetectorOptions,
     build=build,
     tasks=("detect2d",),
@@ -55,7 +55,7 @@ fasterrcnn: ModelSpec[OfficialDetectorOptions] = ModelSpec(
             size_mb=159.7,
         ),
     ),
-    normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",
+    normalisation="RGB in 0..1, minus ImageNet's mean, divided by its standard deviation",
     parameters=41_755_286,
     needs=("torchvision",),
     convert=convert,
@@ -64,5 +64,5 @@ fasterrcnn: ModelSpec[OfficialDetectorOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[OfficialDetectorOptions]]:
-    """The model plugin of this module."""
+    """Hook of the plugin system: returns the model plugin that this module defines."""
     return [fasterrcnn]

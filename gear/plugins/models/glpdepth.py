@@ -39,7 +39,7 @@ def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
 
 spec = ModelSpec(
     name=NAME,
-    summary="GLPDepth, MiT-b4: monocular depth with a transformer encoder (one of the paper's networks).",
+    summary="GLPDepth with the encoder MiT-b4: monocular depth with a transformer (a network of the paper).",
     config=GlpnOptions,
     build=build,
     tasks=("depth",),
@@ -56,7 +56,7 @@ spec = ModelSpec(
             size_mb=245.0,
         ),
     ),
-    normalisation="RGB in 0..1 as it is; sides are mirrored out to multiples of 32",
+    normalisation="RGB in 0..1; sides are extended by reflection to multiples of 32",
     parameters=61_220_903,
     needs=("transformers",),
     convert=convert,
@@ -65,5 +65,5 @@ spec = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[GlpnOptions]]:
-    """The model plugin of this module."""
+    """Hook of the plugin system: returns the model plugin that this module defines."""
     return [spec]

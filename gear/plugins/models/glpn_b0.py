@@ -27,14 +27,14 @@ def build(options: GlpnB0Options) -> Model:
 
 spec = ModelSpec(
     name=NAME,
-    summary="GLPDepth with the small encoder MiT-b0: the same graph and loss, seventeen times fewer parameters.",
+    summary="GLPDepth with the small encoder MiT-b0, a 17th of the parameters: reference network for depth.",
     config=GlpnB0Options,
     build=build,
     tasks=("depth",),
     views=("left",),
     taps=("stem", "trunk", "decoder"),
     recipe=Recipe(learning_rate=5e-4, batch=8, epochs=40, scales=(0.8, 1.25), gradient_norm=1.0),
-    normalisation="RGB in 0..1 as it is; sides are mirrored out to multiples of 32",
+    normalisation="RGB in 0..1; sides are extended by reflection to multiples of 32",
     parameters=3_414_807,
     needs=("transformers",),
     convert=convert,
@@ -43,5 +43,5 @@ spec = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[GlpnB0Options]]:
-    """The model plugin of this module."""
+    """Hook of the plugin system: returns the model plugin that this module defines."""
     return [spec]

@@ -97,5 +97,5 @@ detect2d: ModelSpec[DetectorFolderOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[Any]]:
-    """The three model plugins of this module, one for each task."""
+    """Hook of the plugin system: returns the three model plugins that this module defines, one for each task."""
     return [semseg, depth, detect2d]

@@ -81,14 +81,14 @@ def start_from_imagenet(model: Any) -> None:
 
 retinanet_r18: ModelSpec[ReferenceDetectorOptions] = ModelSpec(
     name=R18,
-    summary="RetinaNet with ResNet-18, a pyramid of 128 channels and group normalisation: trains on CPUs.",
+    summary="RetinaNet with ResNet-18 and FPN: reference network for 2D detection that CPUs can train.",
     config=ReferenceDetectorOptions,
     build=build_r18,
     tasks=("detect2d",),
     views=("left",),
     taps=("layer1", "layer2", "layer3", "layer4"),
     recipe=RECIPE,
-    normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",
+    normalisation="RGB in 0..1, minus ImageNet's mean, divided by its standard deviation",
     parameters=13_366_855,
     input_scale=INPUT_SCALE,
     needs=("torchvision",),
@@ -96,14 +96,14 @@ retinanet_r18: ModelSpec[ReferenceDetectorOptions] = ModelSpec(
 
 retinanet_lite0: ModelSpec[ReferenceDetectorOptions] = ModelSpec(
     name=LITE0,
-    summary="RetinaNet with EfficientNet-Lite0, which `gear train --init imagenet` takes from an installed package.",
+    summary="RetinaNet with EfficientNet-Lite0: reference for 2D detection; --init imagenet has ImageNet weights.",
     config=ReferenceDetectorOptions,
     build=build_lite0,
     tasks=("detect2d",),
     views=("left",),
     taps=("layer1", "layer2", "layer3", "layer4"),
     recipe=RECIPE,
-    normalisation="RGB in 0..255, less 127, over 128",
+    normalisation="RGB in 0..255, minus 127, divided by 128",
     parameters=4_504_071,
     input_scale=INPUT_SCALE,
     needs=("torchvision", "timm"),
@@ -113,5 +113,5 @@ retinanet_lite0: ModelSpec[ReferenceDetectorOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[ReferenceDetectorOptions]]:
-    """The two model plugins of this module."""
+    """Hook of the plugin system: returns the two model plugins that this module defines."""
     return [retinanet_r18, retinanet_lite0]

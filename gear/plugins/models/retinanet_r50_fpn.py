@@ -40,7 +40,7 @@ def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
 
 retinanet: ModelSpec[OfficialDetectorOptions] = ModelSpec(
     name=NAME,
-    summary="RetinaNet with ResNet-50 and a feature pyramid (Lin et al., 2017; torchvision's): boxes in one stage.",
+    summary="RetinaNet with ResNet-50 and FPN, from torchvision: one-stage 2D detection (a network of the paper).",
     config=OfficialDetectorOptions,
     build=build,
     tasks=("detect2d",),
@@ -55,7 +55,7 @@ retinanet: ModelSpec[OfficialDetectorOptions] = ModelSpec(
             size_mb=130.3,
         ),
     ),
-    normalisation="RGB in 0..1, less ImageNet's mean, over its standard deviation",
+    normalisation="RGB in 0..1, minus ImageNet's mean, divided by its standard deviation",
     parameters=34_014_999,
     needs=("torchvision",),
     convert=convert,
@@ -64,5 +64,5 @@ retinanet: ModelSpec[OfficialDetectorOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[OfficialDetectorOptions]]:
-    """The model plugin of this module."""
+    """Hook of the plugin system: returns the model plugin that this module defines."""
     return [retinanet]

@@ -50,28 +50,28 @@ def start_from_imagenet(model: Any) -> None:
 
 stereo_centre: ModelSpec[StereoCentreOptions] = ModelSpec(
     name=RESNET,
-    summary="Siamese ResNet-18-FPN with a correlation volume and centre heads: trains on two cores.",
+    summary="Stereo network with ResNet-18 that finds objects by their centres: reference for stereo3d.",
     config=StereoCentreOptions,
     build=build_resnet,
     tasks=("stereo3d",),
     views=(LEFT, RIGHT),
     taps=TAPS,
     recipe=RECIPE,
-    normalisation="ImageNet mean and deviation",
+    normalisation="ImageNet's mean and standard deviation",
     parameters=4_962_314,
     input_scale=INPUT_SCALE,
 )
 
 stereo_centre_lite0: ModelSpec[StereoCentreOptions] = ModelSpec(
     name=LITE0,
-    summary="The same heads on EfficientNet-Lite0, which `gear train --init imagenet` takes from an installed package.",
+    summary="Stereo network with EfficientNet-Lite0, like stereo_centre; --init imagenet has ImageNet weights.",
     config=StereoCentreOptions,
     build=build_lite0,
     tasks=("stereo3d",),
     views=(LEFT, RIGHT),
     taps=TAPS,
     recipe=RECIPE,
-    normalisation="RGB in 0..255, less 127, over 128",
+    normalisation="RGB in 0..255, minus 127, divided by 128",
     parameters=3_364_394,
     input_scale=INPUT_SCALE,
     needs=("torchvision", "timm"),
@@ -81,5 +81,5 @@ stereo_centre_lite0: ModelSpec[StereoCentreOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[StereoCentreOptions]]:
-    """The two model plugins of this module."""
+    """Hook of the plugin system: returns the two model plugins that this module defines."""
     return [stereo_centre, stereo_centre_lite0]

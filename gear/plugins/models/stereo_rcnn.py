@@ -27,7 +27,7 @@ def from_official(state: Mapping[str, Any]) -> Mapping[str, Any]:
 
 stereo_rcnn: ModelSpec[StereoRcnnOptions] = ModelSpec(
     name="stereo_rcnn",
-    summary="Stereo R-CNN R101-FPN: paired proposals, keypoints, box solver and dense alignment; cars only.",
+    summary="Stereo R-CNN with ResNet-101 and FPN: stereo 3D detection of cars (a network of the paper).",
     config=StereoRcnnOptions,
     build=build,
     tasks=("stereo3d",),
@@ -42,7 +42,7 @@ stereo_rcnn: ModelSpec[StereoRcnnOptions] = ModelSpec(
             size_mb=848.0,
         ),
     ),
-    normalisation="BGR 0..255 less (102.98, 115.95, 122.77), short side 600",
+    normalisation="BGR in 0..255, minus (102.98, 115.95, 122.77); shorter side 600 pixels",
     parameters=105_891_452,
     convert=from_official,
 )
@@ -50,5 +50,5 @@ stereo_rcnn: ModelSpec[StereoRcnnOptions] = ModelSpec(
 
 @hookimpl
 def gear_models() -> list[ModelSpec[StereoRcnnOptions]]:
-    """The model plugin of this module."""
+    """Hook of the plugin system: returns the model plugin that this module defines."""
     return [stereo_rcnn]
