@@ -204,3 +204,12 @@ def test_the_official_tools_score_ground_truth_perfect(tmp_path: Path, monkeypat
     assert pixels["averageScoreCategories"] == pytest.approx(1.0)
     scores = averages.get("averages", averages)
     assert scores["allAp"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 1.0, -2.0, 3.0])
+def test_a_level_camera_file_has_no_negative_zero(yaw_rad: float) -> None:
+    world_from_ego = RigidTransform.from_yaw("world", "ego", (10.0, 5.0, 0.0), yaw_rad)
+    (record,) = Rig(cameras=(CameraMount(name="left", width_px=64, height_px=32),)).place(world_from_ego)
+    extrinsic = camera_json(record, world_from_ego, baseline_m=0.0)["extrinsic"]
+    assert [extrinsic[name] for name in ("pitch", "roll", "yaw")] == pytest.approx([0.0] * 3, abs=1e-9)
+    assert "-0.0," not in json.dumps(extrinsic) and "-0.0}" not in json.dumps(extrinsic)

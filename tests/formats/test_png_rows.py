@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gear.formats.png import decode_plain, decode_rgb, encode_labels, encode_rgb
-from gear.formats.png_rows import decode_rows, encode_deep
+from gear.formats.png_rows import decode_rows, encode_deep, whole
 
 FILTERS = {"none": cv2.IMWRITE_PNG_FILTER_NONE, "sub": cv2.IMWRITE_PNG_FILTER_SUB, "up": cv2.IMWRITE_PNG_FILTER_UP}
 
@@ -92,3 +92,10 @@ def test_a_header_that_promises_more_than_there_is_costs_nothing() -> None:
         header = b"IHDR" + (2**31 - 1).to_bytes(4, "big") * 2 + data[24:29]
         data = data[:12] + header + zlib.crc32(header).to_bytes(4, "big") + data[33:]
         assert decode_rows(data) is None
+
+
+@pytest.mark.parametrize(("height", "width"), [(0, 5), (5, 0)])
+def test_a_picture_without_pixels_is_left_alone(height: int, width: int) -> None:
+    """A row of no pixels is still a byte, its filter, so that the data are as long as they should be."""
+    data = zlib.compress(bytes(height))
+    assert decode_rows(whole(width, height, 8, 0, data)) is None
