@@ -69,14 +69,14 @@ class Response:
         return np.asarray(self._table[linear_rgb])
 
     def curve(self, light: npt.ArrayLike) -> Floats:
-        """The response without rounding: light 0..1 to picture values 0..1, elementwise, float64."""
+        """Converts light 0..1 to picture values 0..1 without rounding; elementwise, float64."""
         x = np.asarray(light, dtype=np.float64)
         y = x * self.exposure / (1 + (self.exposure - 1) * x)
         z = y**self.contrast
         return encode_srgb(z) if self.encoding == "srgb" else z
 
     def inverse(self, picture: npt.ArrayLike) -> Floats:
-        """The inverse of `curve`: picture values 0..1 to light 0..1, elementwise, float64."""
+        """Converts picture values 0..1 back to light 0..1, the inverse of `curve`; elementwise, float64."""
         value = np.asarray(picture, dtype=np.float64)
         z = decode_srgb(value) if self.encoding == "srgb" else value
         y = z ** (1 / self.contrast)

@@ -40,12 +40,14 @@ def apply(response: Response, light: torch.Tensor) -> torch.Tensor:
 
 
 def face_light(renderer_name: str, face: torch.Tensor) -> torch.Tensor:
-    """`gear.camera.response.face_light` for tensors: picture values 0..1 to weights 0..1 of the same shape."""
+    """`gear.camera.response.face_light` for tensors: converts picture values 0..1 to weights 0..1, in a tensor
+    of the same shape.
+    """
     return face if renderer_name == "classic" else decode_srgb(face)
 
 
 def decode_srgb(values: torch.Tensor) -> torch.Tensor:
-    """sRGB values 0..1 to linear light 0..1, elementwise; differentiable once."""
+    """Converts sRGB values 0..1 to linear light 0..1, elementwise; differentiable once."""
     with torch.no_grad():
         base = (values.clamp_min(0.04045) + 0.055) / 1.055
         bent = base**2.4

@@ -37,8 +37,14 @@ class SparseMatrix:
 
 
 def stacked_product(matrices: Sequence[SparseMatrix], dense: Tensor) -> Tensor:
-    """The products of several matrices with one (M, k) float32 matrix, stacked vertically; differentiable with
-    respect to `dense`.
+    """Products of several sparse matrices with one dense matrix, stacked vertically.
+
+    Args:
+        matrices: matrices (N_i, M).
+        dense: (M, k) float32; the result is differentiable with respect to it.
+
+    Returns:
+        (sum of N_i, k) float32.
     """
     product: Tensor = _Product.apply(dense, matrices)  # type: ignore[no-untyped-call]
     return product

@@ -63,7 +63,7 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def displayed_colour(albedo: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Display values 0..1 for linear albedo 0..1 in full light, elementwise."""
+    """Converts linear albedo 0..1 to the display values 0..1 that it has in full light, elementwise."""
     return _lifted(encode_srgb(albedo))
 
 

@@ -67,12 +67,12 @@ class PlacementSpace:
     def __init__(
         self, model: mujoco.MjModel, bodies: Mapping[str, ActorType], parked_m: float = -PARKED_DEPTH_M
     ) -> None:
-        """Uses a placement model.
+        """Prepares the placement model for queries: all actors are moved out of the way.
 
         Args:
             model: the placement model.
             bodies: the assets of its actors, by body name.
-            parked_m: height to which actors that a question does not name are moved.
+            parked_m: height to which actors that a query does not name are moved.
         """
         self._model = model
         self._parked_m = parked_m

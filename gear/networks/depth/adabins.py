@@ -46,7 +46,7 @@ class AdaBins(DepthNetwork):
         self._normalise = Normalise().to(self.device).eval()
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """Depth at the size of the picture, and the bins of the picture; both in metres."""
+        """`depth_m` (B, H, W) at the size of the picture, and `bin_centres_m` (B, bins); both in metres."""
         height, width = (int(side) for side in picture.shape[2:])
         seen = resized(picture, *fitting(height, width, least=self.options.queries + 1))
         half_m, centres_m = self.graph(self._normalise(seen))

@@ -21,7 +21,7 @@ CAP_M = 80.0
 
 
 def known(depth_m: Tensor, cap_m: float | None = CAP_M) -> Tensor:
-    """Boolean mask of the pixels whose ground truth is known and at most `cap_m` (None for no limit)."""
+    """(B, H, W) bool: True for pixels whose true depth is known and at most `cap_m` (None for no limit)."""
     is_known = torch.isfinite(depth_m) & (depth_m > LEAST_M)
     return is_known if cap_m is None else is_known & (depth_m <= cap_m)
 
@@ -52,14 +52,18 @@ def silog(
 
 
 def adabins_silog(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
-    """AdaBins' pixel loss: 10 * sqrt(variance + 0.15 * mean^2) of the differences between logarithms of depth;
-    see `silog`.
+    """AdaBins' pixel loss: 10 * sqrt(variance + 0.15 * mean^2) of the differences between logarithms of depth.
+
+    Arguments are those of `silog`: (B, H, W) depths in metres, NaN where the truth is unknown.
     """
     return silog(predicted_m, depth_m, balance=0.85, scale=10.0, cap_m=cap_m)
 
 
 def log_l1(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
-    """Mean absolute difference between the logarithms of depth: a relative error that is robust to outliers."""
+    """Mean absolute difference between the logarithms of depth, a relative error that is robust to outliers.
+
+    Arguments are those of `silog`: (B, H, W) depths in metres, NaN where the truth is unknown.
+    """
     mask = known(depth_m, cap_m)
     return _log_errors(predicted_m, depth_m, mask).abs().sum() / mask.sum().clamp_min(1)
 
@@ -67,8 +71,8 @@ def log_l1(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M)
 def root_mean_square(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float = CAP_M) -> Tensor:
     """Root mean square error in metres; predictions beyond `cap_m` are set to `cap_m`, as in the evaluation.
 
-    The metric is that of Eigen et al., NeurIPS 2014. Logarithmic errors give near pixels the most weight; this error
-    gives it to far pixels.
+    Arguments are those of `silog`. The metric is that of Eigen et al., NeurIPS 2014. Logarithmic errors give near
+    pixels the most weight; this error gives it to far pixels.
     """
     mask = known(depth_m, cap_m)
     errors = torch.where(mask, predicted_m.clamp_max(cap_m) - torch.where(mask, depth_m, 0.0), 0.0)
@@ -78,7 +82,10 @@ def root_mean_square(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float = CAP
 
 
 def smooth_l1(predicted_m: Tensor, depth_m: Tensor, *, beta_m: float = 1.0, cap_m: float | None = CAP_M) -> Tensor:
-    """Mean smooth L1 error in metres: quadratic below `beta_m`, linear above (Girshick, ICCV 2015)."""
+    """Mean smooth L1 error in metres: quadratic below `beta_m`, linear above (Girshick, ICCV 2015).
+
+    Arguments are those of `silog`: (B, H, W) depths in metres, NaN where the truth is unknown.
+    """
     mask = known(depth_m, cap_m)
     target_m = torch.where(mask, depth_m, predicted_m.detach())
     return functional.smooth_l1_loss(predicted_m, target_m, beta=beta_m, reduction="sum") / mask.sum().clamp_min(1)

@@ -14,7 +14,9 @@ PLANES = 128
 
 
 def upsample(features: Tensor, size: torch.Size) -> Tensor:
-    """Bilinear interpolation with aligned corners, as everywhere in this network."""
+    """Resizes (B, C, h, w) features to `size` (height, width) bilinearly, with aligned corners as everywhere in
+    this network.
+    """
     return functional.interpolate(features, size=size, mode="bilinear", align_corners=True)
 
 

@@ -20,7 +20,7 @@ def conv1x1(inputs: int, outputs: int, stride: int = 1) -> nn.Conv2d:
 
 
 def upsample(features: Tensor, like: Tensor) -> Tensor:
-    """Bilinear interpolation to the height and width of the map `like`; corners are not aligned."""
+    """Resizes (B, C, h, w) features bilinearly to the height and width of the map `like`; corners are not aligned."""
     return functional.interpolate(features, size=like.shape[2:], mode="bilinear", align_corners=False)
 
 

@@ -175,7 +175,7 @@ class CentreGraph(nn.Module, ABC):
 
     @abstractmethod
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Feature maps of single pictures at strides 2 and 4."""
+        """Feature maps of single pictures (B, 3, H, W): at stride 2, (B, C, H / 2, W / 2), and at stride 4."""
 
     @abstractmethod
     def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:

@@ -30,7 +30,7 @@ def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
 
 
 def decode(codes: Tensor, anchors: Tensor) -> Tensor:
-    """The boxes that belong to codes.
+    """The (…, 4) boxes for (…, 4) codes relative to (…, 4) anchors.
 
     As in the original code this is not the exact inverse of `encode`: right and bottom are larger by one pixel.
     """

@@ -44,5 +44,14 @@ def propose(
 
 
 def legacy_nms(boxes: Tensor, scores: Tensor, most_overlap: float) -> Tensor:
-    """(K,) indices of the boxes that non-maximum suppression keeps, best first. Box sides are right - left + 1."""
+    """Non-maximum suppression of boxes whose sides are right - left + 1.
+
+    Args:
+        boxes: (N, 4) left, top, right, bottom.
+        scores: (N,) scores.
+        most_overlap: a box whose IoU with a kept box of higher score exceeds this is dropped.
+
+    Returns:
+        (K,) indices of the kept boxes, highest score first.
+    """
     return nms(boxes + boxes.new_tensor([0, 0, 1, 1]), scores, most_overlap)

@@ -40,7 +40,7 @@ class BitDepth(PerPicture):
         self._table = np.rint(np.rint(np.arange(256) / 255 * steps) / steps * 255).astype(np.uint8)
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The picture with fewer bits per channel; no mask."""
+        """The (H, W, 3) picture with fewer bits per channel; no mask."""
         return self._table[picture], None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:

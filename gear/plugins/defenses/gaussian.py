@@ -45,7 +45,7 @@ class Gaussian(PerPicture):
         self._kernel: npt.NDArray[np.float32] = (kernel / kernel.sum()).astype(np.float32)
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The blurred picture; no mask."""
+        """The blurred (H, W, 3) picture; no mask."""
         blurred = cv2.sepFilter2D(
             picture.astype(np.float32), -1, self._kernel, self._kernel, borderType=cv2.BORDER_REFLECT_101
         )

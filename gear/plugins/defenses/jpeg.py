@@ -40,7 +40,7 @@ class Jpeg(PerPicture):
         self._parameters = [cv2.IMWRITE_JPEG_QUALITY, config.quality]
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The picture after compression; no mask."""
+        """The (H, W, 3) picture after compression; no mask."""
         return self._recode(picture), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:

@@ -61,7 +61,7 @@ class Lgs(PerPicture):
         self._stride_px = config.window_px - config.overlap_px
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The darkened picture, and the darkening as a mask."""
+        """The darkened (H, W, 3) picture, and as a mask (H, W) how much each pixel was darkened, 0..1."""
         unit = picture.astype(np.float32) / 255
         grey = unit @ np.array(GREY, np.float32)
         dx, dy = np.zeros_like(grey), np.zeros_like(grey)

@@ -40,7 +40,7 @@ class Median(PerPicture):
         self._side_px = 2 * config.radius_px + 1
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The filtered picture; no mask."""
+        """The filtered (H, W, 3) picture; no mask."""
         return np.asarray(cv2.medianBlur(np.ascontiguousarray(picture), self._side_px), np.uint8), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:

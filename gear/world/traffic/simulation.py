@@ -150,7 +150,7 @@ def vehicle_discs(
 
 
 class TrafficSimulation:
-    """Vehicles and people that move among obstacles."""
+    """The traffic of a sample: vehicles and people that move among obstacles which stand still."""
 
     def __init__(
         self,

@@ -66,7 +66,12 @@ class TextureOptimiser:
         self.has_gradient |= (gradient or 0.0) > 0
 
     def step(self, ascent: Tensor, share: float) -> None:
-        """Makes one Adam step along the gradient, with `share` of the learning rate; textures stay in 0..1."""
+        """Makes one Adam step; textures stay in 0..1.
+
+        Args:
+            ascent: (S, 3, h, w) direction in which the textures are changed.
+            share: share of the learning rate that is used, 0..1.
+        """
         self.done += 1
         self.mean.lerp_(ascent, 1 - BETAS[0])
         self.square.lerp_(ascent.square(), 1 - BETAS[1])

@@ -116,7 +116,9 @@ class Defended(nn.Module):
         return self.model.forward(self.defended(views).views, targets)
 
     def defended(self, views: Mapping[str, Tensor]) -> DefendedBatch:
-        """The defense's result for a batch. The last result and its graph are cached."""
+        """The defense's result for a batch of (B, 3, H, W) pictures by camera. The last result and its graph are
+        cached.
+        """
         has_gradients = torch.is_grad_enabled()
         if self._last is None or self._last[0] is not views or self._last[1] != has_gradients:
             self._last = (views, has_gradients, self._defend(views))

@@ -61,7 +61,9 @@ class MaskBlock:
         return torch.sigmoid(mask_out * inner + mask_out_offset)
 
     def score(self, shallow: Tensor, deep: Tensor) -> float:
-        """The agreement of both maps under the mask: sum(H_D H_S M) / (1 + sum M), 0 or more."""
+        """The score of an attack: how much both heat maps agree under the mask, sum(H_D H_S M) / (1 + sum M), 0
+        or more.
+        """
         return float(self.score_tensor(shallow, deep))
 
     def score_tensor(self, shallow: Tensor, deep: Tensor) -> Tensor:

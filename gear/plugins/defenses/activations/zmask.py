@@ -140,11 +140,14 @@ class ZMask:
         raise ValueError("Z-Mask looks into the model: it has `forward_fitted`")
 
     def forward_fitted(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> Mapping[str, Tensor]:
-        """The cleaned pictures; those of `defend_batch`."""
+        """Cleans (B, 3, H, W) pictures by camera; the result is that of `defend_batch` without masks and scores."""
         return self.defend_batch(views, model, state).views
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> DefendedBatch:
-        """Covers regions as `apply` does. The gradient of the covering is that of the mask before rounding."""
+        """Cleans (B, 3, H, W) pictures by camera as `apply` does, and returns masks and scores with gradients.
+
+        The gradient of the covered pictures is that of the mask before rounding.
+        """
         covers = {name: torch.zeros_like(pictures[:, :1]) for name, pictures in views.items()}
         masks = {name: pictures.new_zeros(pictures[:, 0].shape) for name, pictures in views.items()}
         scores: list[Tensor] = []
