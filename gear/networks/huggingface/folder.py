@@ -22,7 +22,7 @@ from gear.values.errors import GearError
 ADAPTER = "write an adapter (docs/how-to/write-a-model.md)"
 
 SHOWN = 240
-"""Number of characters of transformers' messages that an error quotes."""
+"""Largest number of characters of a message of transformers that an error quotes."""
 
 OF_TIMM = {"in_chans": "num_channels", "out_indices": "out_indices", "output_stride": "output_stride"}
 """Keys of `backbone_kwargs` for a backbone of timm in files from before transformers 5, and their current names."""
