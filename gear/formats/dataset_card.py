@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -114,7 +115,7 @@ def card(splits: Sequence[SplitFacts], configs: Mapping[str, Mapping[str, Sequen
     lines = [
         "---",
         "license: mit",
-        f"pretty_name: {title(splits)}",
+        f"pretty_name: {json.dumps(title(splits))}",
         "language: [en]",
         "annotations_creators: [machine-generated]",
         "source_datasets: [original]",
@@ -126,7 +127,7 @@ def card(splits: Sequence[SplitFacts], configs: Mapping[str, Mapping[str, Sequen
     for place, (config, files) in enumerate(configs.items()):
         lines += [f"- config_name: {config}", *(["  default: true"] if place == 0 else []), "  data_files:"]
         for split, patterns in files.items():
-            quoted = ", ".join(f'"{pattern}"' for pattern in patterns)
+            quoted = ", ".join(json.dumps(pattern) for pattern in patterns)
             lines += [f"  - split: {hub_names[split]}", f"    path: [{quoted}]"]
     lines += ["---", "", f"# {title(splits)}", "", f"{counted(samples, 'sample')} of driving scenes, made by gear."]
     lines += ["", "| split | samples | town/scene | weather | patch | seed |", "|---|---|---|---|---|---|"]

@@ -1,3 +1,5 @@
+import dataclasses
+
 import yaml
 
 from gear.contracts.tasks import SplitInfo
@@ -26,6 +28,13 @@ def test_the_front_matter_is_what_the_hub_reads() -> None:
     ]  # fmt: skip
     assert "| val | 2 | town10/billboard01 | ClearNoon | none | 131 |" in body
     assert "gear 0.1.0, MuJoCo 4.0.0, renderer classic" in body and "Trees of pictures." in body
+
+
+def test_a_name_with_signs_of_yaml_is_a_name() -> None:
+    facts = SplitFacts.of(dataclasses.replace(INFO, scene='a: "b" # c'), "depth", 1, {})
+    front = yaml.safe_load(card([facts], {"x": {"val": ['a"b/*.png']}}, "").split("---\n")[1])
+    assert front["pretty_name"] == 'gear depth town10 a: "b" # c, patch none'
+    assert front["configs"][0]["data_files"][0]["path"] == ['a"b/*.png']
 
 
 def test_what_a_manifest_lacks_is_unknown() -> None:
