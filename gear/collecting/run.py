@@ -48,16 +48,18 @@ class CollectReport:
         )
 
 
-def executor_of(job: Job, workers: int, *, engine: str = DEFAULT, in_subprocess: bool = False) -> Executor:
+def executor_of(
+    job: Job, workers: int, *, engine: str = DEFAULT, address: str | None = None, in_subprocess: bool = False
+) -> Executor:
     """The executor of an engine; a single worker of the default engine is this process, unless a process of its own is
     requested.
 
     Raises:
         UnknownNameError: there is no such engine.
     """
-    if workers == 1 and engine == DEFAULT and not in_subprocess:
+    if workers == 1 and engine == DEFAULT and address is None and not in_subprocess:
         return InThisProcess()
-    return open_engine(engine, workers=workers, backend=job.config.renderer)
+    return open_engine(engine, workers=workers, backend=job.config.renderer, address=address)
 
 
 def run_job(

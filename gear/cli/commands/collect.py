@@ -52,7 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's flags to its parser."""
     parser.epilog = EXAMPLE
     add_collection_arguments(parser)
-    parser.add_argument("--engine", metavar="NAME", help="engine that makes the samples (processes)")
+    parser.add_argument(
+        "--engine", metavar="NAME", help="engine that makes the samples: processes, ray or slurm (processes)"
+    )
+    parser.add_argument("--address", help="of the engine's cluster: a Ray cluster, or a SLURM partition")
     parser.add_argument(
         "--workers",
         type=positive,

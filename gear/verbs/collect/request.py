@@ -35,6 +35,7 @@ class CollectRequest:
     probes: bool | None = None
     settings: tuple[str, ...] = ()
     engine: str = DEFAULT
+    address: str | None = None
     workers: int = 1
     shard: str | None = None
     in_subprocess: bool = False

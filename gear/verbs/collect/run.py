@@ -30,6 +30,7 @@ def collect(
     probes: bool | None = None,
     settings: Iterable[str] = (),
     engine: str = DEFAULT,
+    address: str | None = None,
     workers: int = 1,
     shard: str | None = None,
     in_subprocess: bool = False,
@@ -48,6 +49,7 @@ def collect(
         probes: whether probes for compositors are stored as well; see `gear.dataset.probe_files`.
         settings: further `KEY=VALUE` texts for any key of the config.
         engine: name of the engine that makes the samples; `processes` uses processes on this machine.
+        address: of the engine's cluster: a Ray cluster, or a partition of SLURM.
         workers: number of workers of the engine; the result does not depend on it.
         shard: `I/N`, to collect the I-th of N parts of the split. Sequences stay whole. Shards may be collected in any
             order, at any time and on any machine. A run without a shard makes what is missing and closes the split;
@@ -78,6 +80,7 @@ def collect(
         probes=probes,
         settings=tuple(settings),
         engine=engine,
+        address=address,
         workers=workers,
         shard=shard,
         in_subprocess=in_subprocess,
@@ -97,6 +100,12 @@ def run_collect(request: CollectRequest, callbacks: Callbacks) -> CollectReport:
     job = resolve(request.loaded())
     for note in job.notes:
         callbacks.on_warning(note)
-    executor = executor_of(job, request.workers, engine=request.engine, in_subprocess=request.in_subprocess)
+    executor = executor_of(
+        job,
+        request.workers,
+        engine=request.engine,
+        address=request.address,
+        in_subprocess=request.in_subprocess,
+    )
     shard = request.chosen_shard()
     return run_job(job, executor=executor, force=request.force, shard=shard, callbacks=callbacks)

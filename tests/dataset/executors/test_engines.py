@@ -31,7 +31,7 @@ def test_the_engine_of_one_machine_is_there() -> None:
 def test_a_new_engine_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "cluster_of_mine.py").write_text(ENGINE)
     monkeypatch.setattr(executors, "__path__", [*executors.__path__, str(tmp_path)])
-    assert engine_names() == ["cluster_of_mine", "processes"]
+    assert engine_names() == ["cluster_of_mine", "processes", "ray", "slurm"]
     opened = open_engine("cluster_of_mine", workers=8, backend="film")
     assert isinstance(opened, InThisProcess) and vars(opened)["asked"] == (8, "film")
 

@@ -1,0 +1,70 @@
+"""The engine `ray` with a cluster of several nodes on this machine, of which some are killed."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gear.contracts.executors import Executor, Outcome, Report
+from gear.dataset.executors.ray import OnRay
+from gear.testing.executor_contract import ExecutorContract
+from gear.values.errors import GearError
+
+ray = pytest.importorskip("ray")
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
+
+
+def make_slowly(folder: str, indices: Iterator[int], report: Report) -> None:
+    for index in indices:
+        time.sleep(0.3)
+        (Path(folder) / str(index)).write_text("made")
+        report(Outcome(index=index))
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    from ray.cluster_utils import Cluster
+
+    made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    ray.init(address=made.address, log_to_driver=False, logging_level="ERROR")
+    yield made
+    ray.shutdown()
+    made.shutdown()
+
+
+@pytest.mark.usefixtures("cluster")
+class TestRay(ExecutorContract):
+    @pytest.fixture
+    def executor(self) -> Executor:
+        return OnRay(workers=2)
+
+
+def test_nodes_that_are_killed_cost_no_item(cluster: Any, tmp_path: Path) -> None:
+    nodes = [cluster.add_node(num_cpus=1) for _ in range(2)]
+    reported: list[Outcome] = []
+
+    def kill() -> None:
+        while len(list(tmp_path.iterdir())) < 3:
+            time.sleep(0.05)
+        for node in nodes:
+            cluster.remove_node(node, allow_graceful=False)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    OnRay(workers=3).run(partial(make_slowly, str(tmp_path)), range(24), reported.append)
+    killer.join()
+    assert {outcome.index for outcome in reported if outcome.kind == "made"} == set(range(24))
+    assert len(list(tmp_path.iterdir())) == 24
+
+
+def test_an_address_without_a_cluster_is_one_line() -> None:
+    ray.shutdown()
+    with pytest.raises(GearError, match=r"--address 127\.0\.0\.1:1: no Ray cluster can be joined there") as caught:
+        OnRay(workers=1, address="127.0.0.1:1").run(partial(make_slowly, ""), [0], lambda outcome: None)
+    assert "\n" not in str(caught.value)
