@@ -28,7 +28,7 @@ def windowed_pinhole(pinhole: Intrinsics, window: Window) -> Intrinsics:
 
 
 def cut_index_box(box_px: BoxPx, window: Window) -> BoxPx:
-    """A box in index pixels of the picture, in index pixels of the window's picture; not clipped."""
+    """Converts a box from index pixels of the picture to index pixels of the window's picture; not clipped."""
     left, top, right, bottom = box_px
     edges = cut_box((left + 0.5, top + 0.5, right + 0.5, bottom + 0.5), window)
     return (edges[0] - 0.5, edges[1] - 0.5, edges[2] - 0.5, edges[3] - 0.5)

@@ -22,10 +22,10 @@ from gear.values.errors import GearError, SamplesFailedError
 from gear.values.progress import Callbacks
 
 FRESH_TRIES = 2
-"""How often a sample that failed is tried again, each time in a fresh process."""
+"""Number of further attempts for a sample that failed, each in a new process."""
 
 POLL_S = 0.5
-"""Seconds between two looks at the samples that other runs are making."""
+"""Seconds between two checks of the samples that other runs are making."""
 
 
 def collect_missing(job: Job, store: Store, part: Shard, executor: Executor, callbacks: Callbacks) -> int:

@@ -114,9 +114,8 @@ def parse_text(text: str, name: str) -> Node:
 
 
 def parse_value(text: str, name: str) -> Node:
-    """Parses one value of the command line: `12`, `fog`, `[1, 2]`, `{a: 1}`. There are no comments, and places
-    have no line and
-    column.
+    """Parses one value of the command line: `12`, `fog`, `[1, 2]`, `{a: 1}`. There are no comments, and places have no
+    line and column.
     """
     if "#" in text and text.strip()[0] not in MARKS:
         return Scalar(text.strip(), False, Place(name))

@@ -1,4 +1,4 @@
-"""Legends: what the colours of a task's previews mean."""
+"""Legends, which explain the colours of a task's previews."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Legend = ColourBar | ColourNames
 
 @runtime_checkable
 class WithLegends(Protocol):
-    """A task that says what the colours of its previews mean."""
+    """A task that explains the colours of its previews."""
 
     def legends(self) -> Mapping[str, Legend]:
         """Legends by name of the preview, for those of `Task.preview` whose colours need one."""

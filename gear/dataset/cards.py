@@ -112,13 +112,15 @@ def damaged_cards(root: Path) -> dict[str, Literal["missing", "damaged"]]:
 
 
 def own_cards(root: Path) -> set[str]:
-    """Those of the two files that are there and are not the user's own."""
+    """Paths of the card files in a dataset that gear wrote, as opposed to files of the user with these names."""
     paths = {relative: inside(root, relative) for relative in CARDS}
     return {relative for relative, path in paths.items() if path.is_file() and is_own(relative, read_bytes(path))}
 
 
 def is_own(relative: str, data: bytes) -> bool:
-    """Whether gear wrote a file, perhaps before it was damaged; else it is the user's own. An empty one is damaged."""
+    """Whether gear wrote a card file, even if it was damaged since; False for a file of the user. An empty file counts
+    as damaged.
+    """
     if not data:
         return True
     if relative == CARD:

@@ -20,10 +20,12 @@ from gear.dataset.layout import claim_path, sidecar_path, split_folder
 from gear.dataset.scratch import is_alive, lock_of, unique_name
 
 OLD_S = 900.0
-"""Where neither a lock nor a process number tells, a claim of this age is abandoned: no sample takes as long."""
+"""Age in seconds from which a claim counts as abandoned, if neither a lock nor a process number shows whether its run
+lives; no sample takes as long.
+"""
 
 TRIES = 100
-"""Another run may remove a claim, or the folder of the claims, between two steps."""
+"""Number of attempts, since another run may remove a claim, or the folder of the claims, between two steps."""
 
 OPENING = os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC
 
@@ -50,7 +52,7 @@ class Claims:
             self.release(index)
 
     def take(self, index: int) -> bool:
-        """Claims a sample. False where another run has claimed it.
+        """Claims a sample; returns False if another run has claimed it.
 
         Raises:
             DatasetError: the disk refuses, or there is a link in the claim's path.
@@ -97,7 +99,7 @@ class Claims:
         return os.path.samestat(there, os.fstat(descriptor))
 
     def release(self, index: int) -> None:
-        """Gives a claim up; one that is not held is no error."""
+        """Releases a claim; does nothing if it is not held."""
         descriptor = self._held.pop(index, None)
         if descriptor is not None:
             try:
@@ -106,7 +108,7 @@ class Claims:
                 os.close(descriptor)
 
     def unclaimed(self, indices: Iterable[int], report: Report) -> Iterator[int]:
-        """Claims one sample after another, and yields those that nobody has made or claimed.
+        """Claims one sample after another, and yields those that no other run has made or claimed.
 
         Args:
             indices: of samples.

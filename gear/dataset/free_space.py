@@ -1,4 +1,4 @@
-"""Whether a disk has room for what a job is about to write."""
+"""Checks that a disk has room for the files of a job."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def check_free_space(folder: Path, needed: float, *, what: str, advice: str) -> 
 
 
 def size_text(size: float) -> str:
-    """A size for a person, in powers of 1000: `3.2 GB`."""
+    """A size as text, in powers of 1000: `3.2 GB`."""
     power = 0
     while size >= 999.5 and power < len(UNITS) - 1:
         size, power = size / 1000, power + 1

@@ -1,7 +1,7 @@
 """Joins folders that each hold some samples of the same split, such as shards of several machines, into one folder.
 
-Each sample costs the same, however many there are: its sidecar and files are read once, checked against their hashes,
-and written once. Nothing is kept in memory but which folder has which sample.
+Each sample's sidecar and files are read once, checked against their hashes, and written once. Only the folder of each
+sample is kept in memory.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from gear.values.progress import Progress
 from gear.values.serial import Json
 
 SAMPLES_AT_A_TIME = 256
-"""Samples that are handed to the copying threads at a time."""
+"""Number of samples that are given to the copying threads at a time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""A new folder that appears whole or not at all: it is filled under a hidden name beside its place, and renamed."""
+"""Writes a new folder atomically: it is filled under a hidden name in the same parent folder, and then renamed."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from gear.values.errors import DatasetError
 
 
 def check_target(target: Path, command: str) -> None:
-    """Checks that a new folder can take its place.
+    """Checks that a folder is empty or new and can be replaced by a new one.
 
     Args:
-        target: the place, as an absolute path.
+        target: absolute path of the folder.
         command: the verb in the message, such as `export`.
 
     Raises:
-        DatasetError: something is in the folder, or it is one that cannot be replaced by another.
+        DatasetError: the folder is not empty, is a mount point, or is the current folder.
     """
     with explained(target):
         if target.exists() and any(target.iterdir()):
@@ -31,7 +31,7 @@ def check_target(target: Path, command: str) -> None:
 
 
 def unfinished_place(target: Path, command: str) -> Path:
-    """The hidden folder beside `target` that is filled until it is whole. There is no link in it.
+    """Path of the hidden folder, next to `target`, that is filled first; checked for links.
 
     Raises:
         DatasetError: it is a link, or holds one.

@@ -117,9 +117,8 @@ def read_look(value: Json) -> Look | None:
 
 @cache
 def light_digest() -> str:
-    """sha256 of the light of every preset by day: sun and sky, the ambient occlusion of road users, the
-    reflections of wet
-    ground, and the camera's response to a ramp.
+    """sha256 of the light of every preset by day: sun and sky, the ambient occlusion of road users, the reflections of
+    wet ground, and the camera's response to a ramp.
 
     Shipped weights are not trained on nights, so nights are left out.
     """

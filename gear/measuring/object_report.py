@@ -1,4 +1,4 @@
-"""The report `objects`: what became of the objects, and false alarms on the patch and elsewhere."""
+"""The report `objects`: the outcomes of objects, and false alarms on the patch and elsewhere."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ STATE_METRICS = {f"{state}_share": state for state in STATES}
 
 
 class ObjectEvaluator:
-    """Gathers what became of the objects of each picture."""
+    """Gathers the outcomes of the objects of each picture."""
 
     def __init__(self, task: WithObjects) -> None:
         """Args: task: of the samples."""
@@ -39,7 +39,7 @@ class ObjectEvaluator:
         self.pictures: list[PictureOutcomes] = []
 
     def update(self, sample: Sample, prediction: Any) -> Mapping[str, float]:
-        """Takes one sample in; returns the metrics of `result` for it."""
+        """Adds one sample; returns the metrics of `result` for it."""
         given = self._task.picture_objects(sample, prediction)
         middles_m = [
             _middle_m(surface.camera_from_surface)
@@ -51,7 +51,7 @@ class ObjectEvaluator:
         return _values(_counts(self.pictures[-1]))
 
     def merge(self, other: Any) -> None:
-        """Takes in the pictures of another one."""
+        """Adds the pictures of another evaluator."""
         self.pictures += other.pictures
 
     def result(self) -> Mapping[str, float]:
@@ -70,7 +70,7 @@ class ObjectEvaluator:
         return {name: np.array([row[name] for row in rows]) for name in (*ALARM_METRICS, *STATE_METRICS)}
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """Shares are at most 1."""
+        """0 and 1 for shares; 0 and infinity for false alarms per picture."""
         return 0.0, 1.0 if metric in STATE_METRICS else math.inf
 
 

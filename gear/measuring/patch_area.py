@@ -46,9 +46,8 @@ def widened(masks: Mapping[str, Mask], margin_px: int = MARGIN_PX) -> dict[str, 
 
 
 def mask_metrics(sample: Sample, found: Mapping[str, Any]) -> dict[str, float]:
-    """Agreement of a defense's mask with the true patch area, over all cameras together: the metrics
-    `MASK_METRICS`, NaN where
-    there is nothing to compare.
+    """Agreement of a defense's mask with the true patch area, over all cameras together: the metrics `MASK_METRICS`,
+    NaN where there is nothing to compare.
     """
     truth = patch_masks(sample)
     real = np.concatenate([truth[name].reshape(-1) for name in found])

@@ -1,4 +1,4 @@
-"""What a patch does to the objects of a picture: the picture is compared with its twin, object by object.
+"""The effect of a patch on the objects of a picture: the picture is compared with its twin, object by object.
 
 Twins show the same objects, so that an object is known by its id and class. Of the objects that are found in the twin,
 those that are missed in the picture are `hidden`, and the others that are not found are `misclassified` or `moved`
@@ -23,21 +23,21 @@ Change = Literal["hidden", "misclassified", "moved", "invented"]
 CHANGES: tuple[Change, ...] = get_args(Change)
 
 OF_OBJECTS: dict[ObjectState, Change] = {"missed": "hidden", "misclassified": "misclassified", "moved": "moved"}
-"""What happened to an object that is found in the twin, by its state in the picture."""
+"""The change of an object that is found in the twin, by its state in the picture."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectChange:
-    """One object, or one detection, that differs from the twin; JSON-ready.
+    """An object or a detection that differs between a picture and its twin; JSON-ready.
 
     Attributes:
-        change: what happened.
-        object_id: of the object; None for an invented detection.
-        label: class of the object, or of the invented detection.
-        box_px: of the object, or of the invented detection; edge pixels.
-        detected_as: class of the detection that is about the object; None for a hidden object.
-        score: of that detection, or of the invented one.
-        patch: distance from the patch.
+        change: kind of the change: `hidden`, `misclassified`, `moved` or `invented`.
+        object_id: id of the object; None for an invented detection.
+        label: class of the object or of the invented detection.
+        box_px: box of the object or of the invented detection, in edge pixels.
+        detected_as: class of the detection that explains the change; None for a hidden object.
+        score: score of that detection, or of the invented one.
+        patch: distance of the object or of the invented detection from the patch.
     """
 
     change: Change
@@ -56,7 +56,7 @@ def found_in_twin(now: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectOu
 
 
 def changes(now: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectChange, ...]:
-    """What differs from the twin: objects first, in the order of the ground truth, then detections, surest first."""
+    """The differences from the twin: objects in the order of the ground truth, then detections by decreasing score."""
     lost = [
         ObjectChange(
             change=OF_OBJECTS[thing.state],

@@ -1,9 +1,9 @@
-"""What became of each object of a picture: found, misclassified, moved or missed; and what the detections are.
+"""The outcome of each object of a picture (found, misclassified, moved or missed), and the role of each detection.
 
 Only confident detections count, those with a score of at least 0.5. The errors are those of TIDE (Bolya et al., "TIDE:
 A General Toolbox for Identifying Object Detection Errors", ECCV 2020), with its thresholds of IoU, 0.5 and 0.1. Each
-detection explains at most one object. Detections choose in three rounds, surest first, among the objects that no
-detection has chosen, the one that they overlap most:
+detection explains at most one object. In three rounds, each detection, by decreasing score, chooses the object with the
+largest overlap among those that no detection has chosen yet:
 
 1. an object of their class, at an IoU of at least 0.5: the object is `found`, or, where the detection lies at another
    place in space, `moved`. This is the matching of `found_share` (`gear.metrics.single_picture`);
@@ -41,7 +41,7 @@ LEAST_OVERLAP = 0.1
 
 
 def outcomes(given: PictureObjects, patch: PatchArea) -> PictureOutcomes:
-    """What became of the objects of a picture, and what its confident detections are.
+    """The outcomes of the objects and of the confident detections of a picture.
 
     Args:
         given: objects and detections.

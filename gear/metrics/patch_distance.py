@@ -1,4 +1,4 @@
-"""Where boxes lie relative to the visible pixels of the patches in a picture."""
+"""Distances of boxes from the visible pixels of the patches in a picture."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class PatchArea:
             self._distance_px = np.asarray(cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE))
 
     def distance(self, box_px: BoxPx, position_m: Vec3 | None = None) -> PatchDistance:
-        """Where a box lies.
+        """The distance of a box from the patches.
 
         Args:
             box_px: in edge pixels; may leave the picture. Its pixels are those of the picture with a centre inside the

@@ -1,4 +1,4 @@
-"""What every engine promises: subclass `ExecutorContract` in a test of an engine, and give it the engine."""
+"""The contract of engines, as tests. Subclass `ExecutorContract` in a test of an engine, and set `executor`."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class ExecutorContract:
         raise NotImplementedError
 
     def test_every_item_is_made_once_and_reported_once(self, executor: Executor, tmp_path: Path) -> None:
-        """Whatever the number of workers."""
+        """With any number of workers every item is made once and has one report."""
         reported: list[Outcome] = []
         executor.run(partial(write_items, str(tmp_path), ()), [5, 3, 9, 0, 7], reported.append)
         assert sorted(outcome.index for outcome in reported) == [0, 3, 5, 7, 9]
@@ -54,7 +54,7 @@ class ExecutorContract:
         assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys("03579", "made ")
 
     def test_a_failed_item_keeps_no_other_from_being_made(self, executor: Executor, tmp_path: Path) -> None:
-        """The failure is reported with its error."""
+        """A failure is reported with its error, and all other items are made."""
         reported: dict[int, Outcome] = {}
         work = partial(write_items, str(tmp_path), (2,))
         executor.run(work, [1, 2, 3], lambda outcome: reported.update({outcome.index: outcome}))
@@ -62,10 +62,10 @@ class ExecutorContract:
         assert reported[2].error == "item 2 cannot be made"
 
     def test_an_error_that_is_not_of_one_item_ends_the_run(self, executor: Executor) -> None:
-        """It is raised where the engine was called."""
+        """An error that does not concern a single item is raised by `run`."""
         with pytest.raises(GearError, match="no renderer here"):
             executor.run(cannot_start, [0, 1], lambda outcome: None)
 
     def test_nothing_is_started_without_an_item(self, executor: Executor) -> None:
-        """No worker, no report."""
+        """Without items no worker is started and nothing is reported."""
         executor.run(cannot_start, [], lambda outcome: pytest.fail("there is no item"))

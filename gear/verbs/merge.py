@@ -52,9 +52,9 @@ def merge(
 ) -> MergeReport:
     """Joins folders with shards of the same collection into one dataset, and closes its splits.
 
-    The result is byte for byte the folder that one run would have made. It is written into a hidden folder beside its
-    place, which is renamed when it is whole; after a merge that was killed, the same command takes up what is there.
-    The folders that are read stay as they are.
+    The result has the same bytes as the folder that one run would have made. It is written into a hidden folder next to
+    `out`, which is renamed when it is complete. After a merge that was killed, the same command continues. The folders
+    that are read are not changed.
 
     Args:
         datasets: roots, each with some samples of one or several splits.

@@ -11,6 +11,6 @@ class InThisProcess:
     """One worker, which is the calling process."""
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """As `Executor.run`."""
+        """Makes all items in this process; see `Executor.run`."""
         if indices:
             work(iter(indices), report)

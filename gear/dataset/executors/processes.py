@@ -66,7 +66,8 @@ class Processes:
     backend: str
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """As `Executor.run`. A worker that dies or hangs is replaced; the items that it held are reported as failed.
+        """Makes all items; see `Executor.run`. A worker that dies or hangs is replaced, and its items are reported as
+        failed.
 
         Raises:
             GearError: the first one that a worker reports.

@@ -22,9 +22,8 @@ from gear.verbs.attack.request import VerifyRequest
 
 
 def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[str | Path] = ()) -> None:
-    """Checks that a dataset exists, has probes, no patch and as many surfaces as patches, and shows no scene on
-    which the
-    patches were optimised or validated.
+    """Checks that a dataset exists, has probes, no patch and as many surfaces as patches, and shows no scene on which
+    the patches were optimised or validated.
 
     Raises:
         GearError: one of these does not hold.

@@ -127,7 +127,7 @@ class PairedTest:
     pairs: int
 
     def as_json(self) -> Json:
-        """As JSON; null for NaN."""
+        """The test as JSON, with null for NaN."""
         return {**known_json({"mean": self.mean, "p": self.p}), "pairs": self.pairs}
 
 
