@@ -15,6 +15,7 @@ from gear.plugins.defenses.activations.over_activation import (
     on_grid,
     pooled_sizes,
     refined,
+    telling_layers,
 )
 
 ROWS, COLUMNS = 30, 60
@@ -107,3 +108,15 @@ def test_the_grid_takes_the_nearest_cell() -> None:
 def test_dead_channels_do_not_divide_by_zero() -> None:
     z = ChannelStatistics(mean=torch.zeros(1), deviation=torch.zeros(1)).z_scores(torch.zeros(1, 4, 8))
     assert torch.equal(z, torch.zeros(1, 4, 8))
+
+
+def test_a_layer_that_hides_the_patch_is_left_out() -> None:
+    """In the common map its heat elsewhere drowns the heat of the others."""
+    truth = torch.zeros(4, 8)
+    truth[:2, :4] = 1
+    upper, lower, drowning = 0.01 * torch.rand(3, 4, 8, generator=torch.manual_seed(1))
+    upper[0, :4], lower[1, :4] = 1, 1
+    drowning[0, :], drowning[2:, :4] = 9, 9
+    maps = {"drowning": [drowning], "upper": [upper], "lower": [lower]}
+    assert set(telling_layers(maps, [truth])) == {"upper", "lower"}
+    assert telling_layers({"one": [upper]}, [torch.zeros(4, 8)]) == ()
