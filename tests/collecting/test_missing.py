@@ -16,7 +16,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from tests.verbs.test_collect import command
 
 from gear.collecting import missing as module
 from gear.collecting.missing import collect_missing
@@ -31,6 +30,7 @@ from gear.testing.synthetic import synthetic_frame
 from gear.values.errors import GearError, SamplesFailedError
 from gear.values.progress import Callbacks
 from tests.dataset.splits import fill, plan, tree
+from tests.verbs.collect.test_run import command
 
 
 def job_of(root: Path, samples: int) -> Any:

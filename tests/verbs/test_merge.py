@@ -21,8 +21,8 @@ from gear.cli.main import main
 from gear.collecting.run import CollectReport
 from gear.values.errors import DatasetError, GearError
 from tests.dataset.splits import fill, plan, tree
+from tests.verbs.collect.test_run import command
 from tests.verbs.conftest import Collected
-from tests.verbs.test_collect import command
 
 Collect = Callable[..., CollectReport]
 

@@ -23,6 +23,7 @@ from typing import Any
 
 from gear.contracts.executors import MOST_FAILURES, Executor, Outcome, Report, Work
 from gear.values.errors import BackendError, GearError
+from gear.values.machine import cores
 
 SILENCE_S = 600.0
 """Seconds without a finished item after which a worker is considered hung: graphics drivers do hang, and the slowest
@@ -30,6 +31,10 @@ machines need less than a minute per item."""
 
 INTERRUPTED = 130
 """Exit code of a worker that was interrupted before it had finished its item."""
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "LP_NUM_THREADS")
+"""Environment variables by which torch, NumPy and Mesa's software rasteriser choose their number of threads. Without
+them every worker starts one for each core, and the workers wait for each other."""
 
 AGAIN = "run the same command again: finished samples are kept"
 
@@ -73,9 +78,10 @@ class Processes:
             GearError: the first one that a worker reports.
             BackendError: a worker died or hung before its first item, or was interrupted.
         """
-        pool = _Pool(backend=self.backend, work=work, pending=deque(indices), report=report)
+        count = min(self.workers, len(indices))
+        pool = _Pool(backend=self.backend, work=work, pending=deque(indices), report=report, count=count)
         try:
-            for _ in range(min(self.workers, len(indices))):
+            for _ in range(count):
                 pool.start()
             pool.listen()
         finally:
@@ -100,6 +106,7 @@ class _Pool:
     Attributes:
         backend, work, report: as in `Processes` and `Executor.run`.
         pending: indices that no worker has taken.
+        count: number of workers that run at a time.
         workers: those that run.
         deaths: workers that died since the last item was made.
     """
@@ -108,6 +115,7 @@ class _Pool:
     work: Work
     pending: deque[int]
     report: Report
+    count: int
     workers: list[_Worker] = field(default_factory=list)
     deaths: int = 0
 
@@ -117,7 +125,8 @@ class _Pool:
         ours, theirs = context.Pipe()
         name = f"gear-{len(self.workers)}"
         process = context.Process(target=_work, args=(self.work, theirs), daemon=True, name=name)
-        with _no_interrupts():  # the worker inherits the mask, so that Ctrl-C does not stop it amid its imports
+        # The worker inherits the mask, so that Ctrl-C does not stop it amid its imports.
+        with _no_interrupts(), _threads_shared(self.count):
             process.start()
             theirs.close()  # so that the pipe ends with the worker
             self.workers.append(_Worker(process=process, pipe=ours))
@@ -192,6 +201,19 @@ class _Pool:
         for worker in self.workers:
             worker.process.join(timeout=10)
             worker.pipe.close()
+
+
+@contextlib.contextmanager
+def _threads_shared(workers: int) -> Iterator[None]:
+    """Gives each worker that is started its share of the cores, unless the user has set a number of threads."""
+    share = str(max(1, cores() // workers))
+    pinned = {name: share for name in THREADS if workers > 1 and name not in os.environ}
+    os.environ.update(pinned)
+    try:
+        yield
+    finally:
+        for name in pinned:
+            os.environ.pop(name, None)
 
 
 @contextlib.contextmanager

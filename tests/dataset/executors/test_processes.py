@@ -34,6 +34,26 @@ def die_at(deadly: tuple[int, ...], number: int, indices: Iterator[int], report:
         report(Outcome(index=index))
 
 
+def tell_threads(folder: str, indices: Iterator[int], report: Report) -> None:
+    for index in indices:
+        (Path(folder) / str(index)).write_text(",".join(os.environ.get(name, "") for name in workers.THREADS))
+        report(Outcome(index=index))
+
+
+@pytest.mark.parametrize(("count", "said"), [(2, "4,9,4,4"), (1, ",9,,")])
+def test_workers_share_the_cores_unless_the_user_has_set_threads(
+    count: int, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in workers.THREADS:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv(workers.THREADS[1], "9")
+    monkeypatch.setattr(workers, "cores", lambda: 8)
+    before = dict(os.environ)
+    ran(partial(tell_threads, str(tmp_path)), 2, count)
+    assert {path.read_text() for path in tmp_path.iterdir()} == {said}
+    assert dict(os.environ) == before
+
+
 def hang_at(where: int, indices: Iterator[int], report: Report) -> None:
     for index in indices:
         if index == where:
