@@ -78,7 +78,7 @@ def test_a_worker_apart_gives_the_same_bytes(
     tmp_path: Path, collect_small: Collect, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     collect_small("depth", tmp_path / "a")
-    monkeypatch.setattr("gear.collecting.run.open_session", lambda job: pytest.fail("rendered in this process"))
+    monkeypatch.setattr("gear.collecting.missing.open_session", lambda job: pytest.fail("rendered in this process"))
     collect_small("depth", tmp_path / "b", in_subprocess=True)
     assert tree(tmp_path / "a") == tree(tmp_path / "b")
 
