@@ -45,7 +45,7 @@ nitpick_ignore_regex = [
     ("py:.*", r"(np|npt|numpy|torch|nn|mujoco)\..*"),
     ("py:.*", r"(pathlib|collections|typing|argparse|dataclasses|importlib|pluggy|pytest|abc)\..*"),
     ("py:.*", r"(Tensor|Path|Any|Self|Literal|Iterator|Iterable|Sequence|Mapping|Callable|Generator)"),
-    ("py:.*", r"(Mapping\[int|Vec3|UInt8Image|Prepared|BaseCompositor|Cache)"),
+    ("py:.*", r"(Mapping\[int|Vec3|UInt8Image|Bools|Prepared|BaseCompositor|Cache)"),
     ("py:.*", r".*(_co|_contra|T)$"),
     ("py:.*", r"gear\.(?!contracts|values|testing|readers\.\w+$).*"),
 ]

@@ -27,6 +27,8 @@ FULL_SCALE_LUX = 38400.0
 NO_OWN_RGBA = (0.5, 0.5, 0.5, 1.0)
 """MuJoCo's default colour; a geom with it has the colour of its material."""
 
+Bools = npt.NDArray[np.bool_]
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Stage:
@@ -45,7 +47,7 @@ class Stage:
     data: mujoco.MjData
     paint_rgb: Mapping[int, Vec3] = field(default_factory=dict)
     faces: Mapping[int, UInt8Image] = field(default_factory=dict)
-    is_absent: npt.NDArray[np.bool_] | None = None
+    is_absent: Bools | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +85,7 @@ class RawView:
     geom_id: IdImage
 
 
-def has_own_colour(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
+def has_own_colour(model: mujoco.MjModel) -> Bools:
     """(ngeom,) bool: whether a geom's own rgba colours it in MuJoCo, and not that of its material."""
     is_said = (model.geom_rgba != np.array(NO_OWN_RGBA, np.float32)).any(axis=1)
     return np.asarray(is_said | (model.geom_matid < 0), np.bool_)
