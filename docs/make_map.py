@@ -46,7 +46,7 @@ ROOMS: dict[str, tuple[float, str, str]] = {
     "networks": (0.2, "graphs, losses", "network graphs, losses, weights, by task"),
     "groundtruth": (0.35, "labels, boxes", "measures labels, boxes and visibility in a frame"),
     "metrics": (0.16, "scores", "the benchmarks' own metrics"),
-    "formats": (0.42, "file formats", "reads and writes Cityscapes, COCO, KITTI, PNG, probes"),
+    "formats": (0.42, "file formats", "reads and writes Cityscapes, COCO, KITTI, PNG"),
     "world": (0.91, "towns, traffic", "towns, roads, traffic, weather and surfaces as MuJoCo models"),
     "render": (0.68, "renderers", "`raster`, `filament` and `classic` behind one protocol"),
     "dataset": (
@@ -61,7 +61,7 @@ ROOMS: dict[str, tuple[float, str, str]] = {
     "reporting": (
         0.8,
         "progress, legends",
-        "progress bars and plain lines, legends of colours",
+        "progress bars and plain lines, drawing of legends",
     ),
 }
 """Every room: its place from left (0) to right (1), two words for the picture, a line for the table."""

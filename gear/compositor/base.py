@@ -1,4 +1,4 @@
-"""The base class of compositors: they replace the pixels of stored pictures that show a patch."""
+"""The base class of compositors: in stored pictures, they replace the pixels of a surface by a patch."""
 
 from __future__ import annotations
 

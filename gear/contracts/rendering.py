@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 Quality = Literal["film", "fast"]
 """`film`: 2x2 supersampling, averaged in linear light; `raster` takes one sample where four show the same.
 
-`fast`: one sample per pixel with gear's own edge filter.
+`fast`: one sample per pixel with gear's own edge filter. `gear.render.raster.renderer`, `gear.render.filament` and
+`gear.render.classic` implement both.
 """
 
 FULL_SCALE_LUX = 38400.0

@@ -86,8 +86,8 @@ def middle_in_camera(box_px: BoxPx, distance_m: float, pinhole: Intrinsics) -> V
 def box_in_camera(thing: SceneObject, camera: CameraRecord) -> Box3d:
     """The tight box of an object in the camera's frame.
 
-    The heading is the object's front projected on the camera's x-z plane. It is exact for level cameras and upright
-    objects, and an approximation for others, because the format has a single angle.
+    The heading is the object's front projected on the camera's x-z plane. It is exact for level
+    cameras and upright objects. Otherwise it is an approximation: KITTI has a single angle, about the camera's y axis.
     """
     camera_from_object = camera.world_from_camera_transform.inverse().matrix @ thing.world_from_object.matrix
     centre, (length_m, width_m, height_m) = thing.shape.box_centre_m, (float(v) for v in thing.shape.box_size_m)

@@ -168,8 +168,9 @@ def auroc_interval(
 
 
 def clustered(differences: Values, clusters: Sequence[Hashable]) -> Values:
-    """(C, F) sums over the clusters of (N, F) differences, for `paired_p`: the signs of one cluster flip together.
+    """Sums of differences within each cluster: (N, F), N samples and F metrics, to (C, F).
 
+    `paired_p` flips the sign of a whole cluster, because the samples of a cluster are not independent.
     NaN if all differences of a cluster are NaN. Sums that differ from 0 only by rounding are 0.
     """
     owners = numbered(clusters)

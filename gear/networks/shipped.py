@@ -34,7 +34,7 @@ class WeightsFile:
     training pictures) and `measured_look_hash` (the same for the pictures on which the metrics were measured, if it
     differs). These are stored as JSON: `data` (training data), `metrics` (values by name), `intervals` (their 95 %
     bounds), `options` (of the model, such as `input_scale`), `look` (`gear.measuring.appearance_hash.Look`) and
-    `averaged` (hashes of the two averaged states).
+    `averaged` (hashes of the two weights files that were averaged). `look` is an older name of the appearance.
 
     Attributes:
         path: path of the file.

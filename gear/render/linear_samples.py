@@ -32,8 +32,9 @@ def four_times(samples: UInt8Image) -> UInt16Image:
 
 
 def smooth_edges(linear_rgb: UInt16Image, geom_id: IdImage, depth_m: FloatImage) -> UInt16Image:
-    """The edge filter of quality `fast`: a 3 x 3 tent filter (1 2 1) where ids change or depth bends; other pixels are
-    unchanged.
+    """The edge filter of quality `fast`: a 3 x 3 Gaussian (sigma 0.8 pixels) where ids change or depth bends.
+
+    Other pixels are unchanged.
 
     Edges are found by ids and depth alone and the filter is linear, so frames stay linear in every albedo. A patch
     cannot influence it, unlike a filter that detects contrast.

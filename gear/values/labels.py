@@ -2,6 +2,8 @@
 
 `docs/reference/mjcf.md` is this table in words. A kind of vehicle is one row of it, a `VehicleKind`: whatever differs
 between kinds of vehicles is read from that row.
+
+The colours of the classes are Cityscapes' own, in `gear/formats/cityscapes.py`.
 """
 
 from __future__ import annotations

@@ -149,7 +149,7 @@ class Weather:
 
     @property
     def exposure_cover(self) -> float:
-        """Share of clouds that the camera's exposure is set for, 0..1: as `cloud_cover`, but one value for all rain."""
+        """Share of clouds that the camera's exposure is set for, 0..1; at least `RAIN_EXPOSURE_COVER` in any rain."""
         return max(self.cloudiness, 100 * RAIN_EXPOSURE_COVER if self.precipitation > 0 else 0.0) / 100
 
 

@@ -1,12 +1,15 @@
-"""Cores that a process may use."""
+"""Cores and memory that a process may use."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
-from gear.values.machine import cores
+from gear.values import machine
+from gear.values.machine import cores, free_memory_bytes
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system has no CPU affinity")
@@ -18,3 +21,60 @@ def test_cores_follow_the_affinity_of_the_process() -> None:
     finally:
         os.sched_setaffinity(0, before)
     assert cores() == len(before)
+
+
+@pytest.fixture
+def grouped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, dict[str, str]], None]:
+    """Puts this process into control groups: the lines of `/proc/self/cgroup`, and files below `/sys/fs/cgroup`."""
+
+    def put(lines: str, files: dict[str, str]) -> None:
+        for name, text in files.items():
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / name).write_text(text)
+        read = machine._lines
+
+        def lines_of(path: Path) -> list[str]:
+            return lines.splitlines() if path == Path("/proc/self/cgroup") else read(path)
+
+        monkeypatch.setattr(machine, "_CONTROL_GROUPS", tmp_path)
+        monkeypatch.setattr(machine, "_lines", lines_of)
+        monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(16)), raising=False)
+
+    return put
+
+
+def test_cores_follow_the_quota_of_the_container(grouped: Callable[[str, dict[str, str]], None]) -> None:
+    grouped("0::/a/b\n", {"a/b/cpu.max": "150000 100000\n", "a/cpu.max": "max 100000\n"})
+    assert cores() == 2
+
+
+def test_the_tightest_group_counts(grouped: Callable[[str, dict[str, str]], None]) -> None:
+    grouped("0::/a/b\n", {"a/b/cpu.max": "max 100000\n", "a/cpu.max": "300000 100000\n"})
+    assert cores() == 3
+
+
+def test_version_1_of_control_groups(grouped: Callable[[str, dict[str, str]], None]) -> None:
+    grouped(
+        "4:memory:/job\n3:cpu,cpuacct:/job\n",
+        {
+            "cpu/job/cpu.cfs_quota_us": "400000",
+            "cpu/job/cpu.cfs_period_us": "100000",
+            "memory/job/memory.limit_in_bytes": "3000000",
+            "memory/job/memory.usage_in_bytes": "1000000",
+        },
+    )
+    assert cores() == 4
+    assert free_memory_bytes() == 2_000_000
+
+
+def test_free_memory_is_what_the_container_has_left(grouped: Callable[[str, dict[str, str]], None]) -> None:
+    stat = "anon 600000\ninactive_file 250000\n"
+    grouped("0::/x\n", {"memory.max": "1000000", "memory.current": "900000", "memory.stat": stat})
+    assert free_memory_bytes() == 350_000
+
+
+def test_without_limits_all_that_is_available_is_free(grouped: Callable[[str, dict[str, str]], None]) -> None:
+    grouped("0::/x\n", {"x/memory.max": "max", "x/memory.current": "5", "x/cpu.max": "max 100000"})
+    assert cores() == 16
+    free = free_memory_bytes()
+    assert free is None or free > 50_000_000

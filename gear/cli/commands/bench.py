@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from gear.cli.commands.collect import positive
+from gear.cli.commands.collect import workers
 
 if TYPE_CHECKING:
     from gear.verbs.bench.plan import Step
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--device", choices=("auto", "cpu", "cuda"), help="device of the networks (the one in the config)"
     )
     parser.add_argument(
-        "--workers", type=positive, default=1, metavar="N", help="number of processes of each collection (1)"
+        "--workers", type=workers, default=1, metavar="N", help="processes of each collection, a number or auto (1)"
     )
     parser.add_argument("--list", action="store_true", help="only print the commands of the benchmark")
     parser.add_argument("--json", action="store_true", help="print bench.json, or the steps, in place of the tables")

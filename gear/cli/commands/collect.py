@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gear.collecting.workers import Workers
 
 EXAMPLE = """examples:
   gear collect --task stereo3d
@@ -20,6 +24,11 @@ def positive(text: str) -> int:
     if number < 1:
         raise argparse.ArgumentTypeError("must be at least 1")
     return number
+
+
+def workers(text: str) -> Workers:
+    """Parses a number of workers, or `auto`, for argparse."""
+    return "auto" if text == "auto" else positive(text)
 
 
 def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,10 +67,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--address", help="of the engine's cluster: a Ray cluster, or a SLURM partition")
     parser.add_argument(
         "--workers",
-        type=positive,
+        type=workers,
         default=1,
         metavar="N",
-        help="number of processes; it does not change the result (1)",
+        help="number of processes, or auto: as many as cores and memory allow; it does not change the result (1)",
     )
     parser.add_argument(
         "--shard",

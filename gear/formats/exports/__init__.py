@@ -1,1 +1,1 @@
-"""Layouts that `gear export` writes: each module here, but `layout` and `registry`, is one, with its `LAYOUT`."""
+"""The layouts of `gear export`. Each module defines one, as `LAYOUT`; `layout` and `registry` are shared code."""

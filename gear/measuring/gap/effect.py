@@ -1,4 +1,4 @@
-"""The effect of patches on a model, composed and rendered: one evaluator for each way of showing them."""
+"""How much a patch harms a model, measured on composed and on rendered pictures, each with its own evaluator."""
 
 from __future__ import annotations
 

@@ -54,7 +54,8 @@ def silog(
 def adabins_silog(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
     """AdaBins' pixel loss: 10 * sqrt(variance + 0.15 * mean^2) of the differences between logarithms of depth.
 
-    Arguments are those of `silog`: (B, H, W) depths in metres, NaN where the truth is unknown.
+    Depths are (B, H, W) metres, NaN where the truth is unknown. `cap_m` is the greatest true depth that
+    counts; None for no limit.
     """
     return silog(predicted_m, depth_m, balance=0.85, scale=10.0, cap_m=cap_m)
 
@@ -62,7 +63,8 @@ def adabins_silog(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None =
 def log_l1(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
     """Mean absolute difference between the logarithms of depth, a relative error that is robust to outliers.
 
-    Arguments are those of `silog`: (B, H, W) depths in metres, NaN where the truth is unknown.
+    Depths are (B, H, W) metres, NaN where the truth is unknown. `cap_m` is the greatest true depth that
+    counts; None for no limit.
     """
     mask = known(depth_m, cap_m)
     return _log_errors(predicted_m, depth_m, mask).abs().sum() / mask.sum().clamp_min(1)

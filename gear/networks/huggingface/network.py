@@ -66,7 +66,7 @@ class FolderNetwork(Network):
         """Runs the graph.
 
         Args:
-            seen: input, from `seen`.
+            seen: (B, 3, h, w) pictures after the image processor, as the method `seen` returns them.
             **labels: labels, for graphs that compute their own losses.
 
         Raises:

@@ -171,7 +171,7 @@ class CentreGraph(nn.Module, ABC):
 
     @abstractmethod
     def left_layers(self) -> Mapping[str, nn.Module]:
-        """The layers of the trunk that only the left picture (with the volume) passes, by key name."""
+        """Layers of the trunk behind the cost volume, which only the left picture's features pass, by key name."""
 
     @abstractmethod
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:

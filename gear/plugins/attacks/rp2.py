@@ -1,7 +1,7 @@
 """Robust physical perturbations (RP2; Eykholt et al., CVPR 2018) on a billboard: all terms are added to one loss.
 
 A perturbation of a base colour is kept small in the 2-norm and printable, while the mean loss over varied pictures is
-optimised: towards a target class for segmentation, away from the ground truth otherwise.
+optimised: towards `target` if one is given (segmentation only), away from the ground truth otherwise.
 """
 
 from __future__ import annotations

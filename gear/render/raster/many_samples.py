@@ -1,4 +1,4 @@
-"""Which pixels of `film` get four samples: one sample shows all others as well.
+"""Which pixels of `film` get four samples: for all other pixels one sample is enough.
 
     needs samples = edge of ids or depth, or a face, or contrast of the picture with one sample per pixel
 
@@ -39,12 +39,12 @@ _DISPLAYED = Response(exposure=4.5, contrast=1.43).apply(
 
 
 def at_edges_and_faces(geom_id: IdImage, depth_m: FloatImage, faces: Iterable[int]) -> Mask:
-    """(H, W) bool, pixels that get four samples whatever colours they have.
+    """(H, W) bool, pixels that get four samples for their geometry alone: edges, and faces with the pixels beside them.
 
     Args:
         geom_id: (H, W) int32, -1 where nothing is.
         depth_m: (H, W) float32, NaN where nothing is.
-        faces: geom ids of faces.
+        faces: ids of the geoms that can show a patch.
     """
     needed = edge_mask(geom_id, depth_m)
     for face in faces:

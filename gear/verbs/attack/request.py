@@ -1,4 +1,4 @@
-"""The requests of an attack and of its rendered check."""
+"""The arguments of `gear.attack`, and of the check that renders a finished patch (`VerifyRequest`)."""
 
 from __future__ import annotations
 

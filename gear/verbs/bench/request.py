@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from gear.collecting.workers import Workers
 from gear.values.errors import GearError
 
 
@@ -20,9 +21,9 @@ class BenchRequest:
     out: str | Path
     settings: tuple[str, ...] = ()
     device: str | None = None
-    workers: int = 1
+    workers: Workers = 1
     in_subprocess: bool = False
 
     def __post_init__(self) -> None:
-        if self.workers < 1:
+        if self.workers != "auto" and self.workers < 1:
             raise GearError(f"workers must be at least 1, got {self.workers}")

@@ -10,6 +10,7 @@ from typing import Any
 
 from gear.collecting.job import versions
 from gear.collecting.lookup import find_weather
+from gear.collecting.workers import Workers, fitting_workers
 from gear.config.dump import to_plain, to_yaml
 from gear.config.load import find_config, load_collection
 from gear.config.nodes import Node, parse_file
@@ -54,7 +55,7 @@ def bench(
     out: str | Path,
     settings: Iterable[str] = (),
     device: str | None = None,
-    workers: int = 1,
+    workers: Workers = 1,
     in_subprocess: bool = False,
     progress: bool = False,
     on_step: OnStep | None = None,
@@ -74,7 +75,7 @@ def bench(
         out: folder of all results.
         settings: `KEY=VALUE` texts for any key of the config.
         device: device of the networks; overrides the config.
-        workers: number of processes of each collection; the results do not depend on it.
+        workers: number of processes of each collection, or `auto`; the results do not depend on it.
         in_subprocess: whether a single worker runs in a process of its own. Each collection in the calling process
             keeps about 20 MB, so True is better for large benches; a script then needs `if __name__ == "__main__":`.
         progress: shows a progress bar.
@@ -190,7 +191,7 @@ def prepared(request: BenchRequest) -> Plan:
         contests=tuple(contests(read, node, attack=attacker, surfaces=surfaces, device=request.device)),
         attack=attacker.spec,
         root=root,
-        workers=request.workers,
+        workers=fitting_workers(request.workers),
     )
     _check_pictures(plan, node)
     return plan

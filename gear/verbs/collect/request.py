@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from gear.collecting.workers import Workers
 from gear.config.collection import CollectionConfig
 from gear.config.load import load_collection
 from gear.dataset.executors.engines import DEFAULT
@@ -17,7 +18,8 @@ class CollectRequest:
     """The arguments of `gear.collect`, which documents them.
 
     Raises:
-        GearError: the number of workers is not at least 1, or the shard is not `I/N`.
+        GearError: the number of workers is below 1, or is `auto` for an engine of other machines; or the shard is not
+            `I/N`.
     """
 
     task: str | None = None
@@ -36,14 +38,16 @@ class CollectRequest:
     settings: tuple[str, ...] = ()
     engine: str = DEFAULT
     address: str | None = None
-    workers: int = 1
+    workers: Workers = 1
     shard: str | None = None
     in_subprocess: bool = False
     force: bool = False
 
     def __post_init__(self) -> None:
-        if self.workers < 1:
+        if self.workers != "auto" and self.workers < 1:
             raise GearError(f"workers must be at least 1, got {self.workers}")
+        if self.workers == "auto" and self.engine != DEFAULT:
+            raise GearError(f"--workers auto counts this machine's cores; give --engine {self.engine} a number")
         self.chosen_shard()
 
     def chosen_shard(self) -> Shard | None:

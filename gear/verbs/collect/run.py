@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gear.collecting.job import resolve
 from gear.collecting.run import CollectReport, executor_of, run_job
+from gear.collecting.workers import Workers, fitting_workers
 from gear.dataset.executors.engines import DEFAULT
 from gear.reporting.display import displayed
 from gear.values.progress import Callbacks, Progress, Warn
@@ -31,7 +32,7 @@ def collect(
     settings: Iterable[str] = (),
     engine: str = DEFAULT,
     address: str | None = None,
-    workers: int = 1,
+    workers: Workers = 1,
     shard: str | None = None,
     in_subprocess: bool = False,
     force: bool = False,
@@ -50,7 +51,8 @@ def collect(
         settings: further `KEY=VALUE` texts for any key of the config.
         engine: name of the engine that makes the samples; `processes` uses processes on this machine.
         address: of the engine's cluster: a Ray cluster, or a partition of SLURM.
-        workers: number of workers of the engine; the result does not depend on it.
+        workers: number of workers of the engine, or `auto`: as many as cores and memory of this machine allow. The
+            result does not depend on it.
         shard: `I/N`, to collect the I-th of N parts of the split. Sequences stay whole. Shards may be collected in any
             order, at any time and on any machine. A run without a shard makes what is missing and closes the split;
             `gear.merge` joins shards of separate folders.
@@ -102,7 +104,7 @@ def run_collect(request: CollectRequest, callbacks: Callbacks) -> CollectReport:
         callbacks.on_warning(note)
     executor = executor_of(
         job,
-        request.workers,
+        fitting_workers(request.workers),
         engine=request.engine,
         address=request.address,
         in_subprocess=request.in_subprocess,

@@ -285,7 +285,8 @@ class EvaluateReport:
         out: folder of results.json, table.txt and the predictions.
         facts: model, defense, task, seed, versions, and notes for the reader of the metrics; JSON.
         rows: results of the datasets, in the order given.
-        together: datasets that differ in more than their patch, counted as one by the patch's label.
+        together: one entry per label of a patch (`none`, `random`, ...), with the metrics over all datasets of that
+            label; for datasets that are not twins, such as those of several scenes.
         differences: differences between twins.
         pools: datasets counted as one at the user's request.
     """

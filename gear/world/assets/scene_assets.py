@@ -1,4 +1,4 @@
-"""Reads the facts of all assets that one scene needs, before its world is planned."""
+"""Reads what the MJCF files of one scene's assets declare (size, kind, colours), before its world is composed."""
 
 from __future__ import annotations
 

@@ -125,7 +125,9 @@ class SplitAsset:
 
 
 def split_asset(file: AssetFile) -> SplitAsset:
-    """Separates the default classes of an asset from the rest of its MJCF, which is scaled to the size of its face.
+    """Separates the default classes of an asset from the rest of its MJCF.
+
+    An asset that has the size of its face in metres (`face_size_m`) is scaled to it first.
 
     A file is not split if it includes other files, or if its default classes refer to other elements (such as a
     material) or apply to elements other than geoms and meshes.

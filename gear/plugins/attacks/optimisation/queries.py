@@ -41,14 +41,14 @@ class Oracle:
         self._seen: set[int] = set()
 
     def state(self) -> State:
-        """The number of used queries, for a checkpoint."""
+        """The remaining queries, and the samples whose clean output is already paid for, for a checkpoint."""
         return {"left": np.array(self.left), "paid": np.array(sorted(self._seen), np.int64)}
 
     def restore(self, state: State) -> None:
-        """Restores the number of used queries from a checkpoint.
+        """Restores what `state` returned.
 
         Raises:
-            GearError: the saved state does not contain that number.
+            GearError: the saved state does not contain it.
         """
         check_saved(state, {"left": np.array(0), "paid": np.zeros(np.size(state.get("paid", ())), np.int64)})
         self.left, self._seen = int(state["left"]), {int(index) for index in state["paid"]}
