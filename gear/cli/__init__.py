@@ -1,3 +1,3 @@
-"""The command line `gear`: one small file for each command, which parses arguments, calls the library and prints
-results.
+"""The command line `gear`: each command has one small module, which parses arguments, calls the library and prints
+the result.
 """

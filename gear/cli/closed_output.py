@@ -1,4 +1,4 @@
-"""Handles standard output that cannot be written: a closed pipe, or a full disk."""
+"""Handles a standard output that cannot be written because the pipe is closed or the disk is full."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import sys
 
 
 def discard_output() -> None:
-    """Discards the rest of stdout's buffer. Otherwise the interpreter would try to write it again at its exit."""
+    """Discards the text that is still in the buffer of stdout, because the interpreter would try to write it again
+    at exit and fail.
+    """
     try:
         sys.stdout.flush()
     except OSError:

@@ -1,4 +1,4 @@
-"""The flag `--device` of the commands that run networks."""
+"""The flag `--device`, which all commands that run networks share."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import Any
 
 
 def add_device(parser: argparse.ArgumentParser, settings: str) -> None:
-    """Adds the flag `--device`; its value is stored as a model setting in the argument that `settings` names."""
+    """Adds the flag `--device` to a parser. Its value is appended as `device=VALUE` to the argument that
+    `settings` names, the list of model options.
+    """
     parser.add_argument(
         "--device",
         choices=("auto", "cpu", "cuda"),

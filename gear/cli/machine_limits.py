@@ -1,4 +1,4 @@
-"""Error messages for limits of the machine: memory, open files, processes."""
+"""Error messages for exhausted limits of the machine: memory, open files and processes."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ SAID = {
     "out of memory": MEMORY,
     "can't start new thread": THREADS,
 }
-"""What gear prints for a limit of the machine, by the text that a C or C++ library uses in its error."""
+"""Messages that gear prints for an exhausted limit, by the text of the library's error."""
 
 
 def limit_reached(error: BaseException) -> str | None:
-    """One line on the limit that an error or its cause reports; None if neither reports a limit."""
+    """Returns a one-line message about the exhausted limit that an error, or the cause of the error, reports; None
+    if no limit is the reason.
+    """
     for one in _chain(error):
         if isinstance(one, OSError) and one.errno in LINES:
             return LINES[one.errno]

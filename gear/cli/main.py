@@ -56,22 +56,22 @@ CIRCUMSTANCES = {
     errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO,
     errno.ESTALE,
 }  # fmt: skip
-"""Types of errors of disks and permissions. They are printed as one line without traceback, wherever they are
-raised.
+"""Error numbers of disks and permissions. An `OSError` with such a number and a file name is printed as one line,
+without a traceback.
 """
 
 FULL = {errno.ENOSPC, errno.EDQUOT}
 
 NO_TEMPORARY = "No usable temporary directory"
-"""Start of Python's message if no folder for temporary files can be used; the message names no file."""
+"""Beginning of Python's error message when no folder for temporary files is usable; this error has no file name."""
 
 
 class Terminated(KeyboardInterrupt):
-    """Raised when the process shall end (SIGTERM), for example by a batch system; handled like Ctrl-C."""
+    """Raised when the process receives SIGTERM, for example from a batch system; it is handled like Ctrl-C."""
 
 
 def entry() -> None:
-    """Entry point of the console script: runs the command in `sys.argv` and exits with its exit code."""
+    """Runs the command in `sys.argv` and exits with its exit code; the entry point of the console script `gear`."""
     signal.signal(signal.SIGTERM, _terminate)
     sys.exit(main(sys.argv[1:]))
 
@@ -83,8 +83,9 @@ def main(argv: Sequence[str]) -> int:
         argv: words of the command line, without the program's name.
 
     Returns:
-        The exit code: 0 on success; 2 for an error that the user can put right (one line on stderr); 130 after Ctrl-C;
-        143 after SIGTERM. `verify` and `view` return 1 if files or samples are faulty. Bugs keep their traceback.
+        0 on success; 2 for an error that the user can correct, printed as one line on stderr; 130 after Ctrl-C; 143
+        after SIGTERM. `verify` and `view` return 1 if files or samples are faulty. Errors in gear's own code are not
+        caught and print their traceback.
     """
     prepare_streams()
     try:
@@ -126,10 +127,11 @@ def main(argv: Sequence[str]) -> int:
 
 
 def full_parser(wanted: str | None = None) -> Parser:
-    """Makes the parser of the command line.
+    """Returns the parser of the whole command line.
 
     Args:
-        wanted: the only command whose flags are added, so that only its module is imported; None for all commands.
+        wanted: name of the only command whose module is imported and whose flags are added; None adds the flags of all
+            commands.
     """
     parser = Parser(
         prog="gear",
@@ -176,8 +178,9 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 def _interrupt_behind(error: BaseException | None) -> KeyboardInterrupt | None:
-    """The KeyboardInterrupt that caused an error, because a compiled module that is interrupted during import raises an
-    ImportError; None if there is none.
+    """Returns the KeyboardInterrupt that caused an error; None if no interrupt caused it.
+
+    A compiled module that is interrupted during its import raises an ImportError instead of the KeyboardInterrupt.
     """
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__

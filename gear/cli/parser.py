@@ -1,4 +1,4 @@
-"""The parser of the command line: a mistyped flag gives one line that suggests the closest known flag."""
+"""The parser of the command line: an unknown flag gives a one-line error that suggests the closest known flag."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {one_line(message)}; {self.prog} --help says more\n")
 
     def command(self, name: str) -> Parser:
-        """The parser of one command."""
+        """Returns the subparser of the command with this name."""
         chosen = next(action for action in self._actions if isinstance(action, argparse._SubParsersAction))
         parser = chosen.choices[name]
         assert isinstance(parser, Parser)
         return parser
 
     def refuse(self, unknown: Sequence[str]) -> NoReturn:
-        """Prints one line about words that no argument accepts, and exits with code 2."""
+        """Prints one line about command-line words that no argument accepts, suggests the closest flag, and exits
+        with code 2.
+        """
         flag = next((word.partition("=")[0] for word in unknown if word.startswith("-")), None)
         if flag is None:
             self.error(f"does not know what to do with {' '.join(unknown)!r}")

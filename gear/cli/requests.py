@@ -1,4 +1,6 @@
-"""Makes requests of the verbs from parsed flags: each field takes the value of the flag with its name."""
+"""Builds the request dataclasses of the library from parsed flags: each field takes the value of the flag with the
+same name.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ RequestT = TypeVar("RequestT")
 
 
 def request_of(kind: type[RequestT], args: argparse.Namespace, **given: Any) -> RequestT:
-    """Makes a request from flags. Lists become tuples; a flag that was not given leaves the field's default.
+    """Builds a request, the dataclass with the arguments of one library function, from parsed flags.
+
+    Lists become tuples. A flag that the user did not give leaves the default of the field.
 
     Args:
         kind: dataclass of the request.
@@ -34,7 +38,8 @@ def request_of(kind: type[RequestT], args: argparse.Namespace, **given: Any) -> 
 
 
 def guard_of(args: argparse.Namespace) -> Guard | None:
-    """The defense that `--defense`, `--defense-set` and the calibration flags describe; None without `--defense`.
+    """Returns the defense that guards the model, from `--defense`, `--defense-set` and the calibration flags; None
+    without `--defense`.
 
     Raises:
         GearError: options or calibration data are given without a defense.

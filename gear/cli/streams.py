@@ -1,4 +1,4 @@
-"""The encoding of the terminal's streams, and the width of their lines."""
+"""Settings of the output streams: how unsupported characters are written, and how wide a line may be."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gear.measuring.text_table import WIDTH
 
 
 def prepare_streams() -> None:
-    r"""Makes stdout and stderr accept every character; those that the encoding lacks are written as `\xe4` or `\u2026`.
+    r"""Makes stdout and stderr accept every character; unsupported ones become `\xe4` or `\u2026`.
 
     Otherwise a terminal in ASCII or Latin-1 would end a command with a UnicodeEncodeError after its work is finished.
     """
@@ -20,7 +20,7 @@ def prepare_streams() -> None:
 
 
 def line_width() -> int:
-    """Largest width of a line in characters: that of the terminal (or `COLUMNS`), or 100 if the output is not a
-    terminal.
+    """Returns the largest line width in characters: at least 60, the width of the terminal (or `COLUMNS`), or 100
+    if the output is not a terminal.
     """
     return max(shutil.get_terminal_size((WIDTH, 24)).columns, 60)

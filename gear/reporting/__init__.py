@@ -1,1 +1,1 @@
-"""Progress of the verbs: bars in terminals and notebooks, plain lines elsewhere."""
+"""Progress of long calls: bars in terminals and notebooks, plain lines in log files."""

@@ -1,7 +1,8 @@
-"""The progress display of a verb: bars in terminals and notebooks, plain lines in logs.
+"""The progress display of a verb, one of gear's main functions such as `collect`: bars in terminals and notebooks,
+plain lines in logs.
 
-Bars are drawn by tqdm. Without a terminal a thread writes one line every `EVERY_S` seconds, even during a longer step,
-so that a log always shows the state and the remaining time of the job.
+Bars are drawn by tqdm. Without a terminal, a thread writes one line every `EVERY_S` seconds, even during a long step. A
+log therefore always contains the current state and the remaining time.
 """
 
 from __future__ import annotations
@@ -18,16 +19,14 @@ from gear.reporting.pace import Pace, duration_text
 from gear.values.progress import Callbacks
 
 EVERY_S = 30.0
-"""Seconds between two plain lines: half a minute, so that there is a line every minute even if the thread has to wait
-for the interpreter.
-"""
+"""Seconds between two plain lines: half a minute, so a log has a line every minute even if the thread is delayed."""
 
 FIT_UNIT = "picture"
-"""Unit of the progress of a calibration."""
+"""Unit that the progress of a defense's calibration counts."""
 
 
 class _Backend(Protocol):
-    """The protocol of both kinds of display: bars and lines."""
+    """The interface that the two displays, tqdm bars and plain lines, implement."""
 
     def update(self, channel: str, unit: str, done: int, total: int) -> None: ...
 
@@ -41,17 +40,17 @@ class _Backend(Protocol):
 
 
 class Display:
-    """Shows progress and warnings of one verb on stderr; a context manager.
+    """A context manager that shows progress and warnings of one verb, such as `collect`, on stderr.
 
     Attributes:
-        callbacks: callbacks for the verb.
+        callbacks: callbacks to pass to the verb; they update this display.
     """
 
     def __init__(self, verb: str, *, unit: str = "sample", python: bool = False) -> None:
         """Args:
-        verb: name of the verb, with which plain lines begin.
-        unit: unit that `on_progress` counts, in the singular.
-        python: whether a Python call, perhaps in a notebook, shows the progress, and not the command line.
+        verb: name of the verb, such as `collect`; plain lines begin with this name.
+        unit: unit, in the singular, that `on_progress` counts.
+        python: True for a call from Python, which may run in a notebook; False for the command line.
         """
         self._unit = unit
         has_bars = sys.stderr.isatty() or (python and _is_notebook())
@@ -63,19 +62,19 @@ class Display:
         )
 
     def write(self, line: str) -> None:
-        """Prints a line without disturbing a bar."""
+        """Prints a line without damaging a progress bar."""
         self._backend.write(line)
 
     def detail(self, text: str) -> None:
-        """Shows a few words next to the progress, such as the loss."""
+        """Shows a short text beside the progress, such as the current loss."""
         self._backend.detail(text)
 
     def begin(self, title: str, unit: str = "sample") -> None:
-        """Begins the next step of several; its progress is counted from its first report.
+        """Begins the next step of a job with several steps, and resets the progress.
 
         Args:
             title: title of the step.
-            unit: unit that `on_progress` counts in this step.
+            unit: unit, in the singular, that `on_progress` counts in this step.
         """
         self._unit = unit
         self._backend.begin(title)
@@ -91,7 +90,9 @@ class Display:
 
 @contextlib.contextmanager
 def displayed(callbacks: Callbacks, verb: str, *, progress: bool, unit: str = "sample") -> Iterator[Callbacks]:
-    """The callbacks of a Python call, combined with those of a display if `progress` is True."""
+    """Yields the caller's callbacks; if `progress` is True, they also update a progress display, which is closed
+    at the end.
+    """
     if not progress:
         yield callbacks
         return

@@ -1,4 +1,4 @@
-"""Draws legends: names beside their colours, or a bar of colours with ticks."""
+"""Draws legends as pictures: names beside their colours, or a colour bar with ticks."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ INK, PAPER = (235, 235, 235), (24, 24, 24)
 FONT, FONT_SCALE = cv2.FONT_HERSHEY_SIMPLEX, 0.4
 LINE_PX, MARGIN_PX, SWATCH_PX, GAP_PX = 20, 6, 12, 14
 BAR_PX = (10, 360)
-"""Height and largest width of a bar of colours."""
+"""Height and largest width of a colour bar in pixels."""
 
 
 def draw_legend(legend: Legend, width_px: int) -> UInt8Image:
-    """A strip with the legend, dark as a contact sheet's captions.
+    """Draws a legend as a dark strip, in the style of the captions of a contact sheet.
 
     Returns:
-        (H, width_px, 3) uint8 RGB; as many lines as the names need.
+        (H, width_px, 3) uint8 RGB; H grows with the number of lines that the names need.
     """
     return _bar(legend, width_px) if isinstance(legend, ColourBar) else _names(legend, width_px)
 

@@ -1,1 +1,1 @@
-"""One HTML page of a dataset that opens from disk: pictures, overlays, filters, histograms and maps."""
+"""One self-contained HTML page for browsing a dataset: pictures, overlays, filters, histograms and maps."""

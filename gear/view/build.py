@@ -1,4 +1,6 @@
-"""Makes the parts of a dataset's page: one entry per sample, in parallel; a damaged sample does not stop the others."""
+"""Makes the parts of a dataset's HTML page: one entry per sample, in parallel; a damaged sample does not stop the
+others.
+"""
 
 from __future__ import annotations
 
@@ -27,22 +29,22 @@ from gear.view.encoding import Picture, encode, largest_scale
 from gear.view.rows import detail, finite, row
 
 PROBES = 6
-"""Number of samples, spread over the split, from which the scale of the pictures is estimated."""
+"""Number of samples, evenly spaced over the split, from which the scale of the pictures is estimated."""
 
 PICTURE_FILES = (".png", ".jpg", ".jpeg", ".webp")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Entry:
-    """One sample, ready for the page.
+    """The data of one sample on the page.
 
     Attributes:
-        row: its entry in the index.
-        detail: all other facts, as deflated JSON.
-        pictures: encoded pictures by channel.
-        cameras: name of the view with which a channel is aligned, if there is one.
-        originals: link to the file with a channel at full size, if the dataset has one and the page does not.
-        problem: why pictures or labels are missing; empty where nothing is missing.
+        row: the overview data of the sample, for the index of the page.
+        detail: all other metadata of the sample, as zlib-compressed JSON.
+        pictures: encoded pictures by channel, which is a camera or a preview.
+        cameras: by channel, the camera whose pixels coincide with the channel's; None if no camera's do.
+        originals: by channel, link to the dataset's file at full size, where the page contains a smaller picture.
+        problem: why pictures or labels are missing; empty if the entry is complete.
     """
 
     row: dict[str, Json]
@@ -55,12 +57,12 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Builder:
-    """Makes the entries.
+    """Makes the entries of the page, one per sample.
 
     Attributes:
-        dataset: the split.
+        dataset: the dataset split that the page shows.
         base_url: URL of the dataset's root relative to the page; ends in `/`.
-        scale: scale of the embedded pictures.
+        scale: factor by which the embedded pictures are resized, at most 1.
     """
 
     dataset: Dataset[Any]
@@ -68,7 +70,9 @@ class Builder:
     scale: float = 1.0
 
     def entries(self, count: int, on_progress: Progress | None = None) -> Iterator[Entry]:
-        """Yields the first `count` samples in order; several are decoded and encoded at the same time."""
+        """Yields the entries of the first `count` samples in order; several samples are decoded and encoded at the
+        same time.
+        """
         executor = ThreadPoolExecutor(min(8, cores()))
         try:
             for done, entry in enumerate(executor.map(self.entry, range(count)), start=1):
@@ -79,10 +83,10 @@ class Builder:
             executor.shutdown(cancel_futures=True)
 
     def entry(self, index: int) -> Entry:
-        """The entry of one sample; files that cannot be read are named in `problem`.
+        """Returns the entry of one sample; its `problem` says which files cannot be read.
 
         Raises:
-            DatasetError: its sidecar cannot be read.
+            DatasetError: the sidecar, the JSON file with the sample's metadata, cannot be read.
         """
         sidecar = self.dataset.sidecar(index)
         links = {path: self.base_url + quote(path) for path in sidecar.files if is_inside(path)}
@@ -102,7 +106,9 @@ class Builder:
         )
 
     def probe(self, index: int) -> list[UInt8Image]:
-        """A sample's pictures, to estimate the size of the page."""
+        """Returns all pictures of one sample, unscaled, to estimate the size of the page; empty if the sample
+        cannot be read.
+        """
         sample, _ = self._read(index)
         return [] if sample is None else [what.pixels for what in self._shown(sample)[0].values()]
 
@@ -121,7 +127,7 @@ class Builder:
             return images(sample), str(error)
 
     def _original(self, sidecar: Sidecar, pixels: UInt8Image) -> str | None:
-        """The file of the sample with exactly these pixels, if there is one."""
+        """Returns the path of the sample's picture file with exactly these pixels; None if there is none."""
         for relative in sidecar.files:
             if PurePosixPath(relative).suffix.lower() in PICTURE_FILES and is_inside(relative):
                 try:
@@ -135,7 +141,9 @@ class Builder:
 
 
 def fitting_scale(builder: Builder, count: int, budget_bytes: float) -> float:
-    """The scale at which the pictures of `count` samples fit a budget, estimated from a few of them."""
+    """Returns the scale, at most 1, at which the pictures of `count` samples fit the budget in bytes, estimated
+    from a few samples.
+    """
     chosen = sorted({round(i * (count - 1) / (PROBES - 1)) for i in range(PROBES)})
     facts = [len(deflated(finite(detail(builder.dataset.sidecar(i), {})))) for i in chosen]
     room = budget_bytes - sum(facts) / len(facts) * count
@@ -147,12 +155,14 @@ def _pictures(builder: Builder, indices: Sequence[int]) -> list[list[UInt8Image]
 
 
 def deflated(value: Json) -> bytes:
-    """JSON in the form that the page's `DecompressionStream` reads."""
+    """Returns a JSON value as zlib-compressed UTF-8, which `DecompressionStream` in the page's script decompresses."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return zlib.compress(text.encode("utf-8", "replace"), 6)
 
 
 def is_inside(relative: str) -> bool:
-    """Whether a path of a sidecar stays inside the dataset, so that the page may link it."""
+    """Whether a relative path from a sample's metadata stays inside the dataset; only such paths are linked on the
+    page.
+    """
     pure = PurePosixPath(relative)
     return not pure.is_absolute() and ".." not in pure.parts and "\\" not in relative and "\0" not in relative

@@ -1,4 +1,6 @@
-"""Channels: the kinds of pictures of a sample, from its cameras and from the task's previews."""
+"""Channels: the kinds of pictures of a sample, which are the pictures of its cameras and the previews that its
+task draws.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,11 @@ from gear.values.frames import UInt8Image
 
 @dataclass(frozen=True, slots=True, order=True)
 class Channel:
-    """A kind of picture that samples have.
+    """One kind of picture that the samples of a dataset have.
 
     Attributes:
         kind: `image` for a camera's picture, `preview` for a picture that the task draws.
-        name: name of the camera or the preview.
+        name: name of the camera or of the preview.
     """
 
     kind: Literal["image", "preview"]
@@ -30,7 +32,7 @@ class Shown:
 
     Attributes:
         pixels: (H, W, 3) uint8 RGB.
-        camera: name of the view whose pixels it is aligned with, or None.
+        camera: name of the camera whose pixels coincide with these pixels; None if there is no such camera.
     """
 
     pixels: UInt8Image
@@ -38,19 +40,19 @@ class Shown:
 
 
 class PreviewError(Exception):
-    """A task's preview failed or returned something else than pictures."""
+    """The preview function of a task failed, or returned something other than pictures."""
 
 
 def images(sample: Sample) -> dict[Channel, Shown]:
-    """The pictures of all cameras."""
+    """Returns the pictures of all cameras of a sample, by channel."""
     return {Channel("image", name): Shown(pixels, name) for name, pixels in sample.images.items()}
 
 
 def previews(task: Task[Any, Any], sample: Sample) -> dict[Channel, Shown]:
-    """The previews of the task.
+    """Returns the previews that the task draws for a sample, by channel.
 
     Raises:
-        PreviewError: the task failed; the pictures can still be shown.
+        PreviewError: the task's preview function failed; the camera pictures are not affected.
     """
     try:
         pictures = check_previews(task.preview(sample))
@@ -60,9 +62,11 @@ def previews(task: Task[Any, Any], sample: Sample) -> dict[Channel, Shown]:
 
 
 def aligned_with(name: str, pixels: UInt8Image, sample: Sample) -> str | None:
-    """The camera whose picture a preview covers pixel by pixel.
+    """Returns the name of the camera whose pixels coincide with those of a preview; None if no camera has the
+    preview's size.
 
-    It is the camera of the same size with the preview's name, or the first camera of the same size.
+    Among the cameras of the preview's size it is the one with the same name, then one whose name is part of the
+    preview's name, then the first.
     """
     same: Mapping[str, UInt8Image] = {k: v for k, v in sample.images.items() if v.shape == pixels.shape}
     return next((camera for camera in same if camera == name), None) or next(

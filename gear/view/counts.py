@@ -1,7 +1,7 @@
-"""Histograms of a task's facts, found without knowing the task.
+"""Histograms of the metadata that a task stores for a sample, found without any knowledge of the task.
 
-Two shapes are understood: a mapping from names to numbers (pixels per label) is a histogram, and a list of mappings
-(objects) is counted by each of its short text fields (label, type).
+Two structures are recognised. A mapping from names to numbers, such as pixels per label, is a histogram. A list of
+mappings, such as objects, is counted by each of its short text fields, such as label or type.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from typing import Any
 from gear.values.serial import Json
 
 Counts = dict[str, dict[str, float]]
-"""Numbers by label, by group: `{"label_px": {"road": 81233}, "objects.kitti_type": {"Car": 3}}`."""
+"""Histograms by name, each from label to number: `{"label_px": {"road": 81233}, "objects.kitti_type": {"Car": 3}}`."""
 
 LONGEST_LABEL = 40
 MOST_LABELS = 200
 
 
 def count(facts: Json) -> Counts:
-    """The histograms of one sample's facts."""
+    """Returns the histograms in the metadata that a task stores for one sample."""
     if not isinstance(facts, dict):
         return {}
     found: Counts = {}
@@ -39,17 +39,19 @@ def _by_text(key: str, items: Sequence[Mapping[str, Any]]) -> Counts:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value can be summed."""
+    """Whether a value is a finite number; True and False are no numbers here."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def is_label(value: Any) -> bool:
-    """Whether a value can be the name of a class."""
+    """Whether a value is a text of 1 to 40 characters, so that it can be the name of a class."""
     return isinstance(value, str) and 0 < len(value) <= LONGEST_LABEL
 
 
 def without_identifiers(samples: Sequence[Counts]) -> list[Counts]:
-    """Leaves out groups whose labels rarely repeat over the split: they are names or codes, not classes."""
+    """Removes the histograms whose labels rarely repeat over the split, because such labels are names or codes,
+    not classes.
+    """
     totals: dict[str, Counter[str]] = {}
     for counts in samples:
         for group, numbers in counts.items():

@@ -1,8 +1,8 @@
-"""The text of the page: template, style, script, index, pictures. The dataset's contents are embedded as data,
-never as HTML.
+"""The text of the HTML page: template, style, script, index and pictures.
 
-The index is JSON in a script block that browsers do not run, with every `<` escaped, and the script inserts it as text.
-A content security policy allows only the page's own script, by its hash, and only pictures to be loaded.
+The contents of the dataset are embedded as data, never as HTML. The index is JSON in a script block that browsers do
+not execute; every `<` in it is escaped, and the script inserts it as text. A content security policy allows only the
+page's own script, identified by its hash, and only pictures to be loaded.
 """
 
 from __future__ import annotations
@@ -22,22 +22,24 @@ from gear.view.counts import without_identifiers
 from gear.view.encoding import MEDIA_TYPE
 
 SCRIPTS = ("dom", "store", "histogram", "filters", "picture", "grid", "map", "tables", "sample", "statistics", "app")
-"""Files of the script, in order; together they are one function without globals."""
+"""Names of the JavaScript files in `gear/view/page`, in the order in which they are joined."""
 
 
 def asset(name: str) -> str:
-    """Reads a file of `gear/view/page`."""
+    """Returns the text of a file in `gear/view/page`."""
     return (files("gear.view") / "page" / name).read_text(encoding="utf-8")
 
 
 def script() -> str:
-    """The script of the page."""
+    """Returns the JavaScript of the page as one function without global variables."""
     body = "\n".join(asset(f"{name}.js") for name in SCRIPTS)
     return f'(() => {{\n"use strict";\n{body}\n}})();\n'
 
 
 def index_of(entries: Sequence[Entry], about: dict[str, Json]) -> dict[str, Json]:
-    """The JSON that the script reads first."""
+    """Returns the JSON index of the page, which its script reads first: `about` (metadata of the split), the
+    channels, and one entry per sample.
+    """
     channels = channels_of(entries)
     rows = []
     for entry, counts in zip(entries, without_identifiers([e.row["counts"] for e in entries]), strict=True):
@@ -51,7 +53,7 @@ def index_of(entries: Sequence[Entry], about: dict[str, Json]) -> dict[str, Json
 
 
 def channels_of(entries: Sequence[Entry]) -> list[Channel]:
-    """All channels, pictures before previews, in the order in which the samples name them."""
+    """Returns all channels of the entries, camera pictures before previews, otherwise in the order of the samples."""
     found = dict.fromkeys(channel for entry in entries for channel in entry.pictures)
     return sorted(found, key=lambda channel: channel.kind)
 
@@ -72,7 +74,9 @@ def _pictures(entry: Entry, channels: Sequence[Channel]) -> list[Json]:
 
 
 def document(title: str, entries: Sequence[Entry], about: dict[str, Json]) -> Iterator[str]:
-    """Yields the pieces of the page; pictures come last, so that a browser can start before it has read them all."""
+    """Yields the pieces of the HTML page; the index comes before the pictures, so a browser can start before all
+    pictures are loaded.
+    """
     style, code = asset("style.css"), script()
     fillings = {
         "policy": html.escape(policy(style, code)),
@@ -93,7 +97,7 @@ def document(title: str, entries: Sequence[Entry], about: dict[str, Json]) -> It
 
 
 def policy(style: str, code: str) -> str:
-    """The page's content security policy."""
+    """Returns the content security policy of the page, with the hashes of its style and its script."""
 
     def digest(text: str) -> str:
         return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
@@ -105,13 +109,13 @@ def policy(style: str, code: str) -> str:
 
 
 def embedded(value: Json) -> str:
-    """JSON that cannot end the script block around it."""
+    """Returns JSON text with `<`, `>` and `&` escaped, so it cannot end the HTML script block around it."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _filled(template: str, fillings: dict[str, str]) -> str:
-    """Fills the template in one pass, so that nothing in a filling is taken for a placeholder."""
+    """Fills the template in one pass, so placeholders inside inserted texts are not replaced."""
     return re.sub(r"\{\{(\w+)\}\}", lambda match: fillings[match[1]], template)
 
 

@@ -1,4 +1,4 @@
-"""Encodes pictures for the page; small files, so that a page with all of them opens quickly."""
+"""Encodes pictures for the HTML page as small WebP files, because the page contains all of them."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from gear.values.frames import UInt8Image
 MEDIA_TYPE = "image/webp"
 QUALITY = 80
 SCALES = (1.0, 0.8, 0.65, 0.5, 0.45, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.1)
-"""Possible scales of embedded pictures; one scale is used for the whole page, so that samples can be compared."""
+"""Allowed scales of embedded pictures. One scale is used for the whole page, so samples can be compared."""
 
 MOST_PX = 16383
 """Largest side of a WebP picture in pixels."""
 
 LEAST_WIDTH_PX = 160
-"""Smallest width of an embedded picture in pixels, for any budget."""
+"""Smallest width of an embedded picture in pixels, even if the page then exceeds its budget."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """A picture as embedded in the page.
+    """One encoded picture of the page.
 
     Attributes:
-        data: encoded bytes.
+        data: encoded bytes (WebP).
         width_px, height_px: size of the original picture.
-        is_whole: whether it has the size of the original.
+        is_whole: whether the encoded picture has the size of the original.
     """
 
     data: bytes
@@ -39,7 +39,7 @@ class Picture:
 
 
 def encode(pixels: UInt8Image, scale: float) -> Picture:
-    """Resizes a (H, W, 3) RGB picture by area averaging and compresses it."""
+    """Resizes a (H, W, 3) uint8 RGB picture by area averaging and compresses it as WebP."""
     height, width = pixels.shape[:2]
     target = max(round(width * scale), min(width, LEAST_WIDTH_PX))
     target = max(1, min(target, MOST_PX, MOST_PX * width // height))
@@ -54,10 +54,13 @@ def encode(pixels: UInt8Image, scale: float) -> Picture:
 
 
 def largest_scale(probes: Sequence[Sequence[UInt8Image]], samples: int, budget_bytes: float) -> float:
-    """The largest of `SCALES` at which the pictures of all samples fit the budget, estimated from a few samples.
+    """Returns the largest of `SCALES` at which the pictures of all samples fit the budget, estimated from a few
+    samples.
+
+    If the pictures fit at no scale, the result is the smallest scale.
 
     Args:
-        probes: pictures of a few samples.
+        probes: all pictures of a few samples, one list per sample.
         samples: number of all samples.
         budget_bytes: budget for all encoded pictures.
     """

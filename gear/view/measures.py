@@ -1,7 +1,7 @@
-"""The measures by which samples can be filtered, found in a task's facts without knowing the task.
+"""The numbers by which the page filters samples, found in a task's metadata without any knowledge of the task.
 
-Lists of mappings are objects. Fields whose name ends in `_fraction` or `distance_m` are their measures (visible share,
-distance); the first field that is a short text in all of them is their label.
+Every list of mappings is taken as a list of objects. Fields whose name ends in `_fraction` (visible share) or
+`distance_m` are the measures of an object. The first field that is a short text in all objects is their label.
 """
 
 from __future__ import annotations
@@ -12,12 +12,15 @@ from gear.values.serial import Json
 from gear.view.counts import is_label, is_number
 
 MEASURES = ("_fraction", "distance_m")
-"""Suffixes of fields with the visible share of an object and with its distance."""
+"""Endings of the names of fields that contain an object's visible share or its distance in metres."""
 
 
 def measures(facts: Json) -> Json:
-    """`labels` with one entry per object, and `values` by field with one entry per object; None where an object
-    lacks the field.
+    """Returns the measures of all objects in the metadata that a task stores for one sample.
+
+    Returns:
+        `labels`, a list with one label per object, and `values`, a mapping from the field's name to a list with one
+        number per object; None where an object has no such field.
     """
     lists = facts.values() if isinstance(facts, dict) else ()
     objects: list[dict[str, Any]] = []

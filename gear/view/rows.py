@@ -1,4 +1,4 @@
-"""The page's index as JSON: the facts of every sample that the overview needs."""
+"""The metadata of one sample as JSON: the part for the overview of the page, and the part for the sample's own view."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from gear.view.surface_occlusion import hidden
 
 
 def row(sidecar: Sidecar) -> dict[str, Json]:
-    """The index entry of one sample: positions from above, surfaces, counts and measures."""
+    """Returns the overview data of one sample: positions of actors and cameras from above, surfaces, histograms
+    and measures.
+    """
     record = sidecar.record
     return {
         "index": record.index,
@@ -36,7 +38,7 @@ def row(sidecar: Sidecar) -> dict[str, Json]:
 
 
 def detail(sidecar: Sidecar, links: dict[str, str]) -> dict[str, Json]:
-    """All other facts of a sample, read when its page is opened."""
+    """Returns all other metadata of a sample, which the page reads only when the user opens the sample."""
     return {
         "record": to_json(sidecar.record),
         "surfaces": to_json(sidecar.surfaces),
@@ -46,7 +48,7 @@ def detail(sidecar: Sidecar, links: dict[str, str]) -> dict[str, Json]:
 
 
 def finite(value: Any) -> Json:
-    """The same JSON with None for numbers that JSON cannot express."""
+    """Returns a copy of a JSON value in which None replaces NaN and infinities, which JSON does not allow."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -57,7 +59,7 @@ def finite(value: Any) -> Json:
 
 
 def _from_above(world_from_thing: RigidTransform) -> list[float]:
-    """East and north in metres, heading in radians counter-clockwise from east."""
+    """Returns [east in metres, north in metres, heading in radians counter-clockwise from east]."""
     x, y, _ = world_from_thing.translation_m
     return [round(float(x), 2), round(float(y), 2), round(world_from_thing.yaw_rad, 3)]
 
@@ -78,7 +80,7 @@ def _camera(camera: CameraRecord) -> dict[str, Json]:
 
 
 def _board(record: SceneRecord, surface: SurfaceRecord) -> dict[str, Json]:
-    """Both ends of a face seen from above, and the side from which it is viewed."""
+    """Returns both ends of a surface as seen from above, in metres, and the unit vector towards its viewer."""
     world_from_surface = record.world_from_surface(surface)
     right = world_from_surface.rotation[:, 0] * surface.width_m / 2
     outward = -world_from_surface.rotation[:, 2]

@@ -1,4 +1,4 @@
-"""Truncation and occlusion of a patch surface."""
+"""Truncation and occlusion of a patch surface in a picture."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Hidden:
-    """Shares of a surface's silhouette; None where a corner is behind the camera or the surface faces away.
+    """The invisible shares of a surface's outline, 0..1; None if a corner is behind the camera or the surface
+    faces away.
 
     Attributes:
-        truncated_fraction: share outside the picture.
-        occluded_fraction: share of the part inside the picture that is occluded; None also where no part is inside.
+        truncated_fraction: share of the outline's area that lies outside the picture.
+        occluded_fraction: occluded share of the part inside the picture; None also if no part is inside.
     """
 
     truncated_fraction: float | None
@@ -24,7 +25,9 @@ class Hidden:
 
 
 def hidden(truth: SurfaceTruth, camera: CameraRecord) -> Hidden:
-    """Computes both shares from the outline in index pixels and the number of visible pixels."""
+    """Computes the truncated and the occluded share of a surface from its projected corners and its number of
+    visible pixels.
+    """
     if truth.corners_px is None or truth.incidence_deg >= 90:
         return Hidden(None, None)
     outline = [(x, y) for x, y in truth.corners_px]
@@ -37,7 +40,9 @@ def hidden(truth: SurfaceTruth, camera: CameraRecord) -> Hidden:
 
 
 def clipped(polygon: list[Point], right: float, bottom: float) -> list[Point]:
-    """The part of a convex polygon inside [-0.5, right] x [-0.5, bottom]: the picture, in index pixels."""
+    """Returns the part of a convex polygon inside [-0.5, right] x [-0.5, bottom]; in these coordinates pixel
+    centres are integers.
+    """
     for axis, bound, sign in ((0, -0.5, 1.0), (0, right, -1.0), (1, -0.5, 1.0), (1, bottom, -1.0)):
         kept: list[Point] = []
         for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True):
@@ -52,6 +57,6 @@ def clipped(polygon: list[Point], right: float, bottom: float) -> list[Point]:
 
 
 def area_px2(polygon: list[Point]) -> float:
-    """Area of a polygon without self-intersections; 0 for fewer than three corners."""
+    """Returns the area in square pixels of a polygon without self-intersections; 0 for fewer than three corners."""
     pairs = zip(polygon, polygon[1:] + polygon[:1], strict=True)
     return abs(sum(a[0] * b[1] - a[1] * b[0] for a, b in pairs)) / 2

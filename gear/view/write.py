@@ -1,4 +1,4 @@
-"""`gear view`: writes the page of a dataset."""
+"""`gear.write_view`: writes the HTML page of a dataset."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from gear.view.rows import finite
 
 MEGABYTE = 1_000_000
 BASE64 = 4 / 3
-"""Characters per byte of a picture in the page."""
+"""Characters in the page per byte of an embedded picture (base64)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ViewReport:
-    """The result.
+    """The result of `gear.write_view`.
 
     Attributes:
         path: path of the page.
         samples: number of samples on the page.
         size_bytes: size of the page.
-        scale: scale of the embedded pictures.
-        problems: (index, problem) of samples that could not be shown completely.
+        scale: factor by which the embedded pictures were resized.
+        problems: (index, problem) of the samples whose pictures or labels are incomplete.
     """
 
     path: Path
@@ -44,7 +44,7 @@ class ViewReport:
     problems: tuple[tuple[int, str], ...]
 
     def summary(self) -> str:
-        """One line about the result, and one for the first problem if there are any."""
+        """Returns one line about the page, and a second line for the first problem if there are any."""
         size = f"{self.size_bytes / MEGABYTE:.1f} MB"
         scaled = "" if self.scale == 1 else f", pictures at {self.scale:.0%} of their width"
         text = f"{self.path}: {counted(self.samples, 'sample')}, {size}{scaled}"
@@ -66,18 +66,18 @@ def write_view(
 ) -> ViewReport:
     """Writes one self-contained HTML page of a dataset; it opens from disk, without a server or a network.
 
-    Pictures and previews are embedded, at full size if they fit `max_mb`, otherwise all at the same smaller scale. In
-    the second case the page of a sample shows the files of the dataset, as long as these are not moved relative to the
-    page.
+    Pictures and previews are embedded at full size if they fit `max_mb`; otherwise all are embedded at the same smaller
+    scale. In the second case, the view of a single sample loads the dataset's picture files, as long as these are not
+    moved relative to the page.
 
     Args:
         path: root of a dataset of any task.
         out: HTML file to write.
         split: the split to show; optional if there is only one.
-        samples: number of samples from the first one on; all by default.
+        samples: number of samples, counted from the first; all by default.
         max_mb: approximate limit for the size of the page in megabytes.
         progress: shows a progress bar.
-        on_progress: called after every sample.
+        on_progress: called after every sample with the numbers of finished and of all samples.
 
     Raises:
         DatasetError: there is no finished split to show, or `out` cannot be written.
@@ -96,7 +96,7 @@ def write_page(
     max_mb: float = 48.0,
     on_progress: Progress | None = None,
 ) -> ViewReport:
-    """Writes the page of an opened dataset; see `write_view`."""
+    """Writes the HTML page of a dataset that is already open; `write_view` describes the arguments."""
     target = Path(out)
     refuse_folder(target)
     with explained(target):
@@ -115,7 +115,9 @@ def write_page(
 
 
 def about(dataset: Dataset[Any], scale: float) -> dict[str, Json]:
-    """The facts of the whole split on the page."""
+    """Returns the metadata of the whole split for the page, as JSON: task, town, scene, split, seed, patch and
+    config.
+    """
     plan = dataset.plan
     known = {key: value for key, value in dataset.manifest.items() if key not in ("samples", "indexes", "sidecars")}
     named = {"task": plan.task, "options": plan.options, "content": plan.content, "patch": plan.patch}
@@ -135,7 +137,7 @@ def about(dataset: Dataset[Any], scale: float) -> dict[str, Json]:
 
 
 def base_url(root: Path, page: Path) -> str:
-    """URL of a dataset's root relative to the page."""
+    """Returns the URL of a dataset's root relative to the page, ending in `/`."""
     return "./" + quote(Path(os.path.relpath(root.resolve(), page.resolve().parent)).as_posix()) + "/"
 
 

@@ -26,7 +26,7 @@ The folder --out gets patch_0.png, …, patch.safetensors, attack.json and figur
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear attack` to its argument parser."""
     from gear.cli.commands.evaluate import add_calibration
     from gear.cli.commands.gap import add_places
 
@@ -134,7 +134,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check_rendered(args: argparse.Namespace, request: AttackRequest, facts: Json) -> None:
-    """Renders the patches in held-out samples and prints their effect."""
+    """Renders the optimised patches in samples that the attack did not use (`--verify`), and prints a
+    comparison with composed patches.
+    """
     import json
 
     from gear.cli.requests import request_of

@@ -22,7 +22,7 @@ interruption, or after adding networks, defenses or scenes: existing results are
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear bench` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("config", metavar="CONFIG", help="name (quick, paper) or path of a bench config")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for data, patches, results and the report")
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the benchmark (or lists its commands), prints its tables and returns the exit code."""
+    """Runs the benchmark and prints its tables, or with `--list` only prints its steps; returns exit code 0."""
     import json
 
     from gear.cli.requests import request_of

@@ -1,4 +1,4 @@
-"""`gear collect`: renders a dataset split, pictures with exact ground truth."""
+"""`gear collect`: renders one split of a dataset: pictures with exact ground truth."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ EXAMPLE = """examples:
 
 
 def positive(text: str) -> int:
-    """Parses a whole number of at least 1, for argparse."""
+    """Parses the text of a flag as a whole number of at least 1; a `type` function for argparse."""
     number = int(text)
     if number < 1:
         raise argparse.ArgumentTypeError("must be at least 1")
@@ -27,12 +27,14 @@ def positive(text: str) -> int:
 
 
 def workers(text: str) -> Workers:
-    """Parses a number of workers, or `auto`, for argparse."""
+    """Parses the value of `--workers`: a whole number of at least 1, or `auto`; a `type` function for argparse."""
     return "auto" if text == "auto" else positive(text)
 
 
 def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags that describe a collection; `gear show-config` has the same flags."""
+    """Adds the flags that describe a collection (task, scene, weather, patch, …); `gear collect` and `gear show-
+    config` share them.
+    """
     parser.add_argument("--task", help="task plugin: semseg, detect2d, stereo3d, depth, or an installed one")
     parser.add_argument("--scene", help="name of a scene of the town (billboard01 … 09, truck …), or FILE.yml:NAME")
     parser.add_argument("--town", help="name of a town, or path of its MJCF (town10)")
@@ -58,7 +60,7 @@ def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear collect` to its argument parser."""
     parser.epilog = EXAMPLE
     add_collection_arguments(parser)
     parser.add_argument(

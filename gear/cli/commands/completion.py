@@ -1,4 +1,4 @@
-"""`gear completion`: prints a script with which a shell completes gear's commands and flags."""
+"""`gear completion`: prints a shell script that enables tab completion of gear's commands and flags."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's arguments."""
+    """Adds the flags of `gear completion` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("shell", choices=SHELLS, help="shell for which the script is printed")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints the script and returns exit code 0."""
+    """Prints the completion script for the requested shell and returns exit code 0."""
     import shtab
 
     from gear.cli.main import full_parser

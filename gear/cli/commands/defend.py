@@ -1,4 +1,4 @@
-"""`gear defend`: writes the pictures of a dataset as a defense cleans them."""
+"""`gear defend`: applies a defense to the pictures of a dataset and writes the cleaned pictures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ The cleaned pictures have the dataset's own relative paths; masks and scores lie
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear defend` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset of any task")
     parser.add_argument("--defense", required=True, metavar="NAME", help="defense plugin; gear plugins --kind defense")

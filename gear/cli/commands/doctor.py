@@ -1,4 +1,4 @@
-"""`gear doctor`: checks the renderers of this machine."""
+"""`gear doctor`: checks which renderers work on this machine."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear doctor` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("--renderer", help="check only this renderer: raster, filament or classic")
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -22,7 +22,7 @@ def run(args: argparse.Namespace) -> int:
     """Checks the renderers and prints a report.
 
     Returns:
-        Exit code: 0 if at least one renderer works (with `--renderer`: if that one works), otherwise 2.
+        0 if at least one of the checked renderers works, otherwise 2; with `--renderer` only that renderer is checked.
     """
     from gear.verbs.doctor import doctor
 

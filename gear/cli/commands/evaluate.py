@@ -21,7 +21,7 @@ interruption.
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear evaluate` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("--model", required=True, metavar="NAME", help="model plugin; gear plugins --kind model")
     parser.add_argument(
@@ -74,7 +74,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags that name the calibration data of a defense."""
+    """Adds the flags `--calibration` and `--calibration-patched`, which name the datasets on which a defense is
+    calibrated.
+    """
     parser.add_argument("--calibration", metavar="DIR", help="clean dataset on which the defense is calibrated")
     parser.add_argument("--calibration-patched", metavar="DIR", help="twin of the calibration dataset, with patches")
 

@@ -11,7 +11,7 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear export` to its argument parser."""
     from gear.formats.exports.registry import layout_names
 
     parser.epilog = EXAMPLE

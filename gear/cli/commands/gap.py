@@ -1,4 +1,6 @@
-"""`gear gap`: how far composed patches differ from rendered ones, in pictures and in metrics."""
+"""`gear gap`: measures how far composed patches (pasted into pictures) differ from rendered patches, in pixels and
+in metrics.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,7 @@ The dataset must have been collected with --probes. With --patch the twin is ren
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear gap` to its argument parser."""
     from gear.cli.commands.collect import positive
     from gear.cli.commands.evaluate import add_calibration
 
@@ -59,7 +61,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_places(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags for datasets of a town that is not part of gear: its MJCF file and its scene library."""
+    """Adds the flags `--town` and `--scenes`: the MJCF file and the scene library of a town that is not part of
+    gear.
+    """
     parser.add_argument(
         "--town",
         metavar="FILE",
@@ -69,7 +73,7 @@ def add_places(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compares composed and rendered patches, prints the table and returns exit code 0."""
+    """Compares composed patches with rendered patches, prints the table and returns exit code 0."""
     from gear.cli.requests import guard_of, request_of
     from gear.dataset.json_text import dump_json
     from gear.measuring.gap.request import GapRequest

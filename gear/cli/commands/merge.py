@@ -1,4 +1,4 @@
-"""`gear merge`: joins folders that `gear collect --shard` filled into one dataset."""
+"""`gear merge`: joins the folders of several `gear collect --shard` runs into one dataset."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear merge` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("datasets", nargs="+", metavar="DIR", help="folder that `gear collect --shard I/N` has filled")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder of the dataset; must be empty or new")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Merges the folders, prints the dataset's folder and returns exit code 0."""
+    """Joins the folders, prints the path of the new dataset and returns exit code 0."""
     from gear.reporting.display import Display
     from gear.verbs.merge import merge
 

@@ -1,4 +1,4 @@
-"""`gear models`: lists the installed networks, or shows one with its weights."""
+"""`gear models`: lists the installed networks, or prints the details of one network and its weights."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ Nothing is downloaded: fetch published weights yourself, then `gear weights conv
 """
 
 HEAD = ("network", "tasks", "size", "weights", "usable", "summary")
-"""Titles of the columns of the list."""
+"""Column titles of the list of networks."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear models` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument(
         "action", nargs="?", choices=("list", "show"), default="list", help="list all, or show one (list)"
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lists the installed networks, or shows one; returns exit code 0."""
+    """Prints the list of installed networks, or the details of one network; returns exit code 0."""
     from gear.networks.shipped import shipped_networks
     from gear.verbs.models import list_models
 
@@ -61,11 +61,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def the_one(models: Sequence[ModelFacts], name: str | None) -> ModelFacts:
-    """The network with the given name, for `gear models show`.
+    """Returns the network with the given name, for `gear models show`.
 
     Raises:
         GearError: no name was given.
-        UnknownNameError: there is no model with this name.
+        UnknownNameError: no installed model has this name.
     """
     from gear.values.errors import GearError, UnknownNameError
 
@@ -78,7 +78,7 @@ def the_one(models: Sequence[ModelFacts], name: str | None) -> ModelFacts:
 
 
 def row(model: ModelFacts) -> list[str]:
-    """The cells of one network in the list, in the order of `HEAD`."""
+    """Returns the table cells of one network, in the order of the column titles in `HEAD`."""
     spec = model.spec
     size = f"{spec.parameters / 1e6:.1f} M" if spec.parameters else "-"
     weights = "shipped" if model.shipped else "published" if spec.published else "-"
@@ -89,7 +89,9 @@ def row(model: ModelFacts) -> list[str]:
 
 
 def details(model: ModelFacts) -> list[str]:
-    """All facts about one network, as lines of text."""
+    """Returns a description of one network as lines of text: tasks, size, input, published weights and shipped
+    weights.
+    """
     spec = model.spec
     size = f"{spec.parameters / 1e6:.1f} M parameters" if spec.parameters else "size not stated"
     facts = [("tasks", ", ".join(spec.tasks)), ("size", size)]
@@ -104,7 +106,9 @@ def details(model: ModelFacts) -> list[str]:
 
 
 def shipped_line(weights: ShippedWeights | None) -> str:
-    """One line about the reference weights of a network."""
+    """Returns one line about the reference weights of a network: file size, metrics, and whether rendering has
+    changed since the training.
+    """
     if weights is None:
         return "none"
     facts = weights.to_json()

@@ -13,7 +13,7 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear new` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("kind", choices=KINDS, help="kind of plugin")
     parser.add_argument("name", help="the plugin's name: lower case letters, digits and underscores")

@@ -1,4 +1,4 @@
-"""`gear plugins`: lists the installed plugins, or shows one with its options."""
+"""`gear plugins`: lists the installed plugins, or prints one plugin with its options."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear plugins` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument(
         "action", nargs="?", choices=("list", "show"), default="list", help="list all, or show one (list)"
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lists plugins, or shows one with its options; returns the exit code."""
+    """Prints the list of plugins, or one plugin with its options; returns exit code 0."""
     from gear.plugins.manager import catalogue
 
     found = catalogue()
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def show_all(found: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
-    """Lists the plugins that work, those that are broken, and clashes of names; returns the exit code."""
+    """Prints the working plugins, the broken plugins, and the names that several plugins share; returns exit code 0."""
     from gear.plugins.describe import summary
 
     rows = [summary(plugin) for kind in kinds for plugin in found.of_kind(kind)]
@@ -72,7 +72,7 @@ def show_all(found: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
 
 
 def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) -> int:
-    """Prints one plugin with its options; returns the exit code."""
+    """Prints one plugin with its source, capabilities and options; returns exit code 0."""
     from gear.plugins.describe import options, source_of, summary, training
 
     plugin = the_one(found, kinds, args.name)
@@ -99,11 +99,11 @@ def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) ->
 
 
 def the_one(found: Catalogue, kinds: tuple[Kind, ...], name: str | None) -> PluginEntry:
-    """The plugin with the given name, of any kind, for `gear plugins show`.
+    """Returns the plugin with the given name, of any of the given kinds, for `gear plugins show`.
 
     Raises:
-        GearError: no name was given, or plugins of several kinds have it.
-        UnknownNameError: there is no plugin with this name.
+        GearError: no name was given, or plugins of several kinds have this name.
+        UnknownNameError: no installed plugin has this name.
         DuplicateNameError: plugins of two packages have this name.
     """
     from gear.values.errors import GearError, UnknownNameError

@@ -1,4 +1,4 @@
-"""`gear sheet`: draws samples of a dataset with their ground truth into one picture."""
+"""`gear sheet`: draws samples of a dataset, with their ground truth, as one PNG picture."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear sheet` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset")
     parser.add_argument("--split", help="split to draw, if the dataset has several")

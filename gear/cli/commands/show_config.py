@@ -1,4 +1,6 @@
-"""`gear show-config`: prints the complete collection config that results from flags and files."""
+"""`gear show-config`: prints the collection config that results from flags and config files, with all defaults
+filled in.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,13 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear show-config` to its argument parser."""
     parser.epilog = EXAMPLE
     add_collection_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints the collection config after checking that all names in it exist; returns exit code 0."""
+    """Checks that every name in the collection config exists, prints the config as YAML and returns exit code 0."""
     from gear.collecting.lookup import look_up
     from gear.config.dump import to_yaml
     from gear.config.load import load_collection

@@ -1,4 +1,4 @@
-"""`gear towns`: lists towns and their scenes, or draws a map of a town and a picture of every scene."""
+"""`gear towns`: lists towns and their scenes, or draws a map of a town and a thumbnail of each of its scenes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear towns` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("town", nargs="?", help="name of a town, or path of its MJCF (all of gear's towns)")
     parser.add_argument("--scenes", metavar="FILE", help="scene library of the town, instead of gear's own")
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lists towns, or draws one; returns the exit code."""
+    """Lists towns with their scenes, or draws one town with `--out`; returns 0, or 2 if a scene is unusable."""
     from gear.values.errors import GearError
     from gear.verbs.towns.facts import read_town, town_names
     from gear.verbs.towns.write import check_pictures
@@ -57,7 +57,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def draw(args: argparse.Namespace) -> int:
-    """Writes the map and the sheet of one town, prints their paths and returns the exit code."""
+    """Writes the map and the thumbnail sheet of one town and prints their paths; returns 0, or 2 if a scene is
+    unusable.
+    """
     from gear.reporting.display import Display
     from gear.verbs.towns.write import write_town
 
@@ -78,7 +80,7 @@ def draw(args: argparse.Namespace) -> int:
 
 
 def _report(problems: Iterable[GearError]) -> int:
-    """Prints the errors of scenes that cannot be used, and returns the exit code."""
+    """Prints one error per unusable scene on stderr; returns 2 if there is any, otherwise 0."""
     code = 0
     for problem in problems:
         print(f"gear: {problem}", file=sys.stderr)
@@ -87,7 +89,7 @@ def _report(problems: Iterable[GearError]) -> int:
 
 
 def show(town: Town) -> None:
-    """Prints a town with its scenes."""
+    """Prints the size, the lanes and the scenes of a town."""
     from gear.verbs.towns.legend import scene_note
 
     width_m, height_m = town.size_m

@@ -1,4 +1,4 @@
-"""`gear train`: trains a network on collected data."""
+"""`gear train`: trains a network on collected datasets."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ SECONDS = {"s": 1, "m": 60, "h": 3600, "": 60}
 
 
 def budget(text: str) -> float:
-    """Parses a duration such as `90s`, `10m` or `1.5h` to seconds; a plain number means minutes. For argparse."""
+    """Parses a duration such as `90s`, `10m` or `1.5h` and returns seconds; a plain number means minutes. A `type`
+    function for argparse.
+    """
     match = re.fullmatch(r"(\d+(?:\.\d*)?)([smh]?)", text.strip())
     if not match or not float(match[1]):
         raise argparse.ArgumentTypeError(f"a time is written 90s, 10m or 1.5h, got {text!r}")
@@ -34,7 +36,7 @@ def budget(text: str) -> float:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear train` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("--task", required=True, metavar="NAME", help="task plugin; gear plugins --kind task")
     parser.add_argument("--model", required=True, metavar="NAME", help="model plugin; gear plugins --kind model")
@@ -99,16 +101,20 @@ def run(args: argparse.Namespace) -> int:
 
 
 class TrainingLog:
-    """Shows loss and learning rate next to the progress, and prints a line after every validation."""
+    """A callback that shows loss and learning rate in the progress display and prints one line after every
+    validation.
+    """
 
     SHOWN = 3
-    """Number of metrics of a validation that are shown, besides the loss."""
+    """Number of validation metrics in the printed line, in addition to the loss."""
 
     def __init__(self, display: Display) -> None:
         self._display = display
 
     def __call__(self, state: TrainingState, share: float, metrics: dict[str, float] | None) -> None:
-        """Updates the display after a step; with `metrics`, prints a line after a validation."""
+        """Updates the display after a training step. With `metrics`, the result of a validation, it also prints a
+        line.
+        """
         if state.steps:
             point = state.steps[-1]
             self._display.detail(f"loss {point['loss']:.3f}, lr {point['rate']:.1e}")

@@ -1,4 +1,6 @@
-"""`gear verify`: checks every file of a dataset against its recorded hash, and can make damaged samples again."""
+"""`gear verify`: compares every file of a dataset with its recorded hash; with `--repair` damaged samples are
+rendered again.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ EXAMPLE = """examples:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags."""
+    """Adds the flags of `gear verify` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset")
     parser.add_argument("--split", help="split to check (all)")
@@ -31,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     """Prints one line for each damaged, missing or unexpected file.
 
     Returns:
-        Exit code: 0 if all files are as they were written, otherwise 1.
+        0 if every file has its recorded content and no file is missing or unexpected; otherwise 1.
     """
     import json
 

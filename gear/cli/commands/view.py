@@ -1,4 +1,4 @@
-"""`gear view`: writes one self-contained HTML page that shows a dataset."""
+"""`gear view`: writes one self-contained HTML page for browsing a dataset."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ The page is one file; it needs no server and no network. On the page, press ? fo
 
 
 def megabytes(text: str) -> float:
-    """Parses a size of at least 1 MB, for argparse."""
+    """Parses a size in megabytes, 1 to 4000; a `type` function for argparse."""
     number = float(text)
     if not 1 <= number <= 4000:
         raise argparse.ArgumentTypeError("must be 1 to 4000")
@@ -24,7 +24,7 @@ def megabytes(text: str) -> float:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear view` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset of any task")
     parser.add_argument("--split", help="split to show, if the dataset has several")
@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     """Writes the page and prints its path.
 
     Returns:
-        Exit code: 0, or 1 if some samples could not be shown.
+        0, or 1 if the pictures or labels of some samples could not be shown.
     """
     from gear.reporting.display import Display
     from gear.view.write import write_view

@@ -1,4 +1,6 @@
-"""`gear weights`: converts published weights files, averages two weights files, or shows a file's metadata."""
+"""`gear weights`: converts a published weights file, averages two weights files, or prints the metadata of a
+weights file.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,7 @@ A published file is read without running code in it; files that would run code a
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the command's flags to its parser."""
+    """Adds the flags of `gear weights` to its argument parser."""
     parser.epilog = EXAMPLE
     actions = parser.add_subparsers(title="actions", metavar="ACTION", dest="action", required=True)
     converting = actions.add_parser(
@@ -67,7 +69,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def convert(args: argparse.Namespace) -> int:
-    """`gear weights convert`: writes the safetensors file, prints its hash and returns exit code 0."""
+    """`gear weights convert`: writes a published weights file as safetensors, prints its hash and returns exit
+    code 0.
+    """
     from gear.verbs.weights.convert import convert_weights
 
     report = convert_weights(
