@@ -1,1 +1,3 @@
-"""The verbs: each is one call of the Python API, shows progress, and resumes an interrupted run."""
+"""The verbs: gear's main functions, such as `collect`, `train` and `attack`, one folder or module per function of
+the Python API.
+"""

@@ -1,4 +1,4 @@
-"""`gear.doctor`: which renderers work on this machine, and on which device and driver."""
+"""`gear.doctor`: checks which renderers work on this machine, and with which device and driver."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RendererCheck:
-    """The result of one renderer for a small reference frame.
+    """The result of the check of one renderer, which renders a small reference frame.
 
     Attributes:
         name: raster, filament or classic.
-        works: whether it returned the frame.
+        works: whether the renderer returned the frame.
         facts: JSON with a description, and either device, driver and times in seconds, or `problem` and `remedy`.
     """
 
@@ -34,7 +34,7 @@ class DoctorReport:
     """The results of all renderers on this machine.
 
     Attributes:
-        machine: Python, packages, system and the number of usable cores; JSON.
+        machine: versions of gear, Python and MuJoCo, the system, and the number of usable cores; JSON.
         renderers: one check per renderer.
     """
 
@@ -43,16 +43,16 @@ class DoctorReport:
 
     @property
     def works(self) -> bool:
-        """Whether at least one of the renderers works."""
+        """Whether at least one of the checked renderers works."""
         return any(check.works for check in self.renderers)
 
     def as_json(self) -> Json:
-        """The report as JSON."""
+        """Returns the report as JSON: the machine, and the checks by the renderer's name."""
         checks = {check.name: {"works": check.works, **check.facts} for check in self.renderers}
         return {**self.machine, "renderers": checks}
 
     def summary(self) -> str:
-        """Several lines of text: the machine, then every renderer with its facts."""
+        """Returns several lines of text: the machine, then each renderer with its device and times, or its problem."""
         lines = [f"{key}: {value}" for key, value in self.machine.items()]
         for check in self.renderers:
             lines.append(f"{check.name}: {'works' if check.works else 'does not work'}")
@@ -61,7 +61,7 @@ class DoctorReport:
 
 
 def doctor(renderer: str | None = None) -> DoctorReport:
-    """Renders a reference frame with each renderer.
+    """Checks the renderers of this machine: renders a reference frame with each of them.
 
     Args:
         renderer: name of the only renderer to check: raster, filament or classic; all by default.

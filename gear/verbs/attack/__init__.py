@@ -1,1 +1,1 @@
-"""`gear attack`: patches for any task and model."""
+"""The verb `attack`: optimises adversarial patches for any task and any model."""

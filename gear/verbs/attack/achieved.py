@@ -1,4 +1,4 @@
-"""The effect of an attack: its objective with the optimised patches, compared with random patches."""
+"""Measures the effect of an attack: the attack's objective with the optimised patches and with random patches."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from gear.values.serial import Json
 from gear.verbs.attack.scenes import Scenes
 
 MOST_SAMPLES = 8
-"""Largest number of training samples on which the objectives are compared; more would hardly change the result."""
+"""Largest number of training samples for the comparison with random patches; more would hardly change the result."""
 
 
 def random_patches(patches: Sequence[Patch], seed: int) -> tuple[Patch, ...]:
-    """Patches of the same sizes whose values are drawn uniformly from 0..1."""
+    """Returns patches of the same sizes as the given ones, with values drawn uniformly from 0..1."""
     rng = derive_rng(seed, "attack", "baseline")
     return tuple(Patch(name=one.name, rgb=rng.random(one.rgb.shape, dtype=np.float32)) for one in patches)
 
@@ -25,19 +25,19 @@ def random_patches(patches: Sequence[Patch], seed: int) -> tuple[Patch, ...]:
 def compared(
     scenes: Scenes, network: Model, objective: Objective, patches: Sequence[Patch], seed: int, most: int | None = None
 ) -> Json:
-    """Mean objective over samples with random patches, and with the given patches.
+    """Measures the mean objective over samples, once with random patches and once with the patches of the attack.
 
     Args:
-        scenes: the samples.
+        scenes: the samples, with the compositor that puts patches into them.
         network: the attacked model.
         objective: the objective that the attack maximises.
         patches: patches of the attack.
         seed: seed of the random patches.
-        most: number of samples, evenly spaced; all by default.
+        most: largest number of samples, evenly spaced; None means all.
 
     Returns:
-        `samples`, the number of samples, and the objectives `random` and `patch`, which are None if they cannot be
-        measured.
+        A dict with `samples`, the number of samples, and the mean objectives `random` and `patch`; None for an
+        objective that is not finite.
     """
     count = len(scenes.samples)
     chosen = np.unique(np.linspace(0, count - 1, min(count, most or count)).round().astype(int)).tolist()
@@ -49,5 +49,5 @@ def compared(
 
 
 def plain(value: float) -> float | None:
-    """A number rounded to six digits for JSON; None if it is not finite."""
+    """Rounds a number to six significant digits for JSON; returns None if the number is not finite."""
     return float(f"{value:.6g}") if np.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""Several datasets as one, with one compositor for all: the pictures that an attack optimises on."""
+"""Joins several datasets, and their compositors, into one set of samples on which an attack optimises."""
 
 from __future__ import annotations
 
@@ -16,14 +16,23 @@ from gear.values.errors import DatasetError
 
 
 class JoinedCompositor:
-    """The compositors of several datasets, addressed by the indices of `Samples`."""
+    """Puts patches into the samples of several datasets; samples are addressed by their index in the joined set of
+    samples.
+    """
 
     def __init__(self, samples: Samples, compositors: Sequence[Compositor]) -> None:
         self._samples, self._compositors = samples, tuple(compositors)
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """Composes patches into pictures: (B, 3, H, W) float32 in 0..1. Patches are (3, h, w) for all samples, or
-        (B, 3, h, w) with one per sample.
+        """Puts patches into the pictures of one camera.
+
+        Args:
+            patches: one tensor per surface, (3, h, w) for all samples or (B, 3, h, w) with one patch per sample.
+            samples: indices of the B samples.
+            view: name of the camera.
+
+        Returns:
+            (B, 3, H, W) float32 pictures in 0..1.
         """
         places = [self._samples.places[index] for index in samples]
         if len({dataset for dataset, _ in places}) == 1:
@@ -39,8 +48,8 @@ def check_joined(datasets: Sequence[Dataset[Any]]) -> None:
     """Checks that one set of patches fits all datasets.
 
     Raises:
-        DatasetError: the datasets differ in task, picture size or number of surfaces, have no surface, or one already
-            shows patches, so that its pictures give no clean predictions.
+        DatasetError: the datasets differ in task, picture size or number of surfaces; a dataset has no surface; or a
+            dataset shows an adversarial patch, so clean predictions are not available.
     """
     first = datasets[0]
     facts = [_facts(dataset) for dataset in datasets]

@@ -1,4 +1,4 @@
-"""The folder of an attack: existing patches, leftovers of interrupted runs, and what is deleted at the end."""
+"""The folder of an attack: reads finished patches, detects unfinished attacks, and deletes temporary files."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from gear.values.serial import Json, from_json
 from gear.verbs.attack.monitor import CHECKPOINT
 
 VERIFY = "verify"
-"""Folder of the rendered check, inside the patch folder."""
+"""Subfolder of the patch folder for the results of `gear attack --verify`."""
 
 NOTES = "attack.json"
 
 BEGUN = "begun.json"
-"""File with the plan of an unfinished attack, because the checkpoint only has the hash of the plan."""
+"""File with all inputs of an unfinished attack; the checkpoint contains only their hash."""
 
 FED = {"data", "validation", "calibration", "calibration_samples"}
-"""Keys of a plan that describe the samples; the other keys describe the method."""
+"""Keys of an attack's plan (all its inputs) that describe the samples; the other keys describe the method."""
 
 EXACT = "patch.safetensors"
 
@@ -44,11 +44,15 @@ TOLD: Any = {
     "steps_done": int, "steps_per_s": float | None, "stopped": str, "masking": dict[str, float] | None,
     "patches": dict[str, str],
 }  # fmt: skip
-"""Keys of a finished record, besides the plan, that are read again."""
+"""Types of the keys of `attack.json`, besides the inputs of the attack, that a later run reads."""
 
 
 def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
-    """Returns the record of finished patches in the folder; if there are none, writes the plan and returns None.
+    """Prepares the patch folder of an attack.
+
+    Returns:
+        The content of `attack.json` if the folder has finished patches of this attack. Otherwise None, after the plan
+        (all inputs of the attack) is written.
 
     Raises:
         OutdatedError: the folder has finished or unfinished patches of the same method for other samples.
@@ -78,7 +82,7 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
 
 
 def read_patches(root: Path) -> tuple[Patch, ...]:
-    """The exact values of finished patches.
+    """Reads the finished patches of a folder with their exact float32 values (`patch.safetensors`).
 
     Raises:
         ReplaceableError: the file is missing or damaged.
@@ -94,13 +98,13 @@ def read_patches(root: Path) -> tuple[Patch, ...]:
 
 
 def tidy(root: Path) -> None:
-    """Deletes the files that only an unfinished attack needs."""
+    """Deletes the files that only an unfinished attack needs, such as its checkpoint."""
     remove_files(root, [CHECKPOINT, BEGUN])
     clear_scratch(root)
 
 
 def _check_begun(root: Path, wanted: Json) -> None:
-    """Checks that an unfinished attack in the folder does not differ only in its samples.
+    """Checks that an unfinished attack in the folder was not begun with the same method on other samples.
 
     Any other difference is found by `Recorder.resume`, which compares the hash of the plan.
 

@@ -1,4 +1,4 @@
-"""An attack whose inputs are all looked up and checked before anything is computed."""
+"""Opens and checks all inputs of an attack before anything is computed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from gear.verbs.attack.models import FLAG, check_attack, check_gradient, choose_
 from gear.verbs.attack.request import AttackRequest
 
 STEPS = 300
-"""Steps of an attack for which neither steps nor queries are given."""
+"""Number of steps if the user gives neither steps nor queries."""
 
 TRAINING = ("train", "finetuning", "debug")
 VALIDATION = ("val",)
@@ -40,21 +40,22 @@ VALIDATION = ("val",)
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Job:
-    """An attack with all inputs looked up and checked.
+    """All inputs of an attack, opened and checked.
 
     Attributes:
-        datasets, validation: data on which patches are optimised, and validated.
-        task: name of their task.
-        surfaces: number of surfaces in each sample, which is the number of patches.
+        datasets, validation: datasets on which patches are optimised, and datasets on which patches are validated.
+        task: name of the task of all datasets.
+        surfaces: number of patch surfaces in each sample, which is the number of patches.
         models: the attacked models.
-        guard: the defense that the attack is adaptive to, with its calibration data.
-        found, spec: plugin and spec of the attack.
-        options, config: options of the attack, as given and as read.
-        compositor: name of the compositor.
-        steps, queries: the budget.
-        every, patience: steps between validations, and validations without improvement before the attack stops.
+        guard: the defense that the attack takes into account, with its calibration data.
+        found, spec: plugin of the attack and its spec.
+        options, config: options of the attack, as the user gave them and as a config object.
+        compositor: name of the compositor that puts patches into pictures.
+        steps, queries: largest number of optimisation steps, and of forward passes (None: not limited).
+        every, patience: steps between two validations, and number of validations without improvement after which the
+            attack stops (0: never).
         seed: seed of all random draws.
-        weights: weights of the terms that lower the defense's score and mask.
+        weights: weights of the loss terms that lower the defense's score and mask.
     """
 
     datasets: Sequence[Dataset[Any]]
@@ -76,8 +77,12 @@ class Job:
     weights: DefenseWeights
 
     def plan(self, weights_sha256: str | None, product: Any) -> Json:
-        """Everything that decides the patches; a later run with an equal plan reuses them. It includes the hash of the
-        network's weights.
+        """Returns everything on which the patches depend, as JSON; a later run with an equal plan reuses the
+        patches.
+
+        Args:
+            weights_sha256: hash of the weights of the attacked networks.
+            product: the attack object, which may name the hash of the files that it reads.
         """
         learnt = self.guard.calibration
         read = product.read_sha256() if isinstance(product, WithInputFiles) else None
@@ -108,7 +113,7 @@ class Job:
 
 
 def resolve(request: AttackRequest, on_fit_progress: Progress) -> Job:
-    """Opens, looks up and checks everything that a request names.
+    """Opens and checks everything that a request names: datasets, models, defense and attack.
 
     Raises:
         GearError: something does not exist, or two inputs do not fit together.
@@ -153,11 +158,13 @@ def resolve(request: AttackRequest, on_fit_progress: Progress) -> Job:
 
 
 def _usable(compositor: str, spec: AttackSpec[Any], datasets: Sequence[Dataset[Any]]) -> str:
-    """The compositor of the request; `homography` if `transport` was requested, probes are missing, and the attack does
-    not need them.
+    """Returns the name of the compositor: the requested one, or `homography` if `transport` cannot be used.
+
+    `transport` needs probes, samples rendered with each surface black and white. Only attacks that do not require
+    probes switch to `homography`.
 
     Raises:
-        DatasetError: the attack needs probes and there are none.
+        DatasetError: the attack requires probes and a dataset has none.
     """
     lacking = next((dataset for dataset in datasets if not dataset.plan.auxiliary), None)
     if compositor != "transport" or lacking is None:
@@ -183,10 +190,10 @@ def _facts(dataset: Dataset[Any]) -> Json:
 
 
 def _task_of(data: Sequence[str | Path]) -> str:
-    """The task of the first dataset that the paths refer to.
+    """Returns the task of the first dataset that the paths refer to.
 
     Raises:
-        DatasetError: there is no dataset, or it does not record its task.
+        DatasetError: there is no dataset, or the dataset does not record its task.
     """
     for path in data:
         for root in roots_of(root_and_split(path)[0]):

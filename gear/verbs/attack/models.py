@@ -1,4 +1,4 @@
-"""The attacked model: one, several together, or one guarded by a defense."""
+"""Builds the model that is attacked: one network, several networks together, or networks guarded by a defense."""
 
 from __future__ import annotations
 
@@ -26,14 +26,16 @@ from gear.values.errors import GearError
 from gear.values.rng import derive_rng
 
 FLAG = "--model-set "
-"""Flag for options of the models; `--set` is for options of the attack."""
+"""Flag for options of the models, for messages; `--set` is for options of the attack."""
 
 
 def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Sequence[Dataset[Any]]) -> list[Chosen]:
-    """Looks up every model with the same options and checks it against the datasets.
+    """Finds the plugins of all models, with the same options for each, and checks that the models fit the
+    datasets.
 
     Raises:
-        GearError: a model does not exist, an option does not fit, a model is named twice, or it does another task.
+        GearError: a model does not exist, an option does not fit, a model is named twice, or a model is for another
+            task.
     """
     if not names:
         raise GearError("name a model to attack: --model NAME (gear plugins --kind model lists them)")
@@ -47,10 +49,10 @@ def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Seque
 
 
 def check_gradient(defense: Chosen | None, attack: AttackSpec[Any]) -> None:
-    """Checks that the defense, if there is one, passes the gradient that the attack needs.
+    """Checks that the defense, if there is one, is differentiable where the attack needs gradients.
 
     Raises:
-        GearError: the defense passes no gradient.
+        GearError: the attack needs gradients and the defense passes none.
     """
     if defense is None:
         return
@@ -66,11 +68,12 @@ def check_gradient(defense: Chosen | None, attack: AttackSpec[Any]) -> None:
 def check_attack(
     found: PluginEntry, models: Sequence[Chosen], task: str, surfaces: int, queries: int | None
 ) -> AttackSpec[Any]:
-    """Checks that the attack supports the task, the surfaces, the models and the budget.
+    """Checks that the attack supports the task, the number of surfaces, the models and the budget; returns its
+    spec.
 
     Raises:
         GearError: the attack is for other tasks or for fewer surfaces, needs gradients that a model does not give, or
-            needs a budget of queries.
+            `queries` is missing or not allowed for this attack.
     """
     spec = found.spec
     assert isinstance(spec, AttackSpec)
@@ -95,16 +98,19 @@ def check_attack(
 def build_model(
     models: Sequence[Chosen], guard: OpenedGuard, seed: int, weights: DefenseWeights = USUAL_WEIGHTS
 ) -> Model:
-    """The model for `Attack.optimise`. A defense that needs calibration is calibrated for each model separately.
+    """Builds the model that is passed to `Attack.optimise`.
+
+    A defense that needs calibration is calibrated for each model separately.
 
     Args:
         models: the attacked models.
-        guard: the defense to which the attack is adaptive.
+        guard: the defense that the attack takes into account, with its calibration data.
         seed: seed of the calibration.
-        weights: weights of the terms that lower the defense's score and mask.
+        weights: weights of the loss terms that lower the defense's score and mask.
 
     Raises:
-        GearError: the defense has neither cleaned pictures nor a differentiable score or mask that an attack could use.
+        GearError: the defense neither changes pictures nor has a differentiable score or mask, so the attack could not
+            take it into account.
     """
     built: dict[str, Model] = {}
     short = [chosen.found.spec.name for chosen in models]
@@ -120,7 +126,7 @@ def build_model(
 
 
 def _behind(opened: OpenedGuard, model: Model, cameras: Sequence[str], seed: int, weights: DefenseWeights) -> Defended:
-    """A model guarded by a defense, which is calibrated when it is used for the first time."""
+    """Wraps a model with a defense; the defense is calibrated when it is used for the first time."""
     defense, calibration = opened.defense, opened.calibration
     assert defense is not None
     product: Defense = build(defense.found, defense.options)

@@ -1,4 +1,4 @@
-"""Monitors an attack: curves, checkpoints, validation, early stopping."""
+"""Monitors a running attack: records curves, writes checkpoints, validates patches and stops early."""
 
 from __future__ import annotations
 
@@ -30,31 +30,33 @@ NOTED: Any = {
     "key": str, "done": int, "queries_left": float | None, "curves": dict[str, tuple[float, ...]],
     "judged": tuple[tuple[int, float], ...], "seconds": float,
 }  # fmt: skip
-"""Keys of the notes in a checkpoint; the arrays of a checkpoint are those of the attack."""
+"""Types of the JSON values in the header of a checkpoint; the arrays of the file are the state of the attack."""
 
 Judge = Callable[[tuple[Patch, ...]], float]
 
 
 @dataclass(eq=False, kw_only=True)
 class Recorder:
-    """A `gear.contracts.attacks.Monitor` that writes into the folder of the attack.
+    """The monitor that an attack calls after every step; it writes into the folder of the attack
+    (`gear.contracts.attacks.Monitor`).
 
     Attributes:
-        root: the folder.
-        key: hash of the plan; a checkpoint with another key is refused.
-        steps: budget of steps.
-        judge: computes the harm of patches on validation samples; None without validation.
+        root: folder of the attack.
+        key: hash of the plan (all inputs of the attack); a checkpoint with another hash is refused.
+        steps: largest number of steps.
+        judge: function that computes the harm (mean objective) of patches on validation samples; None without
+            validation.
         every: steps between two validations.
         patience: validations without improvement after which the attack stops; 0 for never.
-        queries: budget of queries, for attacks that count queries.
-        on_progress: called with the finished and the allowed steps, or queries.
-        curves: values by name, one per step.
+        queries: largest number of forward passes, for attacks that count them.
+        on_progress: called with the finished and the allowed number of steps, or of queries.
+        curves: recorded values by name, one per step.
         judged: (step, harm) of every validation.
-        best: patches with the largest harm in a validation.
-        is_asked: whether the attack uses the return value of `step`.
-        done: finished steps, over all runs.
-        stopped: why the attack ended before its budget.
-        seconds: time spent so far, over all runs.
+        best: the patches with the largest harm in a validation.
+        is_asked: whether the attack has called `resume`, as attacks that report their steps do.
+        done: number of finished steps, over all runs.
+        stopped: why the attack ended before its budget was used; empty if it did not.
+        seconds: time spent, over all runs.
     """
 
     root: Path
@@ -79,6 +81,9 @@ class Recorder:
 
     def resume(self) -> State | None:
         """Loads the checkpoint of an interrupted attack, with its curves and validations.
+
+        Returns:
+            The arrays that the attack saved, by name; None if there is no checkpoint.
 
         Raises:
             ReplaceableError: the checkpoint belongs to another attack.
@@ -112,8 +117,16 @@ class Recorder:
         patches: Callable[[], tuple[Patch, ...]],
         state: Callable[[], State],
     ) -> bool:
-        """Records the values of a step, and validates and saves when it is time. Returns True when validation says
-        to stop.
+        """Records one finished step; validates the patches and writes a checkpoint when these are due.
+
+        Args:
+            done: number of finished steps.
+            values: values of this step by name, such as the objective.
+            patches: function that returns the current patches.
+            state: function that returns the arrays from which the attack can continue.
+
+        Returns:
+            Whether the attack must stop, because validation no longer improves.
         """
         self.done = done
         for name, value in values.items():
@@ -129,21 +142,21 @@ class Recorder:
         return bool(self.stopped)
 
     def tell(self, done: int, queries_left: float | None = None) -> None:
-        """Reports the progress: in queries where they are counted, in steps otherwise."""
+        """Reports the progress to `on_progress`: in queries if the attack counts them, otherwise in steps."""
         if self.queries is None:
             self.on_progress(done, self.steps)
         else:
             self.on_progress(0 if queries_left is None else self.queries - int(queries_left), self.queries)
 
     def finish(self, done: int, last: tuple[Patch, ...]) -> None:
-        """Validates the last patches if the attack ended between two validations, for example because its queries were
-        used up.
+        """Validates the last patches if the attack ended between two validations, for example because its queries
+        were used up.
         """
         if self.judge is not None and (not self.judged or self.judged[-1][0] != done):
             self._validate(done, last)
 
     def save(self, done: int, state: State) -> None:
-        """Writes the checkpoint, whole or not at all; does nothing for an attack without state."""
+        """Writes the checkpoint atomically; does nothing if the attack has no state to save."""
         self._saved = time.monotonic()
         if not state:
             return
@@ -161,7 +174,7 @@ class Recorder:
         write_whole(self.root, CHECKPOINT, to_bytes(arrays, {"notes": json.dumps(notes)}))
 
     def clock(self) -> float:
-        """Seconds spent so far, over all runs."""
+        """Returns the seconds spent on the attack so far, over all runs."""
         now = time.monotonic()
         self.seconds, self._since = self.seconds + now - self._since, now
         return self.seconds
@@ -178,10 +191,11 @@ class Recorder:
 
 
 def _best(arrays: State, *, is_judged: bool) -> tuple[Patch, ...]:
-    """The patches of a checkpoint with the largest harm; none before the first validation.
+    """Returns the patches with the largest harm from the arrays of a checkpoint; an empty tuple before the first
+    validation.
 
     Raises:
-        ValueError: the arrays are not those of such a checkpoint.
+        ValueError: the arrays are not those of a checkpoint with patches.
     """
     names = sorted((name for name in arrays if name.startswith(BEST)), key=surface_of)
     if is_judged and not names:
@@ -193,5 +207,7 @@ def _best(arrays: State, *, is_judged: bool) -> tuple[Patch, ...]:
 
 
 def _worth(harm: float) -> float:
-    """The harm as a number that can be compared; harm that could not be measured is below all measured harm."""
+    """Returns the harm as a comparable number; NaN, which means that it could not be measured, becomes minus
+    infinity.
+    """
     return -math.inf if math.isnan(harm) else harm

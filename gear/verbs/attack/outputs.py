@@ -1,4 +1,4 @@
-"""The files of a patch folder: pictures to print, exact values, and a record of the attack."""
+"""Writes the files of a patch folder: pictures to print, exact values, figures, and a record of the attack."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from gear.values.frames import UInt8Image
 from gear.values.serial import Json
 
 SHOWN_PX = 1024
-"""Largest width of a picture in the figure; three pairs of pictures with 2048 pixels make a file of 14 MB."""
+"""Largest width in pixels of a picture in `figures/samples.png`; at 2048 pixels the file would have 14 MB."""
 
 BLUE, RED, GREY = "#1f5fa8", "#b3402a", "0.55"
 
 
 def write_patches(root: Path, patches: Sequence[Patch], notes: Json) -> None:
-    """Writes `patch_0.png`, …, `patch.safetensors` and, last, `attack.json`, which marks the folder as complete."""
+    """Writes `patch_0.png`, …, then `patch.safetensors`, and last `attack.json`, which marks the folder as complete."""
     for patch in patches:
         write_whole(root, f"{patch.name}.png", encode_rgb(as_picture(patch)))
     exact = {patch.name: np.ascontiguousarray(patch.rgb, np.float32) for patch in patches}
@@ -33,14 +33,14 @@ def write_patches(root: Path, patches: Sequence[Patch], notes: Json) -> None:
 
 
 def as_picture(patch: Patch) -> UInt8Image:
-    """A patch as a (H, W, 3) uint8 sRGB picture to print."""
+    """Returns a patch as a printable (H, W, 3) uint8 sRGB picture."""
     return np.asarray(np.floor(np.clip(patch.rgb, 0, 1) * 255 + 0.5).astype(np.uint8))
 
 
 def write_curves(
     root: Path, title: str, curves: Mapping[str, Sequence[float]], judged: Sequence[tuple[int, float]]
 ) -> None:
-    """Writes `figures/curves.png`: every value over the steps, and the validations."""
+    """Writes `figures/curves.png`: every recorded value over the steps, and the harm on the validation samples."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -68,8 +68,9 @@ def write_curves(
 
 
 def write_samples(root: Path, pairs: Sequence[tuple[UInt8Image, UInt8Image]]) -> None:
-    """Writes `figures/samples.png`: pairs of pictures without and with the patches, one pair per row; large
-    pictures are resized.
+    """Writes `figures/samples.png`, one row per sample: the picture without patches and the picture with patches.
+
+    Pictures wider than `SHOWN_PX` are resized.
     """
     rows = [np.concatenate([_shown(picture) for picture in pair], axis=1) for pair in pairs]
     if rows:
@@ -85,7 +86,7 @@ def _shown(picture: UInt8Image) -> UInt8Image:
 
 
 def _smoothed(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Steps, and a moving average over a twentieth of them."""
+    """Returns the steps and the values, each as a moving average over a twentieth of the steps."""
     known = np.isfinite(values)
     width = max(1, int(known.sum()) // 20)
     kernel = np.ones(width) / width

@@ -1,4 +1,4 @@
-"""The result of an attack."""
+"""The result of `gear.attack`."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class AttackReport:
-    """The result of an attack.
+    """The result of `gear.attack`.
 
     Attributes:
         out: the patch folder.
-        patches: patches, one per surface.
-        facts: content of `attack.json`.
-        made: whether this run made the patches; False if they existed already.
+        patches: the optimised patches, one per surface.
+        facts: content of `attack.json`: all inputs and results.
+        made: True if this run made the patches; False if finished patches already existed.
     """
 
     out: Path
@@ -29,7 +29,7 @@ class AttackReport:
     made: bool
 
     def summary(self) -> str:
-        """The result as a few lines of text."""
+        """Returns the result as a few lines of text."""
         done = self.facts["steps_done"]
         lines = [
             f"{self.out}: {len(self.patches)} patch{'es' * (len(self.patches) > 1)} after {done} steps"
@@ -52,7 +52,7 @@ class AttackReport:
 
     @property
     def next_command(self) -> str:
-        """The command that collects test pictures of the scene with the patches in it."""
+        """The `gear collect` command that renders test pictures of the scene with these patches."""
         town, _, scene = self.facts["data"][0]["scene"].partition("/")
         is_ours = (data_dir("mjcf") / "towns" / f"{town}.xml").is_file()
         words = ["gear", "collect", "--task", self.facts["task"], "--scene", scene, "--split", "test"]
@@ -60,7 +60,7 @@ class AttackReport:
         return shlex.join([*words, *where, "--patch", str(self.out)])
 
     def _achieved(self) -> list[str]:
-        """A line with the objective for these patches and for random ones."""
+        """Returns one line per group of samples, with the objective for random patches and for these patches."""
         lines = []
         for name, found in (self.facts.get("achieved") or {}).items():
             if found is not None and None not in (found["random"], found["patch"]):

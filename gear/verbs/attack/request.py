@@ -1,4 +1,6 @@
-"""The arguments of `gear.attack`, and of the check that renders a finished patch (`VerifyRequest`)."""
+"""The arguments of `gear.attack` (`AttackRequest`), and of the check that renders finished patches
+(`VerifyRequest`).
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttackRequest:
-    """The arguments of `gear.attack`, which documents them; `guard` is the defense with its calibration data.
+    """The arguments of `gear.attack`, which describes each of them; `guard` combines the defense with its
+    calibration data.
 
     Raises:
         GearError: a number is out of range.
@@ -51,17 +54,17 @@ class AttackRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerifyRequest:
-    """A rendered check of a patch folder.
+    """The arguments of the check that renders finished patches in a held-out dataset.
 
     Attributes:
         out: the patch folder.
-        data: root of a dataset of the scene with probes, or `DIR:SPLIT`; not a dataset on which the patches were
-            optimised or validated.
+        data: root of a dataset with probes (`gear collect --probes`), or `DIR:SPLIT`; the patches must not have been
+            optimised or validated on it.
         models: names of model plugins.
-        model_settings: `KEY=VALUE` texts for their options.
+        model_settings: `KEY=VALUE` texts for the models' options.
         guard: the defense that guards the models; None for no defense.
-        samples: number of samples, counted from the first one; all by default.
-        town, scenes: files of the town and of its scene library, for towns that are not part of gear.
+        samples: number of samples, counted from the first; all by default.
+        town, scenes: MJCF file of the town and file of its scene library, for towns that are not part of gear.
     """
 
     out: str | Path

@@ -1,4 +1,4 @@
-"""`gear.attack`: resolves a request, optimises patches, writes a patch folder."""
+"""`gear.attack`: checks the inputs, optimises patches and writes a patch folder."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class _Made:
     """The result of an optimisation.
 
     Attributes:
-        patches: the best patches in validation, or the last ones.
-        settings: settings of the attack, completed by the task.
-        seen: samples that were optimised on.
+        patches: the best patches in validation, or the last ones without validation.
+        settings: settings of the attack, completed with the task's values.
+        seen: samples on which the patches were optimised.
         objective: the objective that was maximised.
         held, held_objective: validation samples and the objective on them.
         recorder: monitor of the attack.
@@ -99,14 +99,14 @@ def attack(
     on_fit_progress: Progress | None = None,
     on_warning: Warn | None = None,
 ) -> AttackReport:
-    """Optimises patches for the surfaces of a scene; resumes an interrupted run.
+    """Optimises adversarial patches for the surfaces of a scene; resumes an interrupted run.
 
     The folder `out` gets `patch_0.png`, … for printing and for `gear collect --patch OUT`, the exact values in
     `patch.safetensors`, `attack.json` with all inputs and results, and figures.
 
     Args:
-        data: datasets with probes (`gear collect --probes`), all of one task; with several datasets one patch is
-            optimised for all of them.
+        data: datasets with probes (`gear collect --probes`), all of one task; with several datasets, the same patches
+            are optimised for all of them.
         model: name of a model plugin, or several names for an attack on all of them at once.
         out: the patch folder.
         attack: name of an attack plugin.
@@ -117,11 +117,11 @@ def attack(
         defense: name of a defense plugin that the attack takes into account.
         defense_settings: `KEY=VALUE` texts for the defense's options.
         calibration: dataset without patches on which the defense is calibrated.
-        calibration_patched: the same dataset with patches.
-        val: datasets for validation; the patches that do best on them are kept.
+        calibration_patched: the calibration dataset rendered with patches.
+        val: datasets for validation; the result is the patches with the largest objective on these datasets.
         every: number of steps between two validations.
         patience: number of validations without improvement after which the attack ends; 0 for never.
-        compositor: `transport`, or `homography`, which needs no probes.
+        compositor: method that puts patches into pictures: `transport`, or `homography`, which needs no probes.
         seed: seed of all random draws.
         score_weight: weight of the term that lowers the defense's score; 0 for no such term.
         mask_weight: weight of the term that lowers the defense's mask on the patch; 0 for no such term.
@@ -162,12 +162,12 @@ def attack(
 
 
 def unit_of(request: AttackRequest) -> str:
-    """The unit of an attack's progress: steps or queries."""
+    """Returns the unit that an attack's progress counts: `step` or `query`."""
     return "step" if request.queries is None else "query"
 
 
 def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
-    """Runs a request; `attack` documents it.
+    """Runs an attack with the arguments in `request`, which `gear.attack` describes.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -197,13 +197,13 @@ def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
 
 
 def as_tuple(paths: Paths) -> tuple[str | Path, ...]:
-    """One path or several as a tuple."""
+    """Returns one path, or a sequence of paths, as a tuple."""
     return (paths,) if isinstance(paths, (str, Path)) else tuple(paths)
 
 
 def _warn(job: Job, on_warning: Warn) -> None:
-    """Warns of pictures that are larger or smaller than those that a model was trained on, and of doubtful calibration
-    data.
+    """Warns if the pictures have another size than those a model was trained on, or if the calibration data are
+    doubtful.
     """
     sizes = (size_note(model, job.datasets[0], FLAG) for model in job.models)
     for note in (*sizes, *job.guard.calibration.doubts()):
@@ -212,7 +212,7 @@ def _warn(job: Job, on_warning: Warn) -> None:
 
 
 def _asked(job: Job) -> list[PluginEntry]:
-    """The plugins whose code runs in the attack, for error messages."""
+    """Returns the plugins whose code runs in the attack, for error messages."""
     return [one.found for one in (*job.models, job.guard.defense) if one is not None]
 
 

@@ -1,4 +1,4 @@
-"""Samples with their compositor, and the effect of patches on them."""
+"""Samples with the compositor that puts patches into them, and the effect of patches on these samples."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ RANDOM_PX = (32, 64)
 """Height and width of the random patches with which gradients are checked."""
 
 PICTURES = "defense_pictures"
-"""Name of the gradient that reaches the model through a defense's pictures."""
+"""Name of the gradient of a defense's output pictures with respect to the patches."""
 
 KEPT_BYTES = 2 << 30
 SHOWN = 3
-"""Number of samples in the figure and in the check for masked gradients."""
+"""Number of samples in `figures/samples.png` and in the checks of gradients."""
 
 
 class Scenes:
-    """Samples with the compositor that composes patches into them."""
+    """The samples of an attack, with the compositor that puts patches into them."""
 
     def __init__(self, datasets: Sequence[Dataset[Any]], compositor: str, device: str, cache: Cache[Prepared]) -> None:
         """Args:
@@ -54,7 +54,9 @@ class Scenes:
     def harm(
         self, model: Model, objective: Objective, patches: Sequence[Patch], indexes: Sequence[int] | None = None
     ) -> float:
-        """Mean of the objective over the samples, or over some of them, for patches without random transforms."""
+        """Returns the mean objective over the samples (or over those in `indexes`), with patches that are not
+        randomly transformed.
+        """
         chosen = range(len(self.samples)) if indexes is None else indexes
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         with torch.no_grad(), frozen(model):
@@ -62,15 +64,18 @@ class Scenes:
         return float(np.mean(values))
 
     def value(self, model: Model, objective: Objective, patches: Sequence[Tensor], indexes: Sequence[int]) -> Tensor:
-        """Mean of the objective over some of the samples."""
+        """Returns the mean objective over the samples in `indexes` as a differentiable scalar."""
         samples = [self.samples[index] for index in indexes]
         views = {view: self.compositor.compose(patches, indexes, view) for view in samples[0].images}
         numbers = counted(objective, model, views, samples, indexes)
         return torch.stack(numbers).sum() if numbers else torch.zeros(())
 
     def masking(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> tuple[float, float]:
-        """The change that the gradient at the patches predicts for a small step, and the change that the step
-        causes.
+        """Checks for masked gradients: takes a small step along the gradient of the objective with respect to the
+        patches.
+
+        Returns:
+            The change of the objective that the gradient predicts, and the change that the step really causes.
         """
         indexes = list(range(min(SHOWN, len(self.samples))))
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
@@ -78,10 +83,11 @@ class Scenes:
             return promised_and_kept(lambda changed: self.value(model, objective, changed, indexes), tensors)
 
     def check_adaptive(self, model: Model, surfaces: int, rng: np.random.Generator) -> None:
-        """Checks that the pictures, scores and masks of the defenses have a gradient with respect to random patches.
+        """Checks that the pictures, scores and masks of the defenses have a gradient with respect to random
+        patches.
 
         Raises:
-            GearError: one of them has a gradient of 0, so an attack would not be adaptive to it.
+            GearError: one of these gradients is 0, so the attack would not be adaptive to the defense.
         """
         patches = [
             torch.from_numpy(rng.uniform(0.05, 0.95, (3, *RANDOM_PX)).astype(np.float32)) for _ in range(surfaces)
@@ -109,8 +115,11 @@ class Scenes:
                 )
 
     def _gradients(self, member: Defended, patches: Sequence[Tensor], index: int) -> dict[str, float]:
-        """Largest entry of the gradient with respect to the patches in one sample, for each term of a defense and for a
-        random projection of its pictures.
+        """Computes the gradients of a defense's outputs with respect to the patches in one sample.
+
+        Returns:
+            The largest absolute entry of the gradient, for each loss term of the defense and for a random projection of
+            its pictures.
         """
         asked = [patch.clone().requires_grad_(True) for patch in patches]
         sample = self.samples[index]
@@ -130,7 +139,7 @@ class Scenes:
         return sizes
 
     def pairs(self, patches: Sequence[Patch]) -> list[tuple[UInt8Image, UInt8Image]]:
-        """A few pictures without and with the patches."""
+        """Returns a few samples as (picture without patches, picture with patches), each (H, W, 3) uint8 RGB."""
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         found = []
         for index in np.linspace(0, len(self.samples) - 1, min(SHOWN, len(self.samples))).astype(int).tolist():

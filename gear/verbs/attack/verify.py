@@ -1,4 +1,4 @@
-"""The rendered check of an attack: its patches are rendered in the world, in samples that the attack did not use."""
+"""Checks finished patches by rendering them in the 3D world, in samples that the attack did not use."""
 
 from __future__ import annotations
 
@@ -22,11 +22,18 @@ from gear.verbs.attack.request import VerifyRequest
 
 
 def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[str | Path] = ()) -> None:
-    """Checks that a dataset exists, has probes, no patch and as many surfaces as patches, and shows no scene on which
-    the patches were optimised or validated.
+    """Checks that a dataset is suitable for the rendered check of an attack.
+
+    It must exist, have probes (samples rendered with the surfaces black and white), show no adversarial patch and have
+    as many surfaces as there are patches. The patches must not be optimised or validated on its samples.
+
+    Args:
+        data: datasets on which the patches are optimised.
+        held: the dataset to check.
+        val: datasets on which the patches are validated.
 
     Raises:
-        GearError: one of these does not hold.
+        GearError: one of these conditions does not hold.
     """
     wanted = open_dataset(*root_and_split(held))
     if not wanted.plan.auxiliary:
@@ -45,17 +52,15 @@ def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[s
 
 
 def verify(request: VerifyRequest, callbacks: Callbacks) -> dict[str, GapReport]:
-    """Renders a patch folder on a held-out dataset, and compares pictures and effect of composed and rendered
-    patches.
+    """Renders finished patches in a held-out dataset, and compares composed and rendered patches in pictures and
+    in their effect.
 
-    A defense draws its random numbers from the seed of the attack, so that a calibrated defense is the one that was
-    attacked.
-
-    The folder `out/verify/<scene>-<split>-<hash>`, one per dataset, gets `<model>/gap.json` and `gap.txt` of each
-    model, and the rendered twin in the folder of the first model.
+    A defense draws its random numbers from the seed of the attack, so a calibrated defense is the same one that was
+    attacked. The folder `out/verify/<scene>-<split>-<hash>` gets `<model>/gap.json` and `gap.txt` for each model; the
+    rendered dataset lies in the folder of the first model.
 
     Returns:
-        Reports by model.
+        One report per model, by the model's name.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.

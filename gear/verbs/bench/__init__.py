@@ -1,1 +1,1 @@
-"""`gear bench`: patches, networks and defenses compared over scenes, as one run."""
+"""The verb `bench`: compares networks, defenses and patches over several scenes in one run."""

@@ -1,4 +1,4 @@
-"""A bar chart of a task's metric: one group per network and defense, one bar per kind of patch."""
+"""A bar chart of a task's metric: one group of bars per network and defense, one bar per kind of patch."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from gear.verbs.evaluate.report import Estimate
 
 COLOURS = {NO_PATCH: "#2f7d4f", RANDOM: "#8b95a1", PATCH: "#b3402a", ADAPTIVE: "#7a2d8c"}
 FURTHER = ("#c98a2b", "#1f5fa8", "#5c6b7a", "#9a5b3c", "#3c8c8c", "#a05c8a", "#6b7a2b")
-"""Colours of the bars for patches that were optimised against other networks."""
+"""Bar colours for patches that were optimised against other networks (transfer)."""
 
 BAR_IN, GAP_IN, EDGE_IN, WIDTH_IN = 0.16, 0.14, 0.9, 8.0
 
 
 def chart(task: TaskResult, form: Literal["svg", "pdf", "png"]) -> bytes:
-    """Draws the chart as PNG bytes, with 95 % intervals if they are known. Equal results give equal bytes."""
+    """Draws the chart as SVG, PDF or PNG bytes, with 95 % intervals where they are known. Equal results give equal
+    bytes.
+    """
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

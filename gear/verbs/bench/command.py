@@ -1,4 +1,4 @@
-"""The command line that is equivalent to a step of a bench."""
+"""Writes a step of a benchmark as the equivalent `gear` command line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FLAGS: dict[str, str] = {
     "calibration_patched": "calibration-patched",
     "reports": "report",
 }
-"""Flags whose name differs from the argument's."""
+"""Names of the flags that differ from the name of the Python argument, by argument."""
 
 ONCE: dict[Verb, tuple[str, ...]] = {"evaluate": ("data",)}
 """Arguments whose values all follow one flag; for other arguments the flag is repeated."""
@@ -24,7 +24,7 @@ ONLY_IN_PYTHON = ("pools",)
 
 
 def command(step: Step) -> str:
-    """The command line of a step, quoted for a POSIX shell."""
+    """Returns the command line of a step, quoted for a POSIX shell."""
     return shlex.join(["gear", step.verb, *_words(step)])
 
 

@@ -1,4 +1,4 @@
-"""The bench config: which networks and defenses are compared, in which scenes, against which patches."""
+"""The bench config: which networks and defenses are compared, in which scenes, and against which patches."""
 
 from __future__ import annotations
 
@@ -19,12 +19,10 @@ from gear.values.errors import FieldError
 LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 WORD = re.compile(r"[-+]?[\w./](?:[\w./+=, -]*[\w./+=,-])?")
-"""Pattern of texts that need no quotes in YAML, except null: mainly numbers, names and paths."""
+"""Pattern of values that need no quotes in YAML, such as numbers, names and paths; `null` also matches."""
 
 TAKEN = frozenset(CONTROLS)
-"""Names of kinds of pictures, which networks cannot have: pictures with a network's patch are named after
-the network.
-"""
+"""Names that networks must not have: `none` and `random` already name the pictures without and with a random patch."""
 
 MOST_SAMPLES = 100_000
 
@@ -35,7 +33,8 @@ def _nothing() -> Node:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contestant:
-    """A network or a defense with its options; the bench config gives it a name.
+    """A network or a defense of the benchmark, with its options; its key in the bench config is its name in
+    tables.
 
     Attributes:
         plugin: name of the plugin; by default the name in the bench config.
@@ -51,9 +50,9 @@ class TaskBench:
     """The networks and defenses that are compared in one task.
 
     Attributes:
-        models: networks, by the names that tables show.
+        models: networks, by their names in the tables.
         defenses: defenses by name; each guards every network, and every network is also measured without a defense.
-        collect: further keys of this task's collections.
+        collect: further collection settings for this task's pictures.
     """
 
     models: dict[str, Contestant]
@@ -121,10 +120,10 @@ class AttackBench:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
-    """The scene in which defenses are calibrated; it must not be one that is measured.
+    """The scene in which defenses are calibrated; it must not be one of the measured scenes.
 
     Attributes:
-        town: name of its town.
+        town: name of the town of this scene.
         scene: name of the scene.
     """
 
@@ -134,19 +133,19 @@ class Calibration:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BenchConfig:
-    """A whole bench.
+    """The configuration of a whole benchmark.
 
     Attributes:
         tasks: networks and defenses to compare, by name of the task plugin.
-        places: scenes by town; an empty list means every scene of the town that has a surface for patches.
-        weathers: weather presets, or presets with changed fields; one patch is made for all weathers.
+        places: names of scenes, by town; an empty list means every scene of the town that has a surface for patches.
+        weathers: weather presets, or presets with changed fields; one patch is optimised for all weathers together.
         samples: number of pictures of each scene in each weather.
         attack: the attack that makes the patches.
         calibration: scene in which defenses are calibrated; needed if a defense requires calibration.
-        transfer: whether each network is also measured with the patches against the other networks.
-        adaptive: whether patches are also optimised against every defense that passes the gradients of the attack.
+        transfer: whether each network is also measured with the patches that were optimised against the other networks.
+        adaptive: whether patches are also optimised against each network behind each defense that supports this attack.
         seed: seed of all random draws.
-        collect: further keys of the collections of all tasks (`gear show-config` prints them).
+        collect: further collection settings for all tasks (`gear show-config` prints the keys).
     """
 
     tasks: dict[str, TaskBench]
@@ -169,7 +168,7 @@ class BenchConfig:
 
 
 def settings_of(node: Node, above: str = "") -> Iterable[str]:
-    """Nested options as `KEY=VALUE` texts, one per option."""
+    """Yields nested options as flat `KEY=VALUE` texts, one per option, such as `augmentation.flip=0`."""
     if isinstance(node, MappingNode) and (node.entries or not above):
         for key, (_, below) in node.entries.items():
             yield from settings_of(below, f"{above}.{key}" if above else key)
@@ -181,7 +180,7 @@ def settings_of(node: Node, above: str = "") -> Iterable[str]:
 
 
 def _quoted(node: Scalar) -> str:
-    """The text quoted so that YAML reads it as the same text."""
+    """Returns the text of a value, quoted where YAML would otherwise read another value."""
     if node.is_null:
         return ""
     is_word = WORD.fullmatch(node.text) and node.text.casefold() != "null"

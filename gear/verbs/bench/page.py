@@ -1,4 +1,6 @@
-"""The report of a bench as one self-contained HTML page: tables, charts, and patches in the rendered world."""
+"""The report of a benchmark as one self-contained HTML page: tables, charts, and pictures of the patches in the
+scenes.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,7 @@ figcaption { font-size: .8rem; color: #5b6672; } .row img { border: 1px solid #c
 
 
 def page(report: BenchReport, plan: Plan) -> str:
-    """The whole page as HTML text. Names from configs are escaped, and the page has no scripts."""
+    """Returns the whole page as HTML text. Names from configs are escaped, and the page has no scripts."""
     facts = report.facts
     counts = plan.config.samples
     where = f"{len(facts['scenes'])} scene{'s' * (len(facts['scenes']) > 1)}, {', '.join(facts['weathers'])}"
@@ -77,7 +79,7 @@ def _table(task: TaskResult) -> str:
 
 
 def _scenes(task: TaskResult) -> str:
-    """A table of the metric in each scene, with one column per kind of patch."""
+    """Returns an HTML table of the metric in each scene, with one column per kind of patch."""
     kinds = list(dict.fromkeys(at.patch for one in task.results for at in one.scenes))
     rows = []
     for one in task.results:
@@ -100,8 +102,9 @@ def _rows(titles: Sequence[str], rows: Iterable[tuple[bool, Sequence[str]]]) -> 
 
 
 def _pictures(plan: Plan, contest: Contest) -> Iterable[str]:
-    """Pictures of each scene without a patch and with each network's patch, for the sample with the most visible patch
-    pixels.
+    """Yields for each scene its pictures without a patch and with each network's patch, as HTML.
+
+    Each scene is represented by the sample in which most pixels of the patch surfaces are visible.
     """
     for scene, weather in plan.places():
         clean = open_dataset(plan.pictures(contest, scene, weather, NO_PATCH))

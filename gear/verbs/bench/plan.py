@@ -1,4 +1,6 @@
-"""The steps of a bench: calls of gear's other verbs in order, and the evaluations that its tables read."""
+"""The plan of a benchmark: the ordered calls of `collect`, `attack` and `evaluate`, and the evaluations that the
+tables need.
+"""
 
 from __future__ import annotations
 
@@ -21,21 +23,23 @@ from gear.verbs.bench.scenes import Scene
 from gear.verbs.bench.validation import Contest, Entrant
 
 RANDOM, PATCH, ADAPTIVE = RANDOM_PATCH, "patch", "adaptive patch"
-"""Kinds of patches: one optimised against the network, and one optimised against the network with its defense."""
+"""Kinds of patches: random, optimised against the network, optimised against the network with its defense."""
 
 SPLITS = {"attack": "train", "choose": "val", "measure": "test", "calibrate": "finetuning"}
-"""Split of the pictures for each purpose."""
+"""Name of the dataset split that is collected for each purpose."""
 
 Verb = Literal["collect", "attack", "evaluate"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """One call of a verb. A step resumes an interrupted run, and returns quickly if its results exist.
+    """One step of a benchmark: a call of `gear.collect`, `gear.attack` or `gear.evaluate`.
+
+    A step resumes an interrupted run, and returns quickly if its results exist.
 
     Attributes:
-        verb: name of the function of `gear`.
-        title: one line for progress output.
+        verb: name of the called function.
+        title: one line for the progress display.
         arguments: keyword arguments of the call.
     """
 
@@ -46,11 +50,12 @@ class Step:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Match:
-    """One network, alone or guarded by a defense, over all scenes.
+    """One evaluation of the benchmark: a network, alone or guarded by a defense, in all scenes.
 
     Attributes:
-        contest: networks and defenses of its task.
-        model, defense: the pair that is evaluated; `defense` is None for the network alone.
+        contest: all networks and defenses of the task.
+        model, defense: the network and the defense that are evaluated together; `defense` is None for the network
+            alone.
         out: folder of the evaluation.
         pools: roots of the datasets, by kind of patch.
     """
@@ -64,23 +69,28 @@ class Match:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weather:
-    """A weather with its name in folders."""
+    """A weather of the benchmark.
+
+    Attributes:
+        label: name of the weather in folders and tables.
+        settings: `KEY=VALUE` texts that select the weather in a collection.
+    """
 
     label: str
     settings: tuple[str, ...]
 
 
 class Plan:
-    """Every step of a bench.
+    """All steps of a benchmark, and the folders of their results.
 
     Args:
         config: the bench config.
-        scenes: scenes that are measured.
-        calibration: scene in which defenses are calibrated, if one needs it.
+        scenes: scenes in which networks are measured.
+        calibration: scene in which defenses are calibrated; None if the config names none.
         contests: networks and defenses of each task.
-        attack: plugin that makes the patches.
-        root: folder of the bench.
-        workers: processes of each collection.
+        attack: spec of the attack that makes the patches.
+        root: folder of the benchmark.
+        workers: number of processes of each collection.
     """
 
     def __init__(
@@ -99,7 +109,7 @@ class Plan:
         self._calibration, self._attack, self._root, self._workers = calibration, attack, root, workers
 
     def steps(self) -> Iterator[Step]:
-        """All steps; each comes after the steps whose results it needs."""
+        """Yields all steps in an order in which each step comes after the steps that it depends on."""
         for contest in self.contests:
             for scene in self.scenes:
                 yield from self._pictures(contest, scene)
@@ -113,7 +123,7 @@ class Plan:
                 yield self._evaluation(match)
 
     def matches(self, contest: Contest) -> Iterator[Match]:
-        """Every network of a task, alone and guarded by each defense."""
+        """Yields one evaluation per network of a task without a defense, and one per network and defense."""
         for model in contest.models:
             for defense in contest.guards:
                 shown = {NO_PATCH: NO_PATCH, RANDOM: RANDOM, PATCH: model.label}
@@ -133,33 +143,43 @@ class Plan:
                 )
 
     def places(self) -> list[tuple[Scene, Weather]]:
-        """Every scene in every weather, in the order of the pools."""
+        """Returns every (scene, weather) pair, in the order of the datasets of a pool."""
         return [(scene, weather) for scene in self.scenes for weather in self.weathers]
 
     def pictures(self, contest: Contest, scene: Scene, weather: Weather, patch: str) -> Path:
-        """Root of the pictures with one patch on which networks are measured; a patch is named after its network."""
+        """Returns the root of the pictures on which networks are measured; `patch` is `none`, `random` or the name
+        of the attacked network.
+        """
         kind = patch if patch in (NO_PATCH, RANDOM) else f"patch-{patch}"
         return self._place(contest, scene) / weather.label / kind
 
     def patch(self, contest: Contest, scene: Scene, name: str) -> Path:
-        """The patch folder of a scene for a network, or for a network behind a defense."""
+        """Returns the folder of the patches that were optimised in a scene; `name` is a network, or a network with
+        a defense.
+        """
         return self._root / "patches" / contest.folder / name / scene.label
 
     def looked_through(self, contest: Contest) -> tuple[Entrant | None, ...]:
-        """The guards against which patches are optimised for a network: none, and each differentiable defense."""
+        """Returns the defenses that attacks on a network take into account; None stands for the attack on the
+        network alone.
+
+        Defenses are included only if the config asks for adaptive patches, and only those that support the attack.
+        """
         return (None, *(defense for defense in contest.defenses if self._is_adaptive(defense)))
 
     @staticmethod
     def name(model: Entrant, defense: Entrant | None) -> str:
-        """Name of a network with its defense, for rows, folders and patches."""
+        """Returns the name of a network with its defense, `<network>+<defense>`, for tables, folders and patches."""
         return model.label if defense is None else f"{model.label}+{defense.label}"
 
     def picture_settings(self, contest: Contest) -> tuple[str, ...]:
-        """Settings of all collections of a task."""
+        """Returns the `KEY=VALUE` settings that all collections of a task share."""
         return (*settings_of(self.config.collect), *settings_of(self.config.tasks[contest.name].collect))
 
     def seed(self, purpose: str) -> int:
-        """Seed of the pictures for one purpose; pictures for different purposes show different scenes."""
+        """Returns the seed of the pictures for one purpose, such as `attack` or `measure`; the samples of two
+        purposes differ.
+        """
         return int(derive_rng(self.config.seed, "bench", purpose).integers(1 << 31))
 
     def _place(self, contest: Contest, scene: Scene) -> Path:
@@ -176,7 +196,9 @@ class Plan:
                 yield self._collect(contest, scene, weather, "measure", out, patch=patch)
 
     def _grounds(self, contest: Contest, scene: Scene, weather: Weather) -> Iterator[Step]:
-        """Roots of the pictures on which a patch is optimised, and of those on which its best step is chosen."""
+        """Yields the collections of the pictures on which a patch is optimised, and of those on which its best
+        step is chosen.
+        """
         for purpose in ("attack", "choose"):
             yield self._collect(contest, scene, weather, purpose, self._ground(contest, scene, weather, purpose))
 
@@ -184,7 +206,7 @@ class Plan:
         return self._place(contest, scene) / weather.label / purpose
 
     def _patch(self, contest: Contest, scene: Scene, model: Entrant) -> Iterator[Step]:
-        """Makes a network's patch, the adaptive patches through its defenses, and the pictures that show them."""
+        """Yields the steps for a network's patch, its adaptive patches, and the rendered pictures of both."""
         for defense in self.looked_through(contest):
             name = self.name(model, defense)
             yield self._attacked(contest, scene, model, defense, self.weathers)
@@ -193,7 +215,9 @@ class Plan:
                 yield self._collect(contest, scene, weather, "measure", out, patch=patch)
 
     def _lessons(self, contest: Contest, scene: Scene) -> Iterator[Step]:
-        """Makes the calibration data of defenses: clean pictures of another scene, and the same pictures with each
+        """Yields the steps that make the calibration data of defenses.
+
+        The calibration data are pictures of the calibration scene without a patch, and the same pictures with each
         network's patch.
         """
         weather = self.weathers[0]
@@ -275,7 +299,7 @@ class Plan:
         )
 
     def _guard(self, contest: Contest, model: Entrant, defense: Entrant | None) -> Guard | None:
-        """A defense in front of one network, with the calibration data that it needs."""
+        """Returns a defense of one network with the calibration data that it needs; None for no defense."""
         if defense is None:
             return None
         guard = Guard(defense=defense.plugin, settings=defense.settings)
@@ -289,7 +313,9 @@ class Plan:
 
 
 def reports_of(contest: Contest) -> tuple[str, ...]:
-    """Names of the reports that the tables need: the one with the task's metric, and `outside_patch`."""
+    """Returns the names of the metric reports that the tables need: the report with the task's main metric, and
+    `outside_patch`.
+    """
     product = build(find("task", contest.name))
     metric_report, dot, _ = contest.task.metric.partition(".")
     wanted = [metric_report] if dot and isinstance(product, Reports) else []
@@ -297,7 +323,7 @@ def reports_of(contest: Contest) -> tuple[str, ...]:
 
 
 def weathers(configs: tuple[WeatherConfig, ...]) -> Iterator[Weather]:
-    """The weathers with the collection settings of each, under names that are unique."""
+    """Yields the weathers of the config, each with a unique label and its collection settings."""
     seen: set[str] = set()
     for one in configs:
         given = {name: value for name, value in to_plain(one).items() if value is not None}
@@ -310,7 +336,7 @@ def weathers(configs: tuple[WeatherConfig, ...]) -> Iterator[Weather]:
 
 
 def _keywords(guard: Guard | None) -> dict[str, Any]:
-    """Keyword arguments of the verbs for a guard."""
+    """Returns the keyword arguments of a verb for a defense with its calibration data."""
     if guard is None:
         return {}
     calibration = {"calibration": guard.calibration, "calibration_patched": guard.calibration_patched}

@@ -1,4 +1,4 @@
-"""The results of a bench, as values and JSON."""
+"""The results of a benchmark, as dataclasses and as JSON."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, Met
 from gear.verbs.evaluate.table import metric_title
 
 FOUND_SHARE = "found_share"
-"""Metric of single samples for tasks whose main metric is not defined for single samples."""
+"""Metric of single samples, for tasks whose main metric is defined only for whole datasets."""
 
 
 COLUMNS = (
@@ -33,7 +33,7 @@ COLUMNS = (
     "ceiling",
     "against",
 )
-"""Columns of bench.csv. `against` is the pool with which objects are compared (`gear.metrics.object_changes`)."""
+"""Columns of bench.csv. `against` is the kind of patch in the pictures with which detected objects are compared."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,9 +41,9 @@ class Metric:
     """The metric by which the networks of a task are compared.
 
     Attributes:
-        report: name of the report that contains it; `task` is the task's own evaluator.
+        report: name of the metric report that contains it; `task` is the task's own evaluator.
         name: name of the metric in the report.
-        less_is_better: whether the metric is an error.
+        less_is_better: whether smaller values are better, as for errors.
     """
 
     report: str
@@ -58,23 +58,23 @@ class Metric:
 
     @property
     def title(self) -> str:
-        """The name of the metric in tables."""
+        """The name of the metric in tables, with the name of its report unless that is the task's own."""
         return metric_title(self.report, self.name)
 
     def among(self, metrics: Metrics) -> Estimate | None:
-        """The value of this metric in the measured metrics; None if it is missing."""
+        """Returns the value of this metric from measured metrics; None if it is missing."""
         return metrics.get(self.report, {}).get(self.name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneMetric:
-    """The task's metric in one scene.
+    """The task's main metric in one scene.
 
     Attributes:
-        scene, weather: the scene and the weather.
-        patch: kind of patch that was shown.
+        scene, weather: names of the scene and of the weather.
+        patch: kind of patch in the pictures.
         samples: number of samples.
-        value: value of the metric.
+        value: value of the metric, with its interval.
     """
 
     scene: str
@@ -86,12 +86,12 @@ class SceneMetric:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Result:
-    """One network, alone or guarded by a defense.
+    """The results of one network, alone or guarded by a defense.
 
     Attributes:
         model, defense: names in the config; `defense` is None for the network alone.
         evaluation: the evaluation with all metrics.
-        scenes: the task's metric in each scene.
+        scenes: the task's main metric in each scene.
     """
 
     model: str
@@ -100,10 +100,10 @@ class Result:
     scenes: tuple[SceneMetric, ...]
 
     def pool(self, patch: str) -> Pool:
-        """The pool of all scenes with one kind of patch.
+        """Returns the results over all scenes with one kind of patch.
 
         Raises:
-            KeyError: no scene was shown with this kind of patch.
+            KeyError: the network was not measured with this kind of patch.
         """
         for pool in self.evaluation.pools:
             if pool.name == patch:
@@ -111,7 +111,11 @@ class Result:
         raise KeyError(patch)
 
     def against(self, pool: Pool) -> Difference | None:
-        """The difference of a patch to the random patch, or of the random patch to none."""
+        """Returns the difference between a pool (all scenes with one kind of patch) and its control pool.
+
+        The control of the random patch is no patch; the control of every other patch is the random patch. None if this
+        difference was not measured.
+        """
         control = NO_PATCH if pool.name == RANDOM else RANDOM
         return next((one for one in pool.differences if one.against == control), None)
 
@@ -123,7 +127,7 @@ class TaskResult:
     Attributes:
         name: name of the task.
         metric: metric by which networks are compared; None if the task has none.
-        results: results in the order of the config.
+        results: results per network and defense, in the order of the config.
     """
 
     name: str
@@ -131,16 +135,20 @@ class TaskResult:
     results: tuple[Result, ...]
 
     def value(self, pool: Pool) -> Estimate | None:
-        """The task's metric of a pool."""
+        """Returns the task's main metric over a pool, the datasets of all scenes with one kind of patch; None if
+        it is missing.
+        """
         return None if self.metric is None else self.metric.among(pool.metrics)
 
     def change(self, one: Difference | None) -> Estimate | None:
-        """The change of the task's metric in a difference."""
+        """Returns the change of the task's main metric between two pools; None if it is missing."""
         return None if self.metric is None or one is None else self.metric.among(one.metrics)
 
     def outside_patch(self, one: Difference | None) -> tuple[str, PairedTest] | None:
-        """The paired test over single samples with the name of its metric; outside the patch if the task supports that
-        report.
+        """Returns the paired test over single samples, with the name of the tested metric.
+
+        If the task supports the report `outside_patch`, the metric excludes the pixels of the patch. None if nothing
+        was tested.
         """
         if one is None:
             return None
@@ -157,7 +165,7 @@ class BenchReport:
 
     Attributes:
         out: folder with bench.json, bench.csv, table.txt and report.html.
-        facts: config, numbers of samples, versions; JSON.
+        facts: config, scenes, weathers, versions and notes; JSON.
         tasks: results of each task, in the order of the config.
     """
 
@@ -166,7 +174,7 @@ class BenchReport:
     tasks: tuple[TaskResult, ...]
 
     def as_json(self) -> Json:
-        """The content of bench.json."""
+        """Returns the content of bench.json."""
         return {
             "format": "gear-bench",
             "version": 1,
@@ -175,8 +183,10 @@ class BenchReport:
         }
 
     def records(self) -> Iterator[Mapping[str, Json]]:
-        """The task's metric of every pool and every scene, and what happens to objects in every pool, one flat record
-        each: the lines of bench.csv.
+        """Yields the lines of bench.csv as flat records.
+
+        There is one record per pool (all scenes with one kind of patch) and one per scene for the task's main metric,
+        and one per pool for each kind of change of detected objects.
         """
         for task in self.tasks:
             for one in task.results:

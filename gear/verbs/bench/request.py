@@ -1,4 +1,4 @@
-"""The request of a bench."""
+"""The arguments of `gear.bench` as a dataclass."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gear.values.errors import GearError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BenchRequest:
-    """The arguments of `gear.bench`, which documents them.
+    """The arguments of `gear.bench`, which describes each of them.
 
     Raises:
         GearError: the number of workers is below 1.

@@ -43,10 +43,10 @@ VERBS: dict[Verb, Callable[..., Any]] = {"collect": collect, "attack": attack, "
 
 
 OnStep = Callable[[Step, int, int], None]
-"""Called with (step, its number from 1, number of steps)."""
+"""A callback that gets the step, its number (from 1) and the number of all steps."""
 
 CONFIG = "bench.yml"
-"""File with the bench config, in which all defaults are filled in."""
+"""Name of the file with the bench config, with all defaults filled in."""
 
 
 def bench(
@@ -82,7 +82,7 @@ def bench(
         on_step: called before each step with the step, its number (from 1) and the number of steps.
         on_progress: called after every sample of a step, or after every step of an attack.
         on_fit_progress: called after every calibration sample that a defense reads for the first time.
-        on_warning: called with settings that may be unintended.
+        on_warning: called with lines on settings that may be unintended, and on results that are made again.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -96,7 +96,7 @@ def bench(
 
 
 def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | None = None) -> BenchReport:
-    """Runs a request; `bench` documents it.
+    """Runs a benchmark with the arguments in `request`, which `gear.bench` describes.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -138,10 +138,10 @@ def _write(report: BenchReport, plan: Plan, root: Path) -> None:
 
 
 def _carried_out(step: Step, root: Path, callbacks: Callbacks, *, in_subprocess: bool) -> Any:
-    """Carries out a step.
+    """Runs one step.
 
     Raises:
-        GearError: the step fails; the text names it.
+        GearError: the step fails; the message names the step.
     """
     keywords: dict[str, Any] = {"on_progress": callbacks.on_progress, "on_warning": callbacks.on_warning}
     if step.verb == "collect":
@@ -157,7 +157,7 @@ def _carried_out(step: Step, root: Path, callbacks: Callbacks, *, in_subprocess:
 
 
 def _done(step: Step, root: Path, keywords: dict[str, Any], warn: Warn) -> Any:
-    """Carries out a step; results for pictures or patches that were changed since are made again."""
+    """Runs one step; results that were made from pictures or patches that have changed since are replaced."""
     verb, again = VERBS[step.verb], f"{step.title}: is made again, for what is there"
     try:
         return verb(**step.arguments, **keywords)
@@ -171,7 +171,7 @@ def _done(step: Step, root: Path, keywords: dict[str, Any], warn: Warn) -> Any:
 
 
 def prepared(request: BenchRequest) -> Plan:
-    """Reads and checks a config; nothing is written.
+    """Reads and checks a bench config and returns its plan; nothing is written.
 
     Raises:
         GearError: something in the config does not exist, does not fit, or cannot be read.
@@ -198,7 +198,7 @@ def prepared(request: BenchRequest) -> Plan:
 
 
 def _check_pictures(plan: Plan, node: Node) -> None:
-    """Checks that the keys of all collections and the options of all tasks can be read, before the first step runs.
+    """Checks the collection settings and task options of all tasks before the first step runs.
 
     Raises:
         ConfigError: a key cannot be read, a weather is unknown, or a network expects another camera.

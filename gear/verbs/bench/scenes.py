@@ -1,4 +1,4 @@
-"""The scenes of a bench, and the places in its config file for error messages."""
+"""The scenes of a benchmark, and error messages that name the line of the bench config."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Scene:
 
     Attributes:
         town: name of the town, or path of its MJCF file.
-        name: name in the town's own scene library, or a library's file and a name in it, such as `my.yml:corner`.
-        surfaces: number of surfaces that show patches.
+        name: name in the town's own scene library, or file and name of another library, such as `my.yml:corner`.
+        surfaces: number of surfaces that can show patches.
     """
 
     town: str
@@ -31,15 +31,15 @@ class Scene:
 
     @property
     def label(self) -> str:
-        """Name of the scene in folders and rows."""
+        """Name of the scene in folders and tables: `<town>-<scene>`."""
         return f"{Path(self.town).stem}-{self.name.rpartition(':')[2]}"
 
 
 def measured_scenes(config: BenchConfig, node: Node) -> tuple[Scene, ...]:
-    """All scenes in which the bench measures, in the order of the config.
+    """Returns all scenes in which networks are measured, in the order of the config.
 
     Raises:
-        ConfigError: a town or a scene is unknown, has no surface for patches, or is named twice.
+        ConfigError: a town or a scene is unknown, a scene has no surface for patches, or a scene is named twice.
     """
     found: dict[str, Scene] = {}
     for town, names in config.places.items():
@@ -57,7 +57,7 @@ def measured_scenes(config: BenchConfig, node: Node) -> tuple[Scene, ...]:
 
 
 def calibration_scene(config: BenchConfig, node: Node, measured: tuple[Scene, ...]) -> Scene | None:
-    """The scene in which defenses are calibrated, if the config names one.
+    """Returns the scene in which defenses are calibrated; None if the config names none.
 
     Raises:
         ConfigError: the scene is unknown, has no surface for patches, or is one of the measured scenes.
@@ -97,7 +97,9 @@ def _surfaces(scene: SceneSpec) -> int:
 
 
 def place_of(node: Node, *path: str) -> Place:
-    """The place of a key in the config file, or of the nearest key above it that is there."""
+    """Returns the position (file and line) of a key in the config file; of the nearest key above it if the key is
+    missing.
+    """
     place = node.place
     for key in path:
         if not isinstance(node, Mapping) or key not in node.entries:
@@ -107,5 +109,5 @@ def place_of(node: Node, *path: str) -> Place:
 
 
 def located(node: Node, error: GearError, *path: str) -> GearError:
-    """The error with the place in the config file that it refers to."""
+    """Returns the error with the position in the config file (file and line) of the key that `path` names."""
     return place_of(node, *path).error(".".join(path), str(error))

@@ -1,4 +1,4 @@
-"""The result tables as text: one per task, with one row per network, defense and kind of patch."""
+"""The result tables of a benchmark as text: one table per task, with one row per network, defense and kind of patch."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ OBJECT_COLUMNS = {
     "invented on patch": "invented_on_patch",
     "invented elsewhere": "invented_elsewhere",
 }
-"""Titles of the columns of detectors, and which counts of objects they show."""
+"""Column titles for tasks with detected objects, each with the key of the count in `ObjectChanges.counts`."""
 
 REST = ("AUROC", "mask IoU", "s/picture")
 
 ALONE = "-"
-"""Cell of a row without a defense."""
+"""Text of the cell `defense` for a network without a defense."""
 
 
 def text(report: BenchReport) -> str:
-    """The tables of all tasks, followed by a legend."""
+    """Returns the tables of all tasks as text, followed by a legend and notes."""
     parts = ["\n".join([title(task), *number_table(columns(task))]) for task in report.tasks]
     return "\n\n".join([*parts, "\n".join([legend(), *report.facts["notes"]])]) + "\n"
 
 
 def title(task: TaskResult) -> str:
-    """Name of the task, its metric, and whether higher or lower values are better."""
+    """Returns the title of a task's table: task, main metric, and whether higher or lower values are better."""
     if task.metric is None:
         return task.name
     return f"{task.name}: {task.metric.title} ({'less' if task.metric.less_is_better else 'more'} is better)"
 
 
 def legend() -> str:
-    """One line that explains the columns."""
+    """Returns one line that explains the columns of the tables."""
     return (
         "in brackets: 95 % intervals; change and AUROC: of a patch against a random one, and of a random one against "
         "none; outside patch: mean change of a picture, without the pixels of the patch where the task can leave them "
@@ -48,27 +48,27 @@ def legend() -> str:
 
 
 def columns(task: TaskResult) -> list[list[str]]:
-    """Titles and rows, without the columns that are empty in every row."""
+    """Returns the cells of a task's table, titles first; columns that are empty in every row are left out."""
     every = [head(task), *lines(task)]
     used = [i for i, cells in enumerate(zip(*every, strict=True)) if any(cells[1:])]
     return [[line[i] for i in used] for line in every]
 
 
 def head(task: TaskResult) -> list[str]:
-    """The titles of the columns."""
+    """Returns the column titles of a task's table."""
     metric = "" if task.metric is None else task.metric.title
     return ["network", "defense", "patch", metric, "change", "outside patch", "p", *OBJECT_COLUMNS, *REST]
 
 
 def lines(task: TaskResult) -> Iterator[list[str]]:
-    """Yields one row per network, defense and kind of patch."""
+    """Yields the rows of a task's table: one per network, defense and kind of patch."""
     for one in task.results:
         for pool in one.evaluation.pools:
             yield line(task, one, pool)
 
 
 def line(task: TaskResult, one: Result, pool: Pool) -> list[str]:
-    """The cells of one row."""
+    """Returns the cells of one row, for one network (with its defense) and one kind of patch."""
     against = one.against(pool)
     outside = task.outside_patch(against)
     test = None if outside is None or not outside[1].pairs else outside[1]
@@ -88,5 +88,5 @@ def line(task: TaskResult, one: Result, pool: Pool) -> list[str]:
 
 
 def _rate(one: Difference | None, name: str) -> str:
-    """How often a change happens to objects; empty for tasks without objects."""
+    """Returns the rate of one kind of change of objects as text; empty for tasks without objects."""
     return "" if one is None or one.objects is None else shown(one.objects.counts[name].rate)

@@ -1,5 +1,5 @@
-"""Checks that the networks, defenses and the attack of a bench exist and fit each other, before anything is
-rendered.
+"""Checks, before anything is rendered, that the networks, defenses and the attack of a benchmark exist and fit
+together.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from gear.verbs.bench.scenes import located
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Entrant:
-    """A network or a defense of a bench, with its plugin found.
+    """A network or a defense of the benchmark, with its plugin.
 
     Attributes:
         label: name in tables and folders.
         plugin: name of the plugin.
-        settings: `KEY=VALUE` texts of its options.
-        chosen: the plugin with its options.
+        settings: `KEY=VALUE` texts for the plugin's options.
+        chosen: the plugin object with its options.
     """
 
     label: str
@@ -43,7 +43,11 @@ class Entrant:
         return isinstance(spec, DefenseSpec) and spec.needs_calibration
 
     def is_looked_through(self, attack: AttackSpec[object]) -> bool:
-        """Whether the entrant is a defense that changes pictures and passes the gradients that the attack needs."""
+        """Whether the entrant is a defense that changes pictures and supports the attack, so patches can be
+        optimised against it.
+
+        A defense supports attacks with gradients only if it passes gradients.
+        """
         spec = self.chosen.found.spec
         if not isinstance(spec, DefenseSpec) or "images" not in spec.outputs:
             return False
@@ -57,7 +61,7 @@ class Contest:
     Attributes:
         name: name of the task plugin in the config.
         task: spec of the task.
-        models, defenses: entrants in the order of the config.
+        models, defenses: networks and defenses in the order of the config.
     """
 
     name: str
@@ -67,17 +71,17 @@ class Contest:
 
     @property
     def folder(self) -> str:
-        """Folder of all results of this task, relative to the bench's."""
+        """Name of the subfolder for the results of this task."""
         return self.name.replace("/", "-")
 
     @property
     def guards(self) -> tuple[Entrant | None, ...]:
-        """None, for the networks alone, and every defense."""
+        """None, which stands for the networks alone, followed by every defense."""
         return (None, *self.defenses)
 
 
 def find_attack(config: BenchConfig, node: Node) -> PluginEntry:
-    """The attack plugin that makes the patches.
+    """Returns the attack plugin that makes the patches.
 
     Raises:
         ConfigError: there is no plugin of that name, or an option does not fit.
@@ -96,18 +100,18 @@ def find_attack(config: BenchConfig, node: Node) -> PluginEntry:
 def contests(
     config: BenchConfig, node: Node, *, attack: PluginEntry, surfaces: int, device: str | None = None
 ) -> Iterator[Contest]:
-    """The networks and defenses of every task.
+    """Yields the networks and defenses of every task, checked against each other.
 
     Args:
         config: the bench config.
-        node: its YAML tree, for places in errors.
+        node: YAML tree of the config, for positions in error messages.
         attack: plugin that makes the patches.
         surfaces: largest number of surfaces in a scene.
-        device: value for the networks' option `device`; None for its default.
+        device: value for the networks' option `device`; None keeps the value of the config.
 
     Raises:
         ConfigError: a plugin does not exist, an option is unknown, a network and a defense do not fit, or a defense
-            needs calibration and the config names no scene for it.
+            needs calibration and the config names no calibration scene.
     """
     for name, bench in config.tasks.items():
         try:

@@ -1,1 +1,1 @@
-"""The verb `collect`: renders and writes a dataset split from a config."""
+"""The verb `collect`: renders one split of a dataset from a config and writes it."""

@@ -1,4 +1,4 @@
-"""What a collection is asked to do."""
+"""The arguments of `gear.collect` as a dataclass."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from gear.values.errors import GearError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CollectRequest:
-    """The arguments of `gear.collect`, which documents them.
+    """The arguments of `gear.collect`, which describes each of them.
 
     Raises:
-        GearError: the number of workers is below 1, or is `auto` for an engine of other machines; or the shard is not
-            `I/N`.
+        GearError: the number of workers is below 1; the number is `auto` for an engine on other machines; or the shard
+            is not `I/N`.
     """
 
     task: str | None = None
@@ -51,7 +51,7 @@ class CollectRequest:
         self.chosen_shard()
 
     def chosen_shard(self) -> Shard | None:
-        """The part of the split that is collected; None for all of it.
+        """Returns the part of the split that is collected; None for the whole split.
 
         Raises:
             GearError: the shard is not `I/N` with 1 ≤ I ≤ N.
@@ -59,7 +59,8 @@ class CollectRequest:
         return None if self.shard is None else Shard.parse(self.shard)
 
     def loaded(self) -> CollectionConfig:
-        """The collection config: the values of a file, overridden by the request's.
+        """Returns the collection config: the values of the config file, overridden by the arguments of this
+        request.
 
         Raises:
             ConfigError: a value cannot be read.

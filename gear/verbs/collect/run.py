@@ -1,4 +1,4 @@
-"""`gear.collect`: renders a dataset split with its ground truth."""
+"""`gear.collect`: renders one split of a dataset with its ground truth."""
 
 from __future__ import annotations
 
@@ -45,23 +45,25 @@ def collect(
     Args:
         task: name of a task plugin; required unless `config` names one.
         config: name or path of a collection config; the other arguments override its values.
-        town, scene, split, samples, seed, weather, patch, renderer, quality: as in the config.
+        town, scene, split, samples, seed, weather, patch, renderer, quality: values of the config keys with these names
+            (`gear show-config` prints all keys).
         out: root of the dataset.
-        probes: whether probes for compositors are stored as well; see `gear.dataset.probe_files`.
+        probes: whether probes are also written: each sample rendered with the surfaces black and white, from which a
+            compositor can put any patch into the picture.
         settings: further `KEY=VALUE` texts for any key of the config.
         engine: name of the engine that makes the samples; `processes` uses processes on this machine.
-        address: of the engine's cluster: a Ray cluster, or a partition of SLURM.
+        address: address of the engine's cluster: a Ray cluster, or a partition of SLURM.
         workers: number of workers of the engine, or `auto`: as many as cores and memory of this machine allow. The
-            result does not depend on it.
+            result does not depend on this number.
         shard: `I/N`, to collect the I-th of N parts of the split. Sequences stay whole. Shards may be collected in any
             order, at any time and on any machine. A run without a shard makes what is missing and closes the split;
             `gear.merge` joins shards of separate folders.
-        in_subprocess: whether a single worker is a process of its own, too, which gives all its memory back.
+        in_subprocess: whether a single worker also runs in a separate process, whose memory is freed at the end.
         force: whether an existing split with another configuration is replaced.
         progress: shows a progress bar.
         on_progress: called after every sample.
-        on_warning: called, before anything is rendered, with what the user may not have meant: patches
-            of another scene, options of the task.
+        on_warning: called before rendering with lines on settings that may be unintended, such as patches of another
+            scene.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -94,7 +96,7 @@ def collect(
 
 
 def run_collect(request: CollectRequest, callbacks: Callbacks) -> CollectReport:
-    """Runs a request; `collect` documents it.
+    """Collects a split with the arguments in `request`, which `gear.collect` describes.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.

@@ -1,1 +1,1 @@
-"""The verb `defend`: writes the pictures of a dataset after a defense has cleaned them."""
+"""The verb `defend`: applies a defense to the pictures of a dataset and writes the cleaned pictures."""

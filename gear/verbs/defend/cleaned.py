@@ -1,6 +1,7 @@
-"""The files that `gear defend` writes for a sample, and a marker with their hashes and those of the source pictures.
+"""The files that `gear defend` writes for one sample.
 
-A sample whose source pictures changed, or whose files are damaged, is cleaned again.
+A marker file records the hashes of the written files and of the source pictures. A sample whose source pictures
+changed, or whose files are damaged, is cleaned again.
 """
 
 from __future__ import annotations
@@ -23,17 +24,17 @@ from gear.values.errors import DatasetError, FieldError
 from gear.values.serial import from_json, to_json
 
 FOLDER = "defense"
-"""Folder of masks, scores and the run's plan, with one folder per split."""
+"""Subfolder for masks, scores and the plan of the run (its inputs), with one folder per split."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Marker:
-    """The record of a cleaned sample, which is written after its files.
+    """The record of a cleaned sample; it is written after the sample's files.
 
     Attributes:
-        score: the defense's score, 0..1; None for a defense without one.
+        score: the defense's score, 0..1; None for a defense without a score.
         source: sha256 of the dataset's pictures that were cleaned, by path in the dataset.
-        files: sha256 of the written files, by path in the folder of the cleaned pictures.
+        files: sha256 of the written files, by path in the output folder.
     """
 
     score: float | None
@@ -42,7 +43,9 @@ class Marker:
 
 
 def kept_marker(root: Path, dataset: Dataset[Any], index: int, spec: DefenseSpec[Any]) -> Marker | None:
-    """The marker of a cleaned sample; None if there is none, the source pictures changed, or a file is damaged."""
+    """Returns the marker of a cleaned sample; None if there is no marker, the source pictures changed, or a file
+    is damaged.
+    """
     path = inside(root, marker_path(dataset.plan.info.split, index))
     if not path.is_file():
         return None
@@ -57,7 +60,7 @@ def kept_marker(root: Path, dataset: Dataset[Any], index: int, spec: DefenseSpec
 def write_sample(
     root: Path, dataset: Dataset[Any], index: int, sample: Any, spec: DefenseSpec[Any], result: DefenseResult
 ) -> Marker:
-    """Writes the results of the defense for one sample, and its marker after them."""
+    """Writes the cleaned pictures and masks of one sample, then its marker, and returns the marker."""
     info = dataset.plan.info
     cleans = "images" in spec.outputs
     pictures = _picture_files(dataset, dataclasses.replace(sample, images=dict(result.views)) if cleans else sample)
@@ -78,12 +81,12 @@ def write_sample(
 
 
 def marker_path(split: str, index: int) -> str:
-    """Path of a sample's marker, relative to the output folder."""
+    """Returns the path of a sample's marker, relative to the output folder."""
     return f"{FOLDER}/{split}/samples/{index:06d}.json"
 
 
 def _picture_files(dataset: Dataset[Any], sample: Any) -> dict[str, bytes]:
-    """The encoded files of a sample that depend on its pictures, by path; works for any task."""
+    """Returns the encoded files of a sample that depend on its pictures, by path; works for any task."""
     info = dataset.plan.info
     inverted = {name: np.subtract(255, picture, dtype=np.uint8) for name, picture in sample.images.items()}
     other = dataset.task.encode(dataclasses.replace(sample, images=inverted), info).files

@@ -1,4 +1,4 @@
-"""The request of `gear defend`."""
+"""The arguments of `gear.defend` as a dataclass."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefendRequest:
-    """The arguments of `gear.defend`, which documents them.
+    """The arguments of `gear.defend`, which describes each of them.
 
     Raises:
         GearError: the seed is out of range.

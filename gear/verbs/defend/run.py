@@ -1,4 +1,4 @@
-"""`gear.defend`: cleans a dataset's pictures with a defense."""
+"""`gear.defend`: applies a defense to the pictures of a dataset."""
 
 from __future__ import annotations
 
@@ -31,14 +31,15 @@ from gear.verbs.defend.request import DefendRequest
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefendReport:
-    """The result of a run.
+    """The result of `gear.defend`.
 
     Attributes:
         root: folder of the cleaned pictures.
         split: name of the split.
         samples: number of cleaned samples of the split.
         made: number of samples cleaned by this run.
-        outdated: how many of these replace earlier results, because the source pictures changed or files were damaged.
+        outdated: how many of the samples in `made` replace earlier results, because the source pictures changed or
+            files were damaged.
     """
 
     root: Path
@@ -48,7 +49,7 @@ class DefendReport:
     outdated: int = 0
 
     def summary(self) -> str:
-        """The result in one line."""
+        """Returns the result as one line of text."""
         kept = self.samples - self.made
         resumed = f" ({kept} were there already)" if kept else ""
         again = f"; {self.outdated} were cleaned again: their pictures or files had changed" if self.outdated else ""
@@ -66,23 +67,22 @@ def defend(
     progress: bool = False,
     on_progress: Progress | None = None,
 ) -> DefendReport:
-    """Writes a dataset's pictures after a defense has cleaned them.
+    """Applies a defense to the pictures of a dataset and writes the cleaned pictures.
 
     An interrupted run is resumed. Samples whose source pictures changed, or whose files are damaged, are cleaned again.
-
-    The cleaned pictures have the same relative paths as in the dataset. If the defense gives masks, they are written to
-    `defense/<split>/masks/<index>_<camera>.png` (16 bits, 65535 is 1); scores are written to
+    The cleaned pictures have the same relative paths as in the dataset. If the defense returns masks, they are written
+    to `defense/<split>/masks/<index>_<camera>.png` (16 bits, 65535 is 1); scores are written to
     `defense/<split>/scores.json`.
 
     Args:
         dataset: root of a dataset of any task.
         defense: name of a defense plugin.
-        out: folder for the pictures; it may hold other splits of the same dataset.
+        out: folder for the cleaned pictures; it may contain other splits of the same dataset.
         split: split of the dataset; optional if there is only one.
         settings: `KEY=VALUE` texts for the defense's options.
         seed: seed of the defense's random draws.
         progress: shows a progress bar.
-        on_progress: called after every sample.
+        on_progress: called after every sample with the numbers of finished and of all samples.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -93,7 +93,7 @@ def defend(
 
 
 def run_defend(request: DefendRequest, callbacks: Callbacks) -> DefendReport:
-    """Runs a request; `defend` documents it.
+    """Cleans a dataset with the arguments in `request`, which `gear.defend` describes.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -138,7 +138,7 @@ def run_defend(request: DefendRequest, callbacks: Callbacks) -> DefendReport:
 
 
 def suitable(found: PluginEntry, task: str) -> DefenseSpec[Any]:
-    """The spec of a defense, checked to need only pictures.
+    """Returns the spec of a defense after checking that the defense needs nothing but pictures.
 
     Raises:
         GearError: the defense is not for the task, or needs a model or calibration data.
@@ -155,10 +155,10 @@ def suitable(found: PluginEntry, task: str) -> DefenseSpec[Any]:
 
 
 def begin(root: Path, split: str, plan: Json) -> None:
-    """Writes the record of the run, or checks that an existing record agrees in everything on which a sample depends.
+    """Writes the plan of the run (defense, options, seed, dataset), or checks that an existing plan is equal.
 
     Raises:
-        DatasetError: the record differs, or a file cannot be written.
+        DatasetError: the existing plan differs, or a file cannot be written.
     """
     relative = f"{FOLDER}/{split}/plan.json"
     with explained(root):
