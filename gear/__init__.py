@@ -4,9 +4,9 @@
 
     report = gear.collect("stereo3d", scene="billboard01", patch="random", out="data/random")
     dataset = gear.open_dataset("data/random", split="test")
-    sample = dataset[0]  # typed: images, objects, surfaces, the scene record
+    sample = dataset[0]  # typed fields: images, objects, surfaces, metadata of the scene
 
-Names are looked up when they are first used, so `import gear` costs nothing.
+Each public name is imported when it is first used, so `import gear` takes almost no time.
 """
 
 from __future__ import annotations

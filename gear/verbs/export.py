@@ -1,4 +1,4 @@
-"""Exports a finished dataset to another layout."""
+"""`gear.export`: writes a finished dataset in the layout of another tool, such as COCO or YOLO."""
 
 from __future__ import annotations
 
@@ -36,22 +36,22 @@ def export(
     progress: bool = False,
     on_progress: Progress | None = None,
 ) -> int:
-    """Writes all splits of a dataset in another layout.
+    """Writes all splits of a dataset in the layout of another tool, such as COCO or YOLO.
 
-    The tree is written into a hidden folder next to `out`, which is renamed when it is complete. An export that fails
-    deletes that folder. After an export that was killed, the same command continues with the files that exist.
+    The files are written into a hidden folder next to `out`, which is renamed when it is complete. If the export fails,
+    the hidden folder is deleted. If the process is killed, the same command continues with the existing files.
 
     Args:
         dataset: root of a dataset whose splits are finished.
         layout: name of a layout, such as `coco`.
-        out: folder of the new tree; must be empty or new.
-        settings: options of the layout as `KEY=VALUE`, each of them.
+        out: folder of the exported files; must be empty or new.
+        settings: `KEY=VALUE` texts for the layout's options.
         progress: shows a progress bar.
-        on_progress: called after every file with (number of written files, 0), because the number of all files is
-            unknown.
+        on_progress: called after every file with (number of written files, 0); 0 means that the number of all files
+            is unknown.
 
     Returns:
-        Number of samples in the tree.
+        Number of exported samples.
 
     Raises:
         UnknownNameError: there is no such layout.
@@ -92,7 +92,7 @@ def export(
 
 @dataclass(frozen=True, slots=True)
 class _Sidecars(Sequence[Sidecar]):
-    """The sidecars of a split, each read from the disk when it is accessed."""
+    """The sidecars (JSON metadata of the samples) of a split; each file is read when it is accessed."""
 
     opened: Dataset[Any]
 
@@ -110,14 +110,14 @@ class _Sidecars(Sequence[Sidecar]):
 
 
 def _split_of(opened: Dataset[Any], task: str) -> ExportSplit:
-    """What a layout is given of a split."""
+    """Returns the data of a split that a layout needs: metadata, sidecars and manifest."""
     info = opened.plan.info
     paths = [sidecar_path(info.split, index) for index in range(len(opened))]
     return ExportSplit(info=info, task=task, sidecars=_Sidecars(opened), sidecar_paths=paths, manifest=opened.manifest)
 
 
 def _hashes(manifest: Json) -> dict[str, str]:
-    """SHA-256 of every file that a manifest lists, by path."""
+    """Returns the SHA-256 of every file that a manifest lists, by path."""
     hashes: dict[str, str] = {**manifest["indexes"], **manifest.get("sidecars", {})}
     for sample in manifest["samples"]:
         hashes |= sample["files"]
@@ -125,7 +125,7 @@ def _hashes(manifest: Json) -> dict[str, str]:
 
 
 def _size_of(root: Path, files: Iterable[str]) -> int:
-    """Bytes of the files that are there, without gear's own, such as sidecars and probes."""
+    """Returns the size in bytes of the existing files, without gear's internal files such as sidecars and probes."""
     paths = [inside(root, path) for path in files if not path.startswith(f"{GEAR}/")]
     return sum(path.stat().st_size for path in paths if path.is_file())
 

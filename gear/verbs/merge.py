@@ -1,4 +1,4 @@
-"""`gear.merge`: shards in separate folders become one dataset."""
+"""`gear.merge`: joins the shards of a collection, which lie in separate folders, into one dataset."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from gear.values.progress import Callbacks, Progress
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MergeReport:
-    """The result of a merge.
+    """The result of `gear.merge`.
 
     Attributes:
         root: folder of the new dataset.
-        samples: number of samples of each split, by its name.
+        samples: number of samples of each split, by name of the split.
         sources: number of folders that were joined.
     """
 
@@ -38,7 +38,7 @@ class MergeReport:
     sources: int
 
     def summary(self) -> str:
-        """The result in one line."""
+        """Returns the result as one line of text."""
         splits = ", ".join(f"{counted(count, 'sample')} in split {name!r}" for name, count in self.samples.items())
         return f"{self.root}: {splits} from {counted(self.sources, 'folder')}"
 
@@ -50,21 +50,22 @@ def merge(
     progress: bool = False,
     on_progress: Progress | None = None,
 ) -> MergeReport:
-    """Joins folders with shards of the same collection into one dataset, and closes its splits.
+    """Joins folders with shards (parts) of the same collection into one dataset, and completes its splits.
 
-    The result has the same bytes as the folder that one run would have made. It is written into a hidden folder next to
-    `out`, which is renamed when it is complete. After a merge that was killed, the same command continues. The folders
-    that are read are not changed.
+    The result has the same bytes as a dataset collected in one run. It is written into a hidden folder next to `out`,
+    which is renamed when it is complete. After an interrupted merge, the same command continues. The source folders are
+    not changed.
 
     Args:
-        datasets: roots, each with some samples of one or several splits.
+        datasets: roots of the source folders, each with some samples of one or several splits.
         out: folder of the new dataset; must be empty or new.
         progress: shows a progress bar.
-        on_progress: called after every sample with (samples so far, samples of the split).
+        on_progress: called after every sample with (finished samples, samples of the split).
 
     Raises:
+        GearError: no folder was given.
         DatasetError: the folders were made with different configurations, a sample is in none of them, a file is
-            damaged or leads outside its folder, `out` holds something, or a file cannot be written.
+            damaged or a path leads outside its folder, `out` is not empty, or a file cannot be written.
         UnknownNameError: the plugin of the task is not installed.
     """
     roots, target = [Path(root) for root in datasets], Path(out).resolve()
@@ -94,10 +95,11 @@ def merge(
 
 
 def _check_versions(parts: Parts) -> None:
-    """Refuses samples of another version of gear or of the task, which would get other index files here.
+    """Checks that the samples were made by the installed versions of gear and of the task; other versions could
+    write other index files.
 
     Raises:
-        DatasetError: names both versions.
+        DatasetError: the versions differ; the message names both.
         UnknownNameError: the plugin of the task is not installed.
     """
     owner = find("task", name_of_task(parts.plan.task)).owner
@@ -116,11 +118,11 @@ def _other_version(parts: Parts, package: str, made_by: str, installed: str) -> 
 
 
 def _check_patch(parts: Parts, pictures: Mapping[str, Path]) -> None:
-    """Refuses pictures of a patch that are not those of the plan.
+    """Checks that the patch pictures in the folders are those that were collected.
 
     Raises:
-        DamagedError: other pictures, or another number of them.
-        PatchError: one cannot be read.
+        DamagedError: the pictures or their number differ.
+        PatchError: a picture cannot be read.
     """
     ordered = [path for _, path in sorted(pictures.items(), key=lambda item: (len(item[0]), item[0]))]
     if digest_of(read_patch(path) for path in ordered) != parts.plan.patch["sha256"]:

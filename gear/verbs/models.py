@@ -15,18 +15,21 @@ from gear.values.serial import Json, to_json
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShippedWeights:
-    """The reference weights of a network.
+    """The reference weights of a network, which an installed package contains.
 
     Attributes:
-        file: metadata of the file.
-        stale: parts of the appearance that changed since the training; None if the file does not record the appearance.
+        file: the weights file with its metadata.
+        stale: parts of gear's rendering that changed since the training; None if the file does not record how its
+            training pictures were rendered.
     """
 
     file: WeightsFile
     stale: tuple[str, ...] | None
 
     def to_json(self) -> Json:
-        """All facts as JSON."""
+        """Returns the metadata of the weights as JSON: path, size, metrics, training data, options and rendering
+        changes.
+        """
         facts = self.file.facts()
         return {
             "path": str(self.file.path),
@@ -42,12 +45,12 @@ class ShippedWeights:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelFacts:
-    """One installed network.
+    """The description of one installed network.
 
     Attributes:
-        found: its plugin.
-        missing: required modules that are not installed.
-        shipped: its reference weights, if an installed package has them.
+        found: the plugin of the network.
+        missing: Python modules that the network requires and that are not installed.
+        shipped: the reference weights of the network; None if no installed package contains them.
     """
 
     found: PluginEntry
@@ -61,7 +64,7 @@ class ModelFacts:
         return self.found.spec
 
     def to_json(self) -> Json:
-        """All facts as JSON."""
+        """Returns the description as JSON."""
         spec = self.spec
         return {
             "name": spec.name,
@@ -83,14 +86,14 @@ class ModelFacts:
 
 
 def list_models(task: str | None = None) -> list[ModelFacts]:
-    """Every installed network, by name; torch is not imported.
+    """Returns a description of every installed network, ordered by name; torch is not imported.
 
     Args:
-        task: name of a task; only networks for this task are listed.
+        task: name of a task; only networks for this task are returned.
 
     Raises:
         UnknownNameError: there is no such task.
-        GearError: a weights package or file is broken.
+        GearError: a weights package or a weights file is broken.
     """
     plugins = catalogue()
     if task is not None:

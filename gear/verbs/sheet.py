@@ -1,4 +1,4 @@
-"""Contact sheets: pictures of a dataset's first samples at a glance."""
+"""Contact sheets: one picture with the first samples of a dataset and their ground truth."""
 
 from __future__ import annotations
 
@@ -26,16 +26,22 @@ CAPTION_PX = 22
 def contact_sheet(
     path: str | Path, *, split: str | None = None, samples: int = 12, on_progress: Progress | None = None
 ) -> UInt8Image:
-    """Pictures of the first samples, one row per sample with all previews of the task and their names.
+    """Draws the first samples of a dataset: one row per sample, with all pictures that the task draws as previews.
 
-    Below them stand the legends of the previews, where the task has them.
+    Legends of the previews are added at the bottom if the task has legends.
+
+    Args:
+        path: root of a dataset.
+        split: split of the dataset; optional if there is only one.
+        samples: number of rows.
+        on_progress: called after every sample with the numbers of finished and of all samples.
 
     Returns:
         (H, W, 3) uint8 RGB.
 
     Raises:
         DatasetError: there is no finished split to show.
-        PluginError: the task of another package failed, or gave no pictures.
+        PluginError: the task of another package failed, or returned no pictures.
     """
     dataset = open_dataset(path, split)
     found = find("task", name_of_task(dataset.plan.task))
@@ -58,9 +64,11 @@ def contact_sheet(
 
 
 def caption(sample: Sample, name: str) -> str:
-    """The text over a preview: sample, name, scene, and the visibility of the first two surfaces.
+    """Returns the caption of a preview: split, index, preview, scene, and visible share and distance of the first
+    two surfaces.
 
-    Visibility is that in the camera with the preview's name, or in the first camera if there is none.
+    The visible share is measured in the camera with the preview's name, or in the first camera if there is no such
+    camera.
     """
     record = sample.record
     camera = name if name in sample.images else record.cameras[0].name
@@ -78,18 +86,22 @@ def sheet(
     progress: bool = False,
     on_progress: Progress | None = None,
 ) -> Path:
-    """Writes the contact sheet of a dataset as a PNG.
+    """Writes the contact sheet of a dataset, which shows its first samples with their ground truth, as a PNG.
 
     Args:
         path: root of a dataset.
-        out: the PNG.
-        split: of the dataset; optional if there is only one.
-        samples: number of rows.
+        out: PNG file to write.
+        split: split of the dataset; optional if there is only one.
+        samples: number of rows, one per sample.
         progress: shows a progress bar.
-        on_progress: called after every sample.
+        on_progress: called after every sample with the numbers of finished and of all samples.
+
+    Returns:
+        The path of the PNG.
 
     Raises:
         DatasetError: there is no finished split, or `out` cannot be written.
+        PluginError: the task of another package failed, or returned no pictures.
     """
     target = Path(out)
     refuse_folder(target)
@@ -100,7 +112,7 @@ def sheet(
 
 
 def _legends(task: object, names: Sequence[str]) -> list[UInt8Image]:
-    """One row with the legend of each preview below it; none where the task has no legends."""
+    """Returns one row of pictures with the legend of each preview; an empty list if the task has no legends."""
     if not isinstance(task, WithLegends):
         return []
     legends = task.legends()

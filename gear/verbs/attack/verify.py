@@ -24,8 +24,8 @@ from gear.verbs.attack.request import VerifyRequest
 def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[str | Path] = ()) -> None:
     """Checks that a dataset is suitable for the rendered check of an attack.
 
-    It must exist, have probes (samples rendered with the surfaces black and white), show no adversarial patch and have
-    as many surfaces as there are patches. The patches must not be optimised or validated on its samples.
+    It must exist, have probes (samples rendered with the surfaces black and white), show no patch and have as
+    many surfaces as there are patches. The patches must not be optimised or validated on its samples.
 
     Args:
         data: datasets on which the patches are optimised.

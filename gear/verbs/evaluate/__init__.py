@@ -1,1 +1,1 @@
-"""`gear evaluate`: a model, with or without a defense, over datasets of its task."""
+"""The verb `evaluate`: measures a model, with or without a defense, on datasets of its task."""

@@ -1,4 +1,6 @@
-"""Warnings about alarm levels that do not carry over from the calibration pictures to the measured scene."""
+"""Warnings about defenses whose alarm level, set on the calibration pictures, gives too many false alarms in the
+measured scenes.
+"""
 
 from __future__ import annotations
 
@@ -9,18 +11,18 @@ from gear.values.serial import Json
 from gear.verbs.evaluate.report import ALARMS, RowReport
 
 EXPECTED = "false_alarms_high"
-"""Value of a fit report: the largest share of false alarms that the draw of the calibration pictures explains."""
+"""Key in a defense's calibration report: largest share of false alarms that chance in the calibration explains."""
 
 
 def alarm_notes(rows: Sequence[RowReport], fit: Json) -> list[str]:
-    """One warning for each clean dataset that raises clearly more alarms than the calibration explains.
+    """Returns one warning for each clean dataset that raises clearly more alarms than the calibration explains.
 
-    Clearly: the lower end of the exact 95 % interval of its share (Clopper and Pearson, 1934) is above the upper end of
-    the share that new pictures like those of the calibration have.
+    Clearly means: the lower end of the exact 95 % interval of the dataset's share of alarms (Clopper and Pearson, 1934)
+    is above the largest share that new pictures like the calibration pictures would have.
 
     Args:
-        rows: the measured datasets.
-        fit: what the defense learnt, as in `results.json`; None for a defense that reports nothing.
+        rows: the results of the datasets.
+        fit: report of the defense on its calibration, as in `results.json`; None for a defense without such a report.
     """
     expected = (fit or {}).get("values", {}).get(EXPECTED)
     if expected is None:
@@ -35,7 +37,7 @@ def alarm_notes(rows: Sequence[RowReport], fit: Json) -> list[str]:
 
 
 def _least_share(row: RowReport) -> float:
-    """Lower end of the exact 95 % interval of a dataset's share of alarms."""
+    """Returns the lower end of the exact 95 % interval of a dataset's share of alarms."""
     from scipy import stats
 
     alarms = round(row.defense[ALARMS] * row.samples)

@@ -1,4 +1,4 @@
-"""Metrics of datasets from their samples, and the difference that patches make between twins."""
+"""Computes the metrics of datasets from their samples, and compares twins, datasets that differ only in their patch."""
 
 from __future__ import annotations
 
@@ -30,22 +30,23 @@ ALARM = 0.5
 """Scores of a defense above this value are alarms."""
 
 Street = tuple[str, int, int]
-"""Identifies the scene of a sample independently of the weather: `town/scene`, seed, and number of the sample."""
+"""Identifier of what a sample shows, independently of weather and patch: `town/scene`, seed and sample index."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Measured:
-    """One dataset with the scores of its samples.
+    """One dataset with the stored scores of its samples.
 
     Attributes:
-        name: name of its folder in the evaluation.
+        name: name of the dataset's folder in the evaluation.
         dataset: the dataset.
-        scorer: scorer of its samples.
+        scorer: the metrics, which are computed from the scores of the samples.
         notes: stored scores of the samples, in order.
-        streets: the street that each sample shows; samples of one street are not independent.
+        streets: the scene content that each sample shows, independently of weather and patch; samples of one street are
+            not statistically independent.
         made: number of samples predicted in this run.
-        damaged: one line per stored prediction that could not be read.
-        known: cache of gathered metrics by report and number of samples, because gathering is slow.
+        damaged: one error per stored prediction that could not be read.
+        known: cache of computed metrics by report and number of samples, because computing them is slow.
     """
 
     name: str
@@ -58,7 +59,7 @@ class Measured:
     known: dict[tuple[str, int], Metrics] = field(default_factory=dict, repr=False)
 
     def gathered(self, report: str, count: int | None = None) -> Metrics:
-        """The metrics of one report over the first `count` samples; over all by default."""
+        """Returns the metrics of one report over the first `count` samples, or over all samples by default."""
         notes = self.notes[:count]
         key = (report, len(notes))
         if key not in self.known:
@@ -72,19 +73,20 @@ class Measured:
 
     @property
     def patch(self) -> str:
-        """Label of the patch that the dataset shows."""
+        """Label of the patch in the dataset's pictures: `none`, `random`, or a name with a hash."""
         return self.dataset.plan.info.patch_label
 
 
 def streets_of(dataset: Dataset[Any]) -> list[Street]:
-    """The street of each sample. Weather, renderer and patch are left out, because the positions of cars do not depend
-    on them.
+    """Returns for each sample an identifier of the scene content that it shows (its street).
+
+    Weather, renderer and patch are not part of the identifier, because the positions of cars do not depend on them.
     """
     return [(*scenes_of(dataset), number) for number in range(len(dataset))]
 
 
 def row_report(row: Measured) -> RowReport:
-    """Metrics, intervals and times of one dataset."""
+    """Returns the results of one dataset: metrics with intervals, times, and the scores of single samples."""
     notes = row.notes
     plan = row.dataset.plan
     return RowReport(
@@ -110,14 +112,15 @@ def row_report(row: Measured) -> RowReport:
 
 
 def mean_cost(notes: Sequence[Note]) -> dict[str, float]:
-    """Mean seconds per sample: `model_s`, `defense_s`."""
+    """Returns the mean seconds per sample of the model (`model_s`) and of the defense (`defense_s`)."""
     return {key: float(np.mean([note.cost[key] for note in notes])) for key in ("model_s", "defense_s")}
 
 
 def mask_means(notes: Sequence[Note], *, has_patch: bool) -> dict[str, float]:
-    """Mean metrics of a defense's masks, and the share of pictures that raise its alarm, if it gives masks and scores.
+    """Returns the mean metrics of a defense's masks, and the share of pictures that raise its alarm.
 
-    Without a patch the only metric of masks is the share of the picture that is masked by mistake.
+    Metrics of masks are left out if the defense returns no masks, and the alarm if it returns no scores. Without a
+    patch, the only metric of masks is `mask_area`, the share of the picture that is masked by mistake.
     """
     masks = [note.mask for note in notes if note.mask is not None]
     scores = [note.score for note in notes if note.score is not None]
@@ -127,7 +130,9 @@ def mask_means(notes: Sequence[Note], *, has_patch: bool) -> dict[str, float]:
 
 
 def drive_note(dataset: Dataset[Any]) -> str | None:
-    """A note on samples that are frames of sequences: intervals and tests treat them as independent scenes."""
+    """Returns a warning if the samples are frames of sequences, because intervals and tests treat them as
+    independent; otherwise None.
+    """
     last = dataset.sidecar(-1).record
     if not last.frame:
         return None
@@ -139,7 +144,9 @@ def drive_note(dataset: Dataset[Any]) -> str | None:
 
 
 def together(rows: Sequence[Measured]) -> Iterable[Together]:
-    """Combines datasets of several scenes or weathers with patches of one label into one."""
+    """Combines datasets of several scenes or weathers that have patches with the same label, and yields one result
+    per label.
+    """
     labelled: dict[str, list[Measured]] = {}
     for row in rows:
         labelled.setdefault(row.patch, []).append(row)
@@ -156,7 +163,7 @@ def together(rows: Sequence[Measured]) -> Iterable[Together]:
 
 
 def metrics_of(row: Measured) -> dict[str, dict[str, Estimate]]:
-    """Metrics over all samples with their intervals."""
+    """Returns the metrics over all samples with their 95 % intervals, by report and name."""
     metrics = {}
     for report in row.scorer.reports:
         one = row.gathered(report)
@@ -168,14 +175,16 @@ def metrics_of(row: Measured) -> dict[str, dict[str, Estimate]]:
 
 
 def as_one(name: str, members: Sequence[Measured]) -> Measured:
-    """Combines several datasets into one with the given name; properties of datasets are taken from the first one."""
+    """Combines several datasets into one with the given name; its other properties are those of the first dataset."""
     notes = [note for row in members for note in row.notes]
     streets = [street for row in members for street in row.streets]
     return replace(members[0], name=name, notes=notes, streets=streets, known={})
 
 
 def compared(rows: Sequence[Measured], seed: int) -> Iterable[Difference]:
-    """Differences between every dataset with a patch and its twins without a patch and with a random patch."""
+    """Yields the difference between every dataset with a patch and its twins, the same samples without a patch and
+    with a random patch.
+    """
     for row in rows:
         for control in CONTROLS[: CONTROLS.index(row.patch) if row.patch in CONTROLS else len(CONTROLS)]:
             for other in rows:
@@ -184,7 +193,9 @@ def compared(rows: Sequence[Measured], seed: int) -> Iterable[Difference]:
 
 
 def difference(row: Measured, other: Measured, seed: int) -> Difference:
-    """Difference between twins over the samples that both have."""
+    """Returns the difference between a dataset and its twin (the same samples with another patch), over the
+    samples that both have.
+    """
     count = min(len(row.notes), len(other.notes))
     here, there, streets = row.notes[:count], other.notes[:count], row.streets[:count]
     return Difference(
@@ -200,7 +211,7 @@ def difference(row: Measured, other: Measured, seed: int) -> Difference:
 
 
 def _objects(here: list[Note], there: list[Note], streets: list[Street], seed: int) -> ObjectChanges | None:
-    """What happens to the objects of each sample; None for tasks without objects."""
+    """Returns how the detections of each object differ between twins; None for tasks without objects."""
     now, twin = ([note.outcomes for note in notes if note.outcomes is not None] for notes in (here, there))
     return object_changes([note.index for note in here], now, twin, streets, seed) if now else None
 
@@ -217,7 +228,7 @@ def _paired(one: Metrics, other: Metrics) -> dict[str, Estimate]:
 def _tested(
     here: list[Note], there: list[Note], streets: list[Street], report: str, seed: int
 ) -> dict[str, PairedTest]:
-    """Paired tests of every metric of the report that is defined for single samples."""
+    """Returns a paired test for every metric of the report that is defined for single samples."""
     names = list(dict.fromkeys(name for note in here for name in note.metrics[report]))
     ours, theirs = (
         np.array([[note.metrics[report].get(name, np.nan) for name in names] for note in notes], np.float64)

@@ -1,5 +1,5 @@
-"""Pools: several datasets that are evaluated as one, such as those with the patches of one attack in
-different scenes.
+"""Pools: groups of datasets that are evaluated as one, such as those with the patches of one attack in different
+scenes.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from gear.verbs.evaluate.compare import Measured, as_one, difference, mask_means
 from gear.verbs.evaluate.report import Difference, Pool
 
 Pools = Mapping[str, Sequence[str | Path]]
-"""Roots of datasets by the name of the pool."""
+"""Roots of the datasets of each pool, by name of the pool."""
 
 
 def check_pools(pools: Pools, roots: Iterable[Path]) -> None:
-    """Checks that every pool names datasets of the evaluation.
+    """Checks that every pool contains only datasets of the evaluation.
 
     Raises:
-        GearError: a pool is empty, names a dataset twice, or names one that is not among the data or is there in
-            several splits.
+        GearError: a pool is empty, contains a dataset twice, or contains a dataset that is not evaluated or is
+            evaluated in several splits.
     """
     known = Counter(root.resolve() for root in roots)
     for name, members in pools.items():
@@ -39,7 +39,9 @@ def check_pools(pools: Pools, roots: Iterable[Path]) -> None:
 
 
 def pooled(rows: Sequence[Measured], pools: Pools, seed: int) -> Iterable[Pool]:
-    """The report of each pool, with its differences to the pools `none` and `random` if these show the same scenes."""
+    """Yields the results of each pool of datasets, with the differences to the pools `none` and `random` if these
+    show the same scenes.
+    """
     by_root = {row.dataset.root.resolve(): row for row in rows}
     found = {name: [by_root[Path(root).resolve()] for root in members] for name, members in pools.items()}
     wholes = {name: as_one(name, members) for name, members in found.items()}
@@ -62,7 +64,9 @@ def pooled(rows: Sequence[Measured], pools: Pools, seed: int) -> Iterable[Pool]:
 
 
 def _counted(one: Difference) -> Difference:
-    """The difference without the single changes of objects, whose samples are those of several datasets."""
+    """Returns the difference without the list of single object changes, because its sample indices belong to
+    several datasets.
+    """
     return one if one.objects is None else replace(one, objects=replace(one.objects, changes=()))
 
 

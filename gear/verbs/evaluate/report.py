@@ -1,4 +1,4 @@
-"""The results of an evaluation, as values and JSON."""
+"""The results of an evaluation, as dataclasses and as JSON."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from gear.metrics.object_changes import ObjectChange
 from gear.values.serial import Json, to_json
 
 ALARMS = "alarms"
-"""Metric: share of a dataset's pictures whose score is an alarm; for clean pictures the rate of false alarms."""
+"""Metric: share of pictures whose defense score is an alarm; for clean pictures, the rate of false alarms."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """A metric with its 95 % interval.
+    """The value of a metric with its 95 % interval.
 
     Attributes:
         value: value of the metric; NaN if it is undefined.
-        interval: lower and upper bound, or None.
-        ceiling: value of perfect predictions on the same samples, for metrics of at most 1.
+        interval: lower and upper end of the interval; None if unknown.
+        ceiling: value that perfect predictions reach on the same samples; less than 1 if a dataset has too few objects.
     """
 
     value: float
@@ -30,14 +30,14 @@ class Estimate:
     ceiling: float = 1.0
 
     def as_json(self) -> Json:
-        """The estimate as JSON: null for values that are not finite, and without a ceiling of 1."""
+        """Returns the estimate as JSON; numbers that are not finite become null, and a ceiling of 1 is left out."""
         low, high = self.interval or (math.nan, math.nan)
         value = known_json({"value": self.value, "low": low, "high": high})
         return value | ({"ceiling": self.ceiling} if self.ceiling < 1 else {})
 
 
 Metrics = Mapping[str, Mapping[str, Estimate]]
-"""By report (`task` is the task's own evaluator), then by metric."""
+"""Metrics by name of the report (`task` is the task's own evaluator), then by name of the metric."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,15 +45,16 @@ class RowReport:
     """The results of one dataset.
 
     Attributes:
-        name: name of its folder in the evaluation.
+        name: name of the dataset's folder in the evaluation.
         dataset: root of the dataset.
-        facts: its split, town, scene, weather, patch and keys; JSON.
+        facts: root, town, scene, split, patch and content hashes of the dataset; JSON.
         samples: number of samples.
         made: number of samples predicted in this run.
         damaged: one line per stored prediction that could not be read and was made again.
-        metrics: metrics over all samples.
+        metrics: metrics over all samples, by report and name.
         cost: mean seconds per sample: `model_s`, `defense_s`.
-        defense: mean metrics of the defense's masks; empty without a defense.
+        defense: mean metrics of the defense's masks, and the share of pictures that raise its alarm; empty without a
+            defense.
         per_sample: metrics of each single sample; JSON.
     """
 
@@ -74,7 +75,7 @@ class RowReport:
         return str(self.facts["patch"])
 
     def as_json(self) -> Json:
-        """The entry of the row in results.json."""
+        """Returns the entry of this dataset in results.json."""
         return {
             "name": self.name,
             "dataset": self.facts,
@@ -88,13 +89,13 @@ class RowReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Together:
-    """Several datasets with patches of one label, counted as one.
+    """Several datasets with patches of the same label, evaluated as one.
 
     Attributes:
         patch: label of the patches.
-        rows: names of the datasets' rows.
-        samples: number of samples of all of them.
-        metrics: metrics over all samples.
+        rows: names of the datasets (`RowReport.name`).
+        samples: number of samples in all these datasets.
+        metrics: metrics over all samples, by report and name.
     """
 
     patch: str
@@ -103,7 +104,7 @@ class Together:
     metrics: Metrics
 
     def as_json(self) -> Json:
-        """The entry in results.json."""
+        """Returns the entry of these datasets in results.json."""
         return {
             "patch": self.patch,
             "rows": list(self.rows),
@@ -114,10 +115,10 @@ class Together:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairedTest:
-    """A paired test between twins of a metric that is defined for single samples.
+    """A paired test of one metric of single samples between twins, datasets that differ only in their patch.
 
     Attributes:
-        mean: mean difference over the pairs; NaN without pairs.
+        mean: mean difference over the pairs of samples; NaN without pairs.
         p: two-sided p-value of `gear.measuring.statistics.paired_p`; NaN without pairs.
         pairs: number of samples with a value in both datasets.
     """
@@ -127,18 +128,21 @@ class PairedTest:
     pairs: int
 
     def as_json(self) -> Json:
-        """The test as JSON, with null for NaN."""
+        """Returns the test as JSON, with null for NaN."""
         return {**known_json({"mean": self.mean, "p": self.p}), "pairs": self.pairs}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChangeCount:
-    """How often one kind of change happens between twins.
+    """How often one kind of change, such as a hidden object, happens between a dataset and its twin, the same
+    samples with another patch.
 
     Attributes:
-        count: number of such changes from `against` to `row`.
-        reverse: number of such changes from `row` to `against`, which chance alone makes as likely.
-        rate: `count` as a share of the objects found in `against`; of invented detections, per picture.
+        count: number of such changes from the twin to the dataset.
+        reverse: number of the same changes in the opposite direction; by chance alone, both numbers would be equal on
+            average.
+        rate: `count` divided by the number of objects that are detected in the twin; for invented detections, divided
+            by the number of pictures.
         paired: test of `count` minus `reverse` per picture.
     """
 
@@ -148,7 +152,7 @@ class ChangeCount:
     paired: PairedTest
 
     def as_json(self) -> Json:
-        """The entry of the change in results.json."""
+        """Returns the entry of this kind of change in results.json."""
         return {
             "count": self.count,
             "reverse": self.reverse,
@@ -159,13 +163,14 @@ class ChangeCount:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DistanceBin:
-    """The objects found in the twin that lie at some distance from the patch, and how many of them are lost.
+    """The objects that are detected in the twin (the same samples with another patch) and lie within a range of
+    distances from the patch.
 
     Attributes:
-        low, high: distances in the bin are at least `low` and less than `high`.
-        found: number of objects found in `against`.
-        lost: number of those that are hidden, misclassified or moved, by kind.
-        rate: the lost objects as a share of `found`.
+        low, high: the distances are at least `low` and less than `high`, in metres or pixels.
+        found: number of these objects.
+        lost: number of these objects that are hidden, misclassified or moved in the dataset itself, by kind.
+        rate: share of these objects that are lost.
     """
 
     low: float
@@ -175,21 +180,22 @@ class DistanceBin:
     rate: Estimate
 
     def as_json(self) -> Json:
-        """The entry of the bin in results.json; null for a bin without an upper end."""
+        """Returns the entry of this bin in results.json; the upper end of the last bin is null."""
         limits = known_json({"low": self.low, "high": self.high})
         return {**limits, "found": self.found, **self.lost, "rate": self.rate.as_json()}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectChanges:
-    """What became of the objects that are found in the twin, and which detections are invented.
+    """How the detections differ between a dataset and its twin, the same samples with another patch.
 
     Attributes:
-        found: number of objects found in `against`.
-        counts: by kind (`gear.metrics.object_changes`) and place: `hidden`, `hidden_on_patch`, `hidden_elsewhere`, ….
-        changes: every change, with the index of its sample; empty for a pool.
-        by_distance: objects by their distance from the patch, in bins of `metres` and of `pixels`; objects of pictures
-            without a visible patch are in no bin.
+        found: number of objects that are detected in the twin.
+        counts: numbers of changes by kind and position relative to the patch: `hidden`, `hidden_on_patch`,
+            `hidden_elsewhere`, ….
+        changes: (index of the sample, change) of every single change; empty for a pool of datasets.
+        by_distance: objects by their distance from the patch, in bins of `metres` and of `pixels`; pictures without a
+            visible patch are left out.
     """
 
     found: int
@@ -198,7 +204,7 @@ class ObjectChanges:
     by_distance: Mapping[str, tuple[DistanceBin, ...]]
 
     def as_json(self) -> Json:
-        """The entry of the objects in results.json."""
+        """Returns the entry of the object changes in results.json."""
         return {
             "found": self.found,
             "counts": {name: one.as_json() for name, one in self.counts.items()},
@@ -209,15 +215,15 @@ class ObjectChanges:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """The difference between a dataset and its twin, sample by sample.
+    """The difference between a dataset and its twin (the same samples with another patch), sample by sample.
 
     Attributes:
-        row, against: names of the rows; differences are `row` minus `against`.
-        metrics: differences of the metrics.
-        auroc: area under the ROC curve of the defense's score as a detector of `row` among both, or None without
-            scores.
+        row, against: names of the dataset and of the twin; differences are `row` minus `against`.
+        metrics: differences of the metrics, by report and name.
+        auroc: area under the ROC curve of the defense's score, which should be high for samples of `row` and low for
+            those of `against`; None without scores.
         paired: tests of the metrics that are defined for single samples, by report and metric.
-        objects: what happens to objects between the twins; None for tasks without objects.
+        objects: changes of the detected objects; None for tasks without objects.
     """
 
     row: str
@@ -228,7 +234,7 @@ class Difference:
     objects: ObjectChanges | None = None
 
     def as_json(self) -> Json:
-        """The entry of the difference in results.json."""
+        """Returns the entry of the difference in results.json."""
         return {
             "row": self.row,
             "against": self.against,
@@ -243,15 +249,16 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pool:
-    """Several datasets that are evaluated as one at the user's request.
+    """Several datasets that the user asked to evaluate as one.
 
     Attributes:
         name: name of the pool.
-        rows: names of the datasets' rows.
-        samples: number of samples of all of them.
-        metrics: metrics over all samples.
+        rows: names of the datasets (`RowReport.name`).
+        samples: number of samples in all these datasets.
+        metrics: metrics over all samples, by report and name.
         cost: mean seconds per sample: `model_s`, `defense_s`.
-        defense: mean metrics of the defense's masks; empty without a defense.
+        defense: mean metrics of the defense's masks, and the share of pictures that raise its alarm; empty without a
+            defense.
         differences: differences to the pools `none` and `random`, if these show the same scenes; `row` and `against`
             are names of pools.
     """
@@ -265,7 +272,7 @@ class Pool:
     differences: tuple[Difference, ...]
 
     def as_json(self) -> Json:
-        """The entry of the pool in results.json."""
+        """Returns the entry of the pool in results.json."""
         return {
             "name": self.name,
             "rows": list(self.rows),
@@ -284,11 +291,11 @@ class EvaluateReport:
     Attributes:
         out: folder of results.json, table.txt and the predictions.
         facts: model, defense, task, seed, versions, and notes for the reader of the metrics; JSON.
-        rows: results of the datasets, in the order given.
-        together: one entry per label of a patch (`none`, `random`, ...), with the metrics over all datasets of that
-            label; for datasets that are not twins, such as those of several scenes.
-        differences: differences between twins.
-        pools: datasets counted as one at the user's request.
+        rows: results of the datasets, in the order of the arguments.
+        together: one entry per label of a patch (`none`, `random`, ...) that several datasets share, such as datasets
+            of several scenes, with the metrics over all of them.
+        differences: differences between twins, datasets that differ only in their patch.
+        pools: results of the groups of datasets that the user asked to evaluate as one.
     """
 
     out: Path
@@ -299,7 +306,7 @@ class EvaluateReport:
     pools: tuple[Pool, ...] = ()
 
     def as_json(self) -> Json:
-        """The content of results.json."""
+        """Returns the content of results.json."""
         return {
             "format": "gear-evaluation",
             "version": 1,
@@ -311,10 +318,10 @@ class EvaluateReport:
         }
 
     def row(self, patch: str) -> RowReport:
-        """The first dataset with a patch of this label.
+        """Returns the results of the first dataset whose patch has this label, such as `none` or `random`.
 
         Raises:
-            KeyError: no dataset shows such a patch.
+            KeyError: no dataset has such a patch.
         """
         for row in self.rows:
             if row.patch == patch:
@@ -323,5 +330,5 @@ class EvaluateReport:
 
 
 def metrics_json(metrics: Metrics) -> Json:
-    """Metrics as JSON, by report and name."""
+    """Returns metrics as JSON, by report and name."""
     return {report: {name: one.as_json() for name, one in rows.items()} for report, rows in metrics.items()}

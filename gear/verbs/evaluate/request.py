@@ -1,4 +1,4 @@
-"""The request of an evaluation."""
+"""The arguments of `gear.evaluate` as a dataclass."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluateRequest:
-    """The arguments of `gear.evaluate`, which documents them; `guard` is the defense with its calibration data.
+    """The arguments of `gear.evaluate`, which describes each of them; `guard` combines the defense with its
+    calibration data.
 
     Raises:
         GearError: a number is out of range.
@@ -37,7 +38,7 @@ class EvaluateRequest:
             raise GearError(f"batch and workers must be at least 1; got {self.batch}, {self.workers}")
 
     def folder(self, task: str) -> Path:
-        """Folder of the results: the requested one, or `evaluations/<task>/<model>[+<defense>]`."""
+        """Returns the folder of the results: the requested one, or `evaluations/<task>/<model>[+<defense>]`."""
         if self.out is not None:
             return Path(self.out)
         guarded = "" if self.guard is None else f"+{self.guard.defense}"

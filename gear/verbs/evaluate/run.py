@@ -1,4 +1,6 @@
-"""`gear.evaluate`: resolves a request, predicts, compares twins, writes the results."""
+"""`gear.evaluate`: runs a model over datasets, computes metrics, compares twins (datasets that differ only in
+their patch) and writes the results.
+"""
 
 from __future__ import annotations
 
@@ -37,17 +39,19 @@ from gear.verbs.evaluate.request import EvaluateRequest
 from gear.verbs.evaluate.table import table
 
 FIT = "fit.json"
-"""File with the fit report of the defense."""
+"""Name of the file with the report of a defense on its calibration."""
 
 INTERVALS = "95 %: jackknife over streets, Student's t"
-"""The note on intervals in results.json."""
+"""The note in results.json on how the intervals are computed."""
 
 LEARNT = {"calibration", "calibration_samples"}
-"""Keys of an evaluation's plan that describe the calibration data of its defense."""
+"""Keys of `plan.json`, the inputs of an evaluation, that describe the calibration data of the defense."""
 
 
 class OtherLessonsError(DatasetError):
-    """The folder holds an evaluation that differs only in the calibration data of its defense."""
+    """Raised if the folder contains an evaluation that differs from the requested one only in the calibration data
+    of its defense.
+    """
 
 
 def evaluate(
@@ -73,10 +77,10 @@ def evaluate(
 ) -> EvaluateReport:
     """Evaluates a model, with or without a defense, on datasets of its task; resumes an interrupted run.
 
-    The folder `out` gets results.json, table.txt, and for each dataset a folder with the predictions in the result
-    layout of its format and a note per sample. Samples with a note are not predicted again, unless their files are
-    damaged (`RowReport.damaged`). Datasets that differ only in their patch are compared sample by sample, detectors
-    object by object. Intervals are 95 % intervals by the jackknife over streets (`gear.measuring.intervals`).
+    The folder `out` gets results.json, table.txt, and one folder per dataset with predictions in the result layout of
+    the dataset's format and a note (scores) per sample. Samples with a note are not predicted again, unless their files
+    are damaged. Datasets that differ only in their patch are compared sample by sample, and detections object by
+    object. Intervals are 95 % jackknife intervals over streets, groups of samples with the same scene content.
 
     Args:
         data: roots of datasets, or folders of such roots, all of one task; `DIR:SPLIT` selects a split.
@@ -86,11 +90,11 @@ def evaluate(
         defense_settings: `KEY=VALUE` texts for the defense's options.
         split: split of the datasets; optional if each has only one.
         calibration: dataset without patches on which the defense is calibrated.
-        calibration_patched: the same dataset with patches.
-        reports: names of further reports: one of the task (`reference`); `outside_patch`, which excludes the patch and
-            5 px around it; or a metric plugin, as `NAME` or `NAME:KEY=VALUE,KEY=VALUE`.
+        calibration_patched: the calibration dataset rendered with patches.
+        reports: names of further groups of metrics: a report of the task (`reference`); `outside_patch`, which excludes
+            the patch and 5 px around it; or a metric plugin, as `NAME` or `NAME:KEY=VALUE,KEY=VALUE`.
         out: folder of the results; `evaluations/<task>/<model>[+<defense>]` by default.
-        batch: samples per batch; by default one, and up to four small ones for gear's own models.
+        batch: samples per batch; by default one, or up to four small pictures for gear's own models.
         workers: number of threads that read samples, and of threads that compute metrics and write files.
         seed: seed of the defense's random draws and of the permutation tests.
         pools: roots of datasets that are evaluated as one, by name of the pool. Pools with the same scenes as the pools
@@ -98,7 +102,8 @@ def evaluate(
         progress: shows a progress bar.
         on_progress: called after every sample.
         on_fit_progress: called after every calibration sample that the defense reads for the first time.
-        on_warning: called with a line for every damaged prediction that is made again.
+        on_warning: called with one line per damaged prediction that is made again, and per problem of the defense's
+            calibration.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -122,7 +127,7 @@ def evaluate(
 
 
 def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateReport:
-    """Runs a request; `evaluate` documents it.
+    """Runs an evaluation with the arguments in `request`, which `gear.evaluate` describes.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -176,7 +181,7 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
 
 
 def _fit_facts(root: Path, guarded: GuardedModel, request: EvaluateRequest, on_warning: Warn) -> Json:
-    """The fit report of the defense on its calibration data; stored for later runs that need no calibration.
+    """Returns the report of the defense on its calibration; it is stored for later runs that need no calibration.
 
     Every problem in the report is passed on as a warning.
     """
@@ -260,7 +265,7 @@ def _end(root: Path, found: EvaluateReport) -> None:
 
 
 def _counter(on_progress: Progress, total: int) -> Callable[[], None]:
-    """Counts finished samples for a progress callback, which it calls with 0 at once."""
+    """Returns a function that counts finished samples and reports the count to `on_progress`; 0 is reported at once."""
     finished = 0
 
     def done() -> None:

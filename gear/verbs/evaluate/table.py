@@ -1,4 +1,4 @@
-"""An evaluation as a table of plain text."""
+"""Formats the results of an evaluation as a plain-text table."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from gear.measuring.text_table import WIDTH, number_table
 from gear.verbs.evaluate.report import ALARMS, Difference, Estimate, EvaluateReport, RowReport
 
 COLUMNS, FURTHER = 4, 2
-"""Number of metrics shown of the task's own report, and of each further report. results.json has all metrics."""
+"""Number of metric columns for the task's own report, and for each further report; results.json has all metrics."""
 
 LABEL_LENGTH = 36
-"""Characters of a row's label."""
+"""Largest number of characters of a row's label."""
 
 
 def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
-    """A table with one row per dataset and the first metrics of each report as columns; differences between twins are
-    below the dataset.
+    """Returns a table with one row per dataset and the first metrics of each report as columns.
+
+    The differences to a dataset's twins (the same samples with another patch) are listed below the dataset.
 
     Args:
         report: results of the evaluation.
@@ -60,7 +61,7 @@ def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
 
 
 def _times(report: EvaluateReport) -> list[str]:
-    """A line that explains the seconds in the table."""
+    """Returns a line that explains the times in the table; no line if they need no explanation."""
     if report.facts["defense"] is not None:
         return [
             "model s: the network alone on defended pictures, one batch at a time; defense s: all that the defense "
@@ -85,7 +86,9 @@ def _columns(report: EvaluateReport) -> list[tuple[str, str]]:
 
 
 def metric_title(report: str, metric: str) -> str:
-    """Title of a column: the metric's name, preceded by the name of its report unless that is the task's own."""
+    """Returns the title of a column: the name of the metric, preceded by the name of its report unless that is the
+    task's own.
+    """
     return metric if report == TASK else f"{report}.{metric}"
 
 
@@ -104,13 +107,13 @@ def _difference(one: Difference, report: EvaluateReport, columns: Iterable[tuple
 
 
 def row_labels(rows: Sequence[RowReport]) -> dict[str, str]:
-    """Labels of the table's rows: the folder that the user gave, with its split if a folder has several.
+    """Returns the labels of the table's rows: the dataset's folder, followed by the split if a folder has several.
 
     Args:
-        rows: rows of the table.
+        rows: results of the datasets.
 
     Returns:
-        Labels by the row's name; long paths keep their last `LABEL_LENGTH` characters.
+        Labels by the name of the row; long paths keep their last `LABEL_LENGTH` characters.
     """
     folders = Counter(row.dataset for row in rows)
     labels = {}
@@ -138,7 +141,7 @@ def _paired(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
 
 
 SHOWN_CHANGES = ("hidden", "misclassified", "moved", "invented_on_patch", "invented_elsewhere")
-"""Counts of objects in the table; results.json has the others by place, and each single change."""
+"""Keys of the object changes in the table; results.json also has the other keys and every single change."""
 
 
 def _objects(report: EvaluateReport, labels: Mapping[str, str], width: int) -> list[str]:
@@ -162,7 +165,7 @@ def _objects(report: EvaluateReport, labels: Mapping[str, str], width: int) -> l
 
 
 def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
-    """A metric with its interval as text; empty if the metric is missing."""
+    """Returns a metric with its interval as text, such as `0.712 [0.690, 0.734]`; empty if the metric is missing."""
     if one is None:
         return ""
     text = number(one.value, is_signed=is_signed)
@@ -170,7 +173,7 @@ def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
 
 
 def number(value: float | None, *, is_signed: bool = False) -> str:
-    """A number with three decimals, or with one if it is large; `-` for NaN."""
+    """Returns a number as text, with three decimals, or with one if it is 100 or more; `-` for NaN and None."""
     if value is None or value != value:
         return "-"
     sign = "+" if is_signed else ""

@@ -1,4 +1,6 @@
-"""Counts, intervals and tests of what happens to objects between a dataset and its twin."""
+"""Counts, intervals and tests of the object changes between a dataset and its twin, the same samples with another
+patch.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,11 @@ from gear.values.picture_objects import ObjectOutcome, PictureOutcomes
 from gear.verbs.evaluate.report import ChangeCount, DistanceBin, Estimate, ObjectChanges, PairedTest
 
 PLACES = ("", "_on_patch", "_elsewhere")
-"""Ends of the names of counts: anywhere, on the patch, elsewhere."""
+"""Endings of the keys of counts: all changes, those on the patch, and those elsewhere in the picture."""
 
 
 BINS = {"metres": (0.0, 5.0, 10.0, 20.0, 40.0, math.inf), "pixels": (0.0, 25.0, 50.0, 100.0, 200.0, math.inf)}
-"""Ends of the bins of distances from the patch (`gear.values.picture_objects.PatchDistance`)."""
+"""Limits of the bins of an object's distance from the patch, by unit."""
 
 
 def object_changes(
@@ -30,14 +32,16 @@ def object_changes(
     streets: Sequence[Hashable],
     seed: int,
 ) -> ObjectChanges:
-    """What happens to objects from twin to twin.
+    """Counts and tests how the detections of objects differ between a dataset and its twin, the same samples with
+    another patch.
 
     Args:
-        indices: of the N samples.
-        here: outcomes of the samples.
-        there: outcomes of the same samples of the twin.
-        streets: of each sample, the street that it shows; intervals and tests treat samples of one street together.
-        seed: of the permutation tests.
+        indices: indices of the N samples.
+        here: detection outcomes of the N samples in the dataset.
+        there: detection outcomes of the same samples in the twin.
+        streets: identifier of the scene content of each sample; intervals and tests treat samples with the same one
+            together.
+        seed: seed of the permutation tests.
     """
     pairs = list(zip(here, there, strict=True))
     lost = [changes(now, twin) for now, twin in pairs]
@@ -73,7 +77,9 @@ def _distance_bin(
     high: float,
     kept: Sequence[npt.NDArray[np.int64]],
 ) -> DistanceBin:
-    """The objects of each picture, all of them found in the twin, whose distance from the patch is in a bin."""
+    """Counts the objects, all detected in the twin, whose distance from the patch is in a bin, and how many of
+    them are lost.
+    """
     inside = [
         [thing for thing in some if (away := getattr(thing.patch, unit)) is not None and low <= away < high]
         for some in pictures
@@ -90,17 +96,24 @@ def _distance_bin(
 
 
 def _places(are_on_patch: Sequence[bool]) -> tuple[float, float, float]:
-    """Numbers anywhere, on the patch and elsewhere."""
+    """Returns three counts: all, those on the patch, and those elsewhere."""
     return float(len(are_on_patch)), float(sum(are_on_patch)), float(len(are_on_patch) - sum(are_on_patch))
 
 
 def _counts(pictures: Sequence[Sequence[ObjectChange]], kind: Change) -> Values:
-    """(N, 3) changes of one kind in each picture: anywhere, on the patch, elsewhere."""
+    """Returns (N, 3) numbers of changes of one kind in each picture: all, on the patch, elsewhere."""
     return np.array([_places([one.patch.is_on_patch for one in some if one.change == kind]) for some in pictures])
 
 
 def _rate(counts: Values, bases: Values, kept: Sequence[npt.NDArray[np.int64]], limits: Interval) -> Estimate:
-    """A ratio of sums over pictures, (N,) each, with its interval; `kept` numbers the pictures without each street."""
+    """Returns the sum of `counts` divided by the sum of `bases`, with its jackknife interval.
+
+    Args:
+        counts: (N,) numbers per picture.
+        bases: (N,) numbers per picture.
+        kept: for each street, the indices of the pictures that do not show that street.
+        limits: smallest and largest possible value.
+    """
     value = _ratio(counts, bases)
     replicates = np.array([_ratio(counts[row], bases[row]) for row in kept])
     return Estimate(value=value, interval=jackknife_interval(value, replicates, limits))

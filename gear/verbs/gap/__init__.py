@@ -1,1 +1,1 @@
-"""The verb `gap`: compares composed patches with the same patches rendered."""
+"""The verb `gap`: compares composed patches (pasted into pictures) with the same patches rendered in the scene."""

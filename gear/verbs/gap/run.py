@@ -1,4 +1,4 @@
-"""`gear.gap`: compares composed patches with the same patches rendered."""
+"""`gear.gap`: compares composed patches (pasted into pictures) with the same patches rendered in the scene."""
 
 from __future__ import annotations
 
@@ -36,22 +36,22 @@ def gap(
     on_fit_progress: Progress | None = None,
     on_warning: Warn | None = None,
 ) -> GapReport:
-    """Compares composed patches with the same patches rendered, as pictures and by their effect on a model.
+    """Compares composed patches (pasted into pictures) with the same patches rendered: in pixels and in their effect.
 
     Args:
         dataset: root of a split that was collected with probes.
-        patch: the patch, as for `gear.collect`; the twin with the patch is collected into `out/twin`.
-        twin: root of an existing twin, instead of `patch`.
+        patch: patch folder, picture or `random`; the same samples are rendered with this patch into `out/twin`.
+        twin: root of an existing dataset with the same samples and a patch; replaces `patch`.
         split: split of the dataset; optional if there is only one.
-        model: name of a model plugin, with which the task's metric is measured; without it only pictures are compared.
+        model: name of a model plugin with which the task's metrics are measured; None compares only the pictures.
         model_settings: `KEY=VALUE` texts for the model's options.
         defense: name of a defense plugin that guards the model.
         defense_settings: `KEY=VALUE` texts for the defense's options.
         calibration: dataset without patches on which the defense is calibrated.
-        calibration_patched: the same dataset with patches.
-        compositors: names of compositors.
-        samples: number of samples from the first one on; only these are rendered. All by default.
-        town, scenes: files of the town and of its scene library, for `patch` and towns that are not part of gear.
+        calibration_patched: the calibration dataset rendered with patches.
+        compositors: names of the methods that compose patches into pictures.
+        samples: number of samples, counted from the first; only these are rendered. All by default.
+        town, scenes: MJCF file and scene library of a town that is not part of gear; needed only with `patch`.
         out: folder for `gap.json` and `gap.txt`; required with `patch`.
         seed: seed of the defense's random draws.
         progress: shows a progress bar.

@@ -1,1 +1,1 @@
-"""`gear new`: a complete small package for a new task, model, attack or defense."""
+"""`gear new`: writes a complete small package for a new task, model, attack, defense or metric."""

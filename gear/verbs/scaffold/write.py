@@ -1,4 +1,4 @@
-"""Writes the package of `gear new`."""
+"""`gear new`: fills templates and writes the Python package of a new plugin."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gear.values.errors import GearError, UnknownNameError
 NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 TOKEN = re.compile(r"\{\{(\w+)\}\}")
 TAKEN = ("spec", "build", "hookimpl", *HOOK_OF.values())
-"""Names that the package uses itself, so that a plugin's module cannot have them."""
+"""Names that every plugin package uses itself; a plugin must not have such a name."""
 
 USE: dict[Kind, str] = {
     "task": "Use it: `gear collect --task {{name}}`, then `gear view` or `gear sheet` on what it wrote, and"
@@ -36,19 +36,19 @@ USE: dict[Kind, str] = {
 
 
 def new_package(kind: str, name: str, *, out: str | Path = ".") -> Path:
-    """Writes a complete small package for a plugin: code, tests through the contracts, README, licence.
+    """Writes a complete small Python package for a plugin: code, tests, README and licence.
 
     Args:
         kind: `task`, `model`, `attack`, `defense` or `metric`.
         name: name of the plugin, such as `my_blur`; hyphens are replaced by underscores.
-        out: folder in which the folder of the package, `gear-<kind>-<name>`, is made.
+        out: existing or new folder in which the package's folder `gear-<kind>-<name>` is created.
 
     Returns:
-        The folder of the package. If an error occurs, nothing is written.
+        The folder of the package. If an error occurs, no package is written.
 
     Raises:
-        UnknownNameError: there is no such kind.
-        GearError: the name is not valid, or the folder exists already.
+        UnknownNameError: there is no such kind of plugin.
+        GearError: the name is not valid or belongs to an installed plugin, or the folder exists already.
         DatasetError: a file cannot be written.
     """
     if kind not in KINDS:
@@ -84,7 +84,7 @@ def new_package(kind: str, name: str, *, out: str | Path = ".") -> Path:
 
 
 def contents(kind: Kind, words: dict[str, str]) -> dict[str, str]:
-    """The package's files by relative path."""
+    """Returns the texts of the package's files, by path relative to the package's folder."""
     words = words | {"use": _filled(USE[kind], words)}
     places = {
         "pyproject.toml": "common/pyproject.toml",
@@ -104,7 +104,7 @@ def contents(kind: Kind, words: dict[str, str]) -> dict[str, str]:
 
 
 def checked_name(name: str) -> str:
-    """Checks the name of a plugin and returns it with underscores.
+    """Returns the name of a plugin with underscores instead of hyphens, after checking it.
 
     Raises:
         GearError: the name is not valid.

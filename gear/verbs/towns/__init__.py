@@ -1,1 +1,1 @@
-"""Towns and their scenes: lists, maps and thumbnails."""
+"""The verb `towns`: lists of towns and their scenes, maps of towns, and thumbnails of scenes."""

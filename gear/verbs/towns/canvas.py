@@ -1,4 +1,4 @@
-"""A canvas for maps: drawing in metres, north at the top. It is drawn at twice its size for smooth edges."""
+"""A canvas for drawing maps, with north at the top. It is drawn at twice its size, so edges are smooth."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ Points = npt.NDArray[np.float64]
 
 OVERSAMPLING = 2
 SHIFT = 4
-"""Fractional bits of positions in OpenCV: sixteenths of a pixel."""
+"""Number of fractional bits of OpenCV positions: positions are in sixteenths of a pixel."""
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 FONT_HEIGHT_PX = 22.0
-"""Height of a capital letter at scale 1."""
+"""Height in pixels of a capital letter of the font at scale 1."""
 
 HAS_STROKES = int(cv2.__version__.partition(".")[0]) < 5
-"""OpenCV 4 draws letters as strokes, whose width must grow with their size; in OpenCV 5 thickness is their weight."""
+"""True for OpenCV 4, where the line width of letters must grow with their size; in OpenCV 5 it is the font weight."""
 
 
 class Canvas:
-    """A picture that shows a part of the world.
+    """A picture on which a map of the world is drawn.
 
-    Positions are (N, 2). Names that end in `_m` are metres in the world; names that end in `_px` are pixels of the
-    finished picture, x to the right and y down.
+    Positions are (N, 2) arrays. Names that end in `_m` are metres in the world; names that end in `_px` are pixels of
+    the finished picture, x to the right and y down.
     """
 
     def __init__(
@@ -52,7 +52,8 @@ class Canvas:
             paper: colour of the background.
             px_per_m: scale of the map.
             origin_px: position of the world's (0, 0) in the picture.
-            box_px: left, top, right and bottom of the part that shows the world; the whole picture if None.
+            box_px: left, top, right and bottom of the part of the picture that the map covers; None means the whole
+                picture.
         """
         self.size_px = size_px
         self.box_px = box_px or (0.0, 0.0, float(size_px[0]), float(size_px[1]))
@@ -61,7 +62,7 @@ class Canvas:
         self._pixels = np.full((size_px[1] * OVERSAMPLING, size_px[0] * OVERSAMPLING, 3), paper, np.uint8)
 
     def picture(self) -> UInt8Image:
-        """The finished picture, (H, W, 3) uint8 RGB."""
+        """Returns the finished picture, (H, W, 3) uint8 RGB."""
         return np.asarray(cv2.resize(self._pixels, self.size_px, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
     def to_px(self, points_m: npt.ArrayLike) -> Points:
@@ -70,7 +71,7 @@ class Canvas:
         return np.asarray(self._origin_px + points * (self.px_per_m, -self.px_per_m))
 
     def fill(self, outline_px: npt.ArrayLike, colour: Colour, opacity: float = 1.0) -> None:
-        """Fills the polygon with an outline of (N, 2) points."""
+        """Fills the polygon with the (N, 2) corners `outline_px`."""
         fixed = _fixed(outline_px)
         if opacity >= 1.0:
             cv2.fillPoly(self._pixels, [fixed], colour, cv2.LINE_AA, SHIFT)
@@ -112,7 +113,7 @@ class Canvas:
         cv2.circle(self._pixels, (int(x), int(y)), round(radius_px * one), colour, -1, cv2.LINE_AA, SHIFT)
 
     def mask(self) -> Mask:
-        """An empty mask, which `fill_triangles` fills and `blend` draws."""
+        """Returns an empty mask; `fill_triangles` adds shapes to a mask and `blend` draws the mask."""
         return np.zeros(self._pixels.shape[:2], np.uint8)
 
     def fill_triangles(self, mask: Mask, triangles_m: Points) -> None:
@@ -121,7 +122,9 @@ class Canvas:
             cv2.fillConvexPoly(mask, triangle, 255, cv2.LINE_8, SHIFT)
 
     def blend(self, mask: Mask, colour: Colour, opacity: float = 1.0) -> None:
-        """Draws a colour over the pixels of a mask, by its values 0..255 and the opacity 0..1."""
+        """Mixes a colour into the pixels of a mask; the weight of the colour is the mask's value (0..255) times
+        the opacity (0..1).
+        """
         x, y, width, height = cv2.boundingRect(mask)
         if not width:
             return
@@ -131,18 +134,18 @@ class Canvas:
         part[:] = mixed >> 8
 
     def outline(self, mask: Mask, colour: Colour, width_px: float) -> None:
-        """Draws the outlines of a mask."""
+        """Draws the outlines of all regions of a mask."""
         rings, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         cv2.drawContours(self._pixels, rings, -1, colour, max(1, round(width_px * OVERSAMPLING)), cv2.LINE_AA)
 
     def shift_down_right(self, mask: Mask, length_px: float) -> Mask:
-        """A mask moved down and to the right, as a shadow."""
+        """Returns a mask moved down and to the right by `length_px` in each direction; used as a shadow."""
         step = length_px * OVERSAMPLING
         moved = cv2.warpAffine(mask, np.array([[1.0, 0.0, step], [0.0, 1.0, step]]), mask.shape[::-1])
         return np.asarray(moved, dtype=np.uint8)
 
     def clip(self, paper: Colour) -> None:
-        """Erases everything outside of the part that shows the world."""
+        """Erases everything outside the part of the picture that the map covers."""
         left, top, right, bottom = (round(value * OVERSAMPLING) for value in self.box_px)
         inside = self._pixels[top:bottom, left:right].copy()
         self._pixels[:] = paper
@@ -155,11 +158,11 @@ class Canvas:
         """Writes one line of text.
 
         Args:
-            at_px: point of the baseline at which the text starts, has its middle, or ends, by `anchor`.
+            at_px: position on the baseline of the text; `anchor` says which point of the text is there.
             words: the text.
             height_px: height of a capital letter.
-            colour: of the letters.
-            anchor: which point of the text is at `at_px`.
+            colour: colour of the letters.
+            anchor: the point of the text that is at `at_px`: its left end, its middle or its right end.
             bold: whether the letters are bold.
             halo: colour of an edge around the letters; None for no edge.
         """
@@ -172,19 +175,19 @@ class Canvas:
         cv2.putText(self._pixels, words, origin, FONT, scale, colour, thickness, cv2.LINE_AA)
 
     def text_width_px(self, words: str, height_px: float, *, bold: bool = False) -> float:
-        """Width of a line of text in pixels."""
+        """Returns the width of a line of text in pixels of the finished picture."""
         scale, thickness = _font(height_px, bold)
         return float(cv2.getTextSize(words, FONT, scale, thickness)[0][0]) / OVERSAMPLING
 
 
 def round_step_m(span_m: float, most: int) -> float:
-    """The smallest step of 1, 2 or 5 times a power of ten that divides a length into at most `most` parts."""
+    """Returns the smallest length of 1, 2 or 5 times a power of ten that divides `span_m` into at most `most` parts."""
     power = 10.0 ** math.floor(math.log10(span_m / most))
     return next(power * factor for factor in (1, 2, 5, 10) if span_m / (power * factor) <= most)
 
 
 def rectangle(x_px: float, y_px: float, width_px: float, height_px: float) -> Points:
-    """(4, 2) corners of an upright rectangle, given by its upper left corner and its size."""
+    """Returns the (4, 2) corners of an axis-parallel rectangle, given by its upper left corner and its size."""
     return np.array([x_px, y_px]) + np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * (width_px, height_px)
 
 

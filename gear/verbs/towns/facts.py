@@ -1,4 +1,4 @@
-"""The facts of a town and its scenes, read without compiling a mesh."""
+"""Reads the metadata of towns and their scenes quickly, without compiling meshes."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class Town:
     """A town with its scenes.
 
     Attributes:
-        library: its MJCF and the folders of its assets.
-        lanes: its lanes, walks and parking bays.
-        scenes: the usable scenes of its library; None if it has no library.
-        faulty: the errors of the unusable scenes of the library, by name.
+        library: the town's MJCF file and the folders of its assets.
+        lanes: the town's lanes, walks and parking bays.
+        scenes: the usable scenes of the town; None if the town has no scene library.
+        faulty: errors of the unusable scenes, by name of the scene.
     """
 
     library: AssetLibrary
@@ -37,22 +37,22 @@ class Town:
 
     @property
     def name(self) -> str:
-        """Name of the town: the stem of its file."""
+        """Name of the town: the name of its MJCF file without the suffix."""
         return self.library.town_name
 
     @property
     def size_m(self) -> tuple[float, float]:
-        """Size of its bounds in metres, west to east and south to north."""
+        """Size of the town in metres, (west to east, south to north)."""
         xmin, ymin, xmax, ymax = self.lanes.bounds_m
         return xmax - xmin, ymax - ymin
 
     @property
     def lane_km(self) -> float:
-        """Length of all lanes together in kilometres, junctions included."""
+        """Total length of all lanes in kilometres, lanes in junctions included."""
         return sum(lane.line.length_m for lane in self.lanes.lanes.values()) / 1000
 
     def to_json(self) -> Json:
-        """The facts as JSON, with the scenes in full."""
+        """Returns the metadata of the town as JSON, with all fields of its scenes."""
         scenes = {} if self.scenes is None else self.scenes.scenes
         return {
             "name": self.name,
@@ -69,25 +69,25 @@ class Town:
 
 
 def town_names() -> list[str]:
-    """Names of gear's own towns."""
+    """Returns the names of the towns that are part of gear."""
     return sorted(path.stem for path in (data_dir("mjcf") / "towns").glob("*.xml"))
 
 
 def towns() -> tuple[Town, ...]:
-    """The towns that come with gear, with their scenes; no mesh is compiled."""
+    """Returns the towns that are part of gear, with their scenes; no mesh is compiled, so the call is quick."""
     return tuple(read_town(name) for name in town_names())
 
 
 def read_town(town: str | Path, scenes: str | Path | None = None) -> Town:
-    """Reads a town's lanes and its scenes.
+    """Reads the lanes and the scenes of a town.
 
     Args:
-        town: name of the town, or path of its MJCF.
-        scenes: path or name of its scene library; gear's own for that town if None.
+        town: name of the town, or path of its MJCF file.
+        scenes: path or name of the town's scene library; None takes the library that is part of gear.
 
     Raises:
         UnknownNameError: there is no such town or file.
-        TownError: the town breaks the conventions.
+        TownError: the MJCF file breaks gear's conventions for towns.
         ConfigError: no scene of the library is usable, or the library is for another town.
     """
     library = AssetLibrary.for_town(town)
@@ -96,10 +96,12 @@ def read_town(town: str | Path, scenes: str | Path | None = None) -> Town:
 
 
 def read_lanes(path: Path) -> LaneGraph:
-    """Reads the lane graph of a town's file. Only its custom fields are compiled, since meshes would take seconds.
+    """Reads the graph of lanes, walks and parking bays from a town's MJCF file.
+
+    Only the custom fields of the file are compiled, because compiling meshes would take seconds.
 
     Raises:
-        TownError: the file is not XML, MuJoCo cannot read it, or a lane is malformed.
+        TownError: the file is not XML, MuJoCo cannot read the file, or a lane is malformed.
     """
     read_numbers(path)
     try:
@@ -115,7 +117,7 @@ def read_lanes(path: Path) -> LaneGraph:
 
 
 def _scenes(library: AssetLibrary, given: str | Path | None) -> tuple[SceneLibrary | None, dict[str, GearError]]:
-    """The usable scenes, and the errors of scenes that cannot be read or that name missing assets."""
+    """Returns the usable scenes, and the errors of scenes that cannot be read or that name missing assets."""
     try:
         file = find_scenes(library, "" if given is None else str(given))
     except UnknownNameError:

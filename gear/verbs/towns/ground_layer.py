@@ -1,4 +1,4 @@
-"""The ground of a map: the surfaces, plants and buildings of a town, seen from above."""
+"""The ground layer of a town map: ground surfaces, plants and buildings, seen from above."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from gear.world.compilation.model_compilation import GROUND_PREFIX
 from gear.world.compilation.mujoco_errors import without_breaks
 
 Bounds = tuple[float, float, float, float]
-"""xmin, ymin, xmax, ymax."""
+"""Bounds of a town in metres: (xmin, ymin, xmax, ymax)."""
 
 COVERS: tuple[tuple[str, tuple[str, ...], Colour], ...] = (
     ("terrain", ("terrain",), (219, 229, 205)),
@@ -32,7 +32,7 @@ COVERS: tuple[tuple[str, tuple[str, ...], Colour], ...] = (
     ("sidewalk", ("sidewalk",), (240, 234, 226)),
     ("road marking", ("road_marking",), (250, 250, 250)),
 )
-"""Name in the legend, labels, and colour of each kind of ground; later ones are drawn over earlier ones."""
+"""(name in the legend, class labels, colour) of each kind of ground; later kinds are drawn over earlier kinds."""
 
 VEGETATION: Colour = (122, 164, 104)
 BUILDING: Colour = (176, 160, 148)
@@ -41,21 +41,21 @@ FENCE: Colour = (132, 122, 114)
 SHADOW: Colour = (70, 66, 74)
 
 LEAST_BUILDING_M = 2.5
-"""Least height, length and width of an obstacle that is drawn as a building."""
+"""Smallest height, length and width in metres of an obstacle that is drawn as a building."""
 
 LEAST_FENCE_M = 3.0
-"""Least length of an obstacle, other than a building, that is drawn as a fence."""
+"""Smallest length in metres of an obstacle that is drawn as a fence and is no building."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class TownGeometry:
-    """The geometry of a town, compiled from its file alone.
+    """The geometry of a town, compiled from its MJCF file without vehicles, people or boards.
 
     Attributes:
-        path: the town's file.
-        model: the compiled model.
-        data: data of the model after forward kinematics.
-        classes: labels of the visible geoms.
+        path: the town's MJCF file.
+        model: the compiled MuJoCo model.
+        data: MuJoCo data of the model after forward kinematics.
+        classes: class labels of the visible geoms.
     """
 
     path: Path
@@ -65,10 +65,10 @@ class TownGeometry:
 
     @staticmethod
     def of(path: Path) -> TownGeometry:
-        """Compiles a town.
+        """Compiles the MJCF file of a town.
 
         Raises:
-            TownError: MuJoCo cannot compile it, or a visible geom has no label.
+            TownError: MuJoCo cannot compile the file, or a visible geom has no label.
         """
         try:
             spec = read_spec(path)
@@ -80,7 +80,9 @@ class TownGeometry:
         return TownGeometry(path=path, model=model, data=data, classes=classify(spec, path))
 
     def corners_m(self, geom: int) -> Array:
-        """(N, 3, 3) corners of a geom's triangles in the world, in metres; an infinite plane ends after 10 km.
+        """Returns the (N, 3, 3) corners of a geom's N triangles in the world, in metres.
+
+        An infinite plane is cut 10 km from its centre.
 
         Raises:
             TownError: the geom has no triangles, such as a height field.
@@ -103,9 +105,9 @@ class Obstacle:
     """A collision geom of the town, seen from above.
 
     Attributes:
-        outline_m: (N, 2) convex outline in the world.
-        height_m: height of its top above its foot.
-        size_m: longer and shorter side of its outline.
+        outline_m: (N, 2) convex outline in the world, in metres.
+        height_m: vertical extent of the geom.
+        size_m: longer and shorter side of the smallest rectangle around the outline.
     """
 
     outline_m: Array
@@ -114,17 +116,17 @@ class Obstacle:
 
     @property
     def is_building(self) -> bool:
-        """Whether it is large and high enough for a building."""
+        """Whether the obstacle is high and wide enough to be drawn as a building."""
         return min(self.height_m, *self.size_m) >= LEAST_BUILDING_M
 
     @property
     def is_fence(self) -> bool:
-        """Whether it is long and no building, such as a fence, a wall or a hedge."""
+        """Whether the obstacle is long and no building, such as a fence, a wall or a hedge."""
         return not self.is_building and self.size_m[0] >= LEAST_FENCE_M
 
 
 def obstacles(geometry: TownGeometry) -> list[Obstacle]:
-    """The collision geoms of a town that are not ground."""
+    """Returns the collision geoms of a town that are not ground."""
     found = []
     for geom in np.flatnonzero(geometry.model.geom_group >= FIRST_HIDDEN_GROUP):
         is_plane = geometry.model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
@@ -139,7 +141,13 @@ def obstacles(geometry: TownGeometry) -> list[Obstacle]:
 
 
 def draw_ground(canvas: Canvas, geometry: TownGeometry, bounds_m: Bounds) -> None:
-    """Draws the ground, plants, fences and buildings of a town with given bounds."""
+    """Draws the ground, plants, fences and buildings of a town.
+
+    Args:
+        canvas: the map.
+        geometry: the compiled town.
+        bounds_m: xmin, ymin, xmax and ymax of the town.
+    """
     corners_m = {geom: geometry.corners_m(geom) for _, labels, _ in COVERS for geom in _labelled(geometry, labels)}
     hidden = _underground(corners_m, _labelled(geometry, ("ground",)), bounds_m)
     for _, labels, colour in COVERS:
@@ -165,8 +173,9 @@ def draw_ground(canvas: Canvas, geometry: TownGeometry, bounds_m: Bounds) -> Non
 
 
 def _underground(corners_m: Mapping[int, Array], ground: Sequence[int], bounds_m: Bounds) -> int | None:
-    """The geom that closes cracks: ground that lies below all other ground and under the whole town; None if there is
-    none.
+    """Returns the ground geom that is only there to close cracks, so that it is not drawn; None if there is none.
+
+    Such a geom lies below all other ground and extends under the whole town.
     """
     if len(corners_m) < 2:
         return None
@@ -184,7 +193,7 @@ def _labelled(geometry: TownGeometry, names: tuple[str, ...]) -> list[int]:
 
 
 def _from_above(corners_m: Array) -> Array:
-    """(M, 3, 2) projections on the ground of those of (N, 3, 3) triangles that have an area there."""
+    """Projects (N, 3, 3) triangles onto the ground; returns the (M, 3, 2) projections with a positive area."""
     flat = corners_m[:, :, :2]
     first, second = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     return flat[np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) > 1e-3]

@@ -1,4 +1,4 @@
-"""The panel to the right of a map: title, legend, scenes, scale and north arrow."""
+"""The panel to the right of a town map: title, legend, list of scenes, scale bar and north arrow."""
 
 from __future__ import annotations
 
@@ -24,7 +24,13 @@ Draw = Callable[[Canvas, float, float], None]
 
 
 def draw_legend(canvas: Canvas, town: Town, colours: Mapping[str, Colour]) -> None:
-    """Fills the panel to the right of the map."""
+    """Draws the panel to the right of the map.
+
+    Args:
+        canvas: the map.
+        town: the town.
+        colours: colours of the scenes with boards, by the scene's name.
+    """
     x, y = canvas.box_px[2] + 36.0, 70.0
     canvas.text((x, y + 8), town.name, 24, INK, bold=True)
     width_m, height_m = town.size_m
@@ -42,12 +48,12 @@ def draw_legend(canvas: Canvas, town: Town, colours: Mapping[str, Colour]) -> No
 
 
 def legend_height_px(scenes: int) -> int:
-    """Height in pixels of the panel of a town with `scenes` scenes."""
+    """Returns the height in pixels of the panel of a town with `scenes` scenes."""
     return 760 + 68 * scenes
 
 
 def scene_note(scene: SceneSpec) -> str:
-    """One line about a scene: boards or truck, vehicles and people."""
+    """Returns one line about a scene: its boards or truck, and the numbers of vehicles and people."""
     if scene.truck is not None:
         what = f"{scene.truck.asset} in the ego car's lane, {_span(scene.truck.gap_m)} m ahead, on any road"
     elif scene.boards:

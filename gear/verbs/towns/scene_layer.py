@@ -1,4 +1,4 @@
-"""Boards and limits of scenes on a map."""
+"""The scene layer of a town map: boards, and the areas in which the road users of a scene may be."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ BEHIND_NUMBER_PX = 12.0
 CLEAR_M = 3.0
 
 Box = tuple[float, float, float, float]
-"""x and y of the middle, half width and half height, in pixels."""
+"""A rectangle as (x of its centre, y of its centre, half width, half height), in pixels."""
 
 
 def scene_colours(scenes: Mapping[str, SceneSpec]) -> dict[str, Colour]:
-    """Colours of the scenes with boards, by the scene's name."""
+    """Returns the colours in which scenes with boards are drawn, by the scene's name."""
     with_boards = [name for name, scene in scenes.items() if scene.boards]
     return {name: PALETTE[number % len(PALETTE)] for number, name in enumerate(with_boards)}
 
@@ -54,10 +54,10 @@ def draw_limits(canvas: Canvas, scene: SceneSpec, colour: Colour) -> None:
 
 
 def draw_boards(canvas: Canvas, library: AssetLibrary, scene: SceneSpec, colour: Colour) -> None:
-    """Draws each board of a scene and a wedge in the direction that it faces; several boards are numbered.
+    """Draws each board of a scene, and a wedge in the direction that the board faces; several boards are numbered.
 
     Raises:
-        TownError: the file of a board cannot be compiled or has no face.
+        TownError: the file of a board cannot be compiled, or the board has no face (the rectangle for the patch).
     """
     for number, board in enumerate(scene.boards):
         centre = canvas.to_px(board.position_m)[0]
@@ -75,7 +75,7 @@ def draw_boards(canvas: Canvas, library: AssetLibrary, scene: SceneSpec, colour:
 
 
 def draw_names(canvas: Canvas, scenes: Mapping[str, SceneSpec], colours: Mapping[str, Colour]) -> None:
-    """Writes the name of each scene near its first board, away from boards and other names."""
+    """Writes the name of each scene near its first board, at a position away from boards and other names."""
     clear_px = max(12.0, CLEAR_M * canvas.px_per_m)
     boards = [board for name in colours for board in scenes[name].boards]
     taken: list[Box] = [(*canvas.to_px(board.position_m)[0], clear_px, clear_px) for board in boards]
@@ -92,7 +92,9 @@ def draw_names(canvas: Canvas, scenes: Mapping[str, SceneSpec], colours: Mapping
 
 
 def _spots(canvas: Canvas, board: BoardSpec, half_px: tuple[float, float]) -> list[Box]:
-    """Candidate places of a name inside of the map, the best first: behind its board, around it, further away."""
+    """Returns candidate positions of a name inside the map, the best first: behind its board, around it, further
+    away.
+    """
     x, y = canvas.to_px(board.position_m)[0]
     left, top, right, bottom = canvas.box_px
     spots = []
@@ -116,14 +118,22 @@ def _overlap_px2(first: Box, second: Box) -> float:
 
 
 def limits_outline_m(board: BoardSpec, limits: NpcLimits) -> Array | None:
-    """(4, 2) corners in the world of limits in a board's frame; None for limits around the ego car alone."""
+    """Returns the (4, 2) corners in the world of an area that is defined relative to a board; None if the area is
+    not relative to a board.
+    """
     if not limits.needs_board:
         return None
     return board_rectangle_m(board, limits.ahead_m or (-1e4, 1e4), limits.lateral_m or (-1e4, 1e4))
 
 
 def board_rectangle_m(board: BoardSpec, ahead_m: Range, lateral_m: Range) -> Array:
-    """(4, 2) corners in the world of a rectangle in the frame of a board."""
+    """Returns the (4, 2) corners in the world of a rectangle that is defined relative to a board, in metres.
+
+    Args:
+        board: the board.
+        ahead_m: range in the direction that the board faces.
+        lateral_m: range to the left of that direction.
+    """
     facing = math.radians(board.facing_deg)
     along, left = np.array([math.cos(facing), math.sin(facing)]), np.array([-math.sin(facing), math.cos(facing)])
     corners = [(a, b) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
@@ -131,7 +141,9 @@ def board_rectangle_m(board: BoardSpec, ahead_m: Range, lateral_m: Range) -> Arr
 
 
 def _face_width_m(library: AssetLibrary, board: BoardSpec) -> float:
-    """Width of a board's face in metres: that of the scene, or the size in the board's file.
+    """Returns the width in metres of the face, the rectangle of a board that shows the patch.
+
+    It is the width in the scene, or that in the board's file if the scene gives none.
 
     Raises:
         TownError: the board's file cannot be compiled or has no face.

@@ -1,4 +1,4 @@
-"""A sheet of thumbnails: every scene of a town as its ego car sees it in one sample."""
+"""A sheet of thumbnails: one rendered sample of every scene of a town, from the camera of the ego car."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class SheetOptions:
     """Settings of the thumbnails.
 
     Attributes:
-        renderer, quality: name of the renderer, and its quality.
-        weather: light and air.
-        seed: seed of the sampled views.
+        renderer, quality: name of the renderer, and its quality (`film` or `fast`).
+        weather: weather of the rendered scenes.
+        seed: seed of the sampled viewpoints.
         width_px, height_px: size of one thumbnail.
     """
 
@@ -51,15 +51,16 @@ class SheetOptions:
 def draw_sheet(
     town: Town, options: SheetOptions, on_progress: Progress | None = None
 ) -> tuple[UInt8Image, list[GearError]]:
-    """Renders one sample of every scene into a sheet.
+    """Renders one sample of every scene of a town and arranges the pictures in a grid.
 
     Args:
-        town: with a scene library.
+        town: a town with scenes.
         options: settings of the thumbnails.
         on_progress: called with the numbers of finished and of all scenes.
 
     Returns:
-        (H, W, 3) uint8 RGB, and the errors of scenes that cannot be composed or planned; their cells show the error.
+        The sheet, (H, W, 3) uint8 RGB, and the errors of scenes that cannot be composed or planned; their cells show
+        the error.
 
     Raises:
         BackendError: the renderer cannot start.
@@ -82,7 +83,7 @@ def draw_sheet(
 
 
 def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) -> tuple[UInt8Image, str]:
-    """Renders one sample of a scene: (H, W, 3) uint8 RGB, and a line on its faces and road users."""
+    """Renders one sample of a scene; returns (H, W, 3) uint8 RGB and a line about its patch surfaces and road users."""
     world = World.build(town=town.library.town, scene_name=name, scene=scene, weather=options.weather)
     rig = Rig(cameras=(CameraMount(name="rgb", width_px=options.width_px, height_px=options.height_px),))
     record = ScenePlanner(world, rig, SplitConfig(seed=options.seed, samples=1), split_name="debug").plan(0)

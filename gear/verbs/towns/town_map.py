@@ -1,4 +1,4 @@
-"""A top-down map of a town: streets, buildings, lanes with their directions, boards and limits of its scenes."""
+"""A top-down map of a town: streets, buildings, lanes with directions, and the boards and areas of its scenes."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ TICK_PX = 7.0
 
 
 def draw_map(town: Town, geometry: ground_layer.TownGeometry) -> UInt8Image:
-    """Draws a town with all of its scenes.
+    """Draws the map of a town with all of its scenes.
 
     Args:
-        town: its lanes and its scenes.
-        geometry: its compiled geometry.
+        town: the town with its lanes and scenes.
+        geometry: the compiled geometry of the town.
 
     Returns:
         (H, W, 3) uint8 RGB.
 
     Raises:
-        TownError: a board's file is broken.
+        TownError: the file of a board is broken, or a geom of the town has no triangles.
     """
     scenes: Mapping[str, SceneSpec] = {} if town.scenes is None else town.scenes.scenes
     xmin, _, _, ymax = town.lanes.bounds_m

@@ -1,4 +1,4 @@
-"""Lanes, sidewalks, crosswalks and parking bays on a map."""
+"""The traffic layer of a town map: lanes, sidewalks, crosswalks and parking bays."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STRIPE_EVERY_M = 1.1
 
 
 def draw_traffic(canvas: Canvas, graph: LaneGraph) -> None:
-    """Draws the lanes, walks and parking bays of a town."""
+    """Draws the lanes, sidewalks, crosswalks and parking bays of a town."""
     for bay in graph.bays:
         _bay(canvas, bay)
     for walk in graph.walks.values():
@@ -36,7 +36,15 @@ def draw_traffic(canvas: Canvas, graph: LaneGraph) -> None:
 
 
 def lane_arrow(canvas: Canvas, tip_px: Array, heading_rad: float, length_px: float, colour: Colour) -> None:
-    """Draws an arrowhead with its middle at a pixel, in a heading counter-clockwise from east."""
+    """Draws an arrowhead that shows the direction of a lane.
+
+    Args:
+        canvas: the map.
+        tip_px: position of the middle of the arrowhead.
+        heading_rad: direction, counter-clockwise from east.
+        length_px: length of the arrowhead.
+        colour: colour of the arrowhead.
+    """
     along = np.array([np.cos(heading_rad), -np.sin(heading_rad)]) * length_px
     across = np.array([-along[1], along[0]]) * 0.42
     back = tip_px - along * 0.5

@@ -1,4 +1,4 @@
-"""Writes the map and the thumbnails of `gear towns NAME --out DIR`."""
+"""`gear.write_town`: writes the map and the thumbnails of a town."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ QUALITIES: tuple[Quality, ...] = ("film", "fast")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TownReport:
-    """The files that were written for a town.
+    """The result of `gear.write_town`.
 
     Attributes:
         town: the town.
         map: path of the map.
-        sheet: path of the thumbnails; None where the town has no scenes.
+        sheet: path of the sheet of thumbnails; None if the town has no scenes.
         problems: errors of the scenes that cannot be read, composed or planned.
     """
 
@@ -42,7 +42,7 @@ class TownReport:
     problems: tuple[GearError, ...] = ()
 
     def summary(self) -> str:
-        """One line with the paths and the number of scenes."""
+        """Returns one line with the paths and the number of scenes."""
         files = [str(path) for path in (self.map, self.sheet) if path is not None]
         count = 0 if self.town.scenes is None else len(self.town.scenes.scenes)
         return f"{' and '.join(files)}: {self.town.name} with {count} scene{'' if count == 1 else 's'}"
@@ -60,23 +60,25 @@ def write_town(
     progress: bool = False,
     on_progress: Progress | None = None,
 ) -> TownReport:
-    """Writes `<town>_map.png`, and `<town>_scenes.png` with a thumbnail of every scene.
+    """Writes two pictures of a town: `<town>_map.png`, a map, and `<town>_scenes.png`, a thumbnail of every scene.
 
     Args:
-        town: name of a town, or path of its MJCF.
-        out: folder of the files; it is made if it does not exist.
-        scenes: path of a scene library; gear's own for that town if None.
+        town: name of a town, or path of its MJCF file.
+        out: folder of the files; it is created if it does not exist.
+        scenes: path of a scene library; None takes the library that is part of gear.
         renderer, quality: renderer of the thumbnails, and its quality.
         weather: name of a weather preset.
-        seed: seed of the views of the thumbnails.
+        seed: seed of the viewpoints of the thumbnails.
         progress: shows a progress bar.
-        on_progress: called after every picture with the numbers of finished and of all pictures.
+        on_progress: called after every thumbnail with the numbers of finished and of all thumbnails.
 
     Raises:
-        UnknownNameError: there is no such town, file, renderer or weather.
-        BackendError: the renderer does not start here; says what to install.
-        TownError: the town breaks the conventions.
+        UnknownNameError: there is no such town, file, renderer, quality or weather.
+        BackendError: the renderer does not start on this machine; the message says what to install.
+        TownError: the MJCF file breaks gear's conventions for towns.
+        ConfigError: no scene of the library is usable, or the library is for another town.
         DatasetError: `out` cannot be written.
+        GearError: the seed is negative.
     """
     check_pictures(renderer=renderer, quality=quality, weather=weather, seed=seed)
     found = _drawable(read_town(town, scenes))
@@ -100,7 +102,7 @@ def write_town(
 
 
 def _drawable(town: Town) -> Town:
-    """The town without the scenes whose boards cannot be compiled; these are among its faulty scenes."""
+    """Returns the town without the scenes whose boards cannot be compiled; these are moved to its faulty scenes."""
     if town.scenes is None:
         return town
     faulty: dict[str, GearError] = {}
@@ -119,7 +121,7 @@ def _drawable(town: Town) -> Town:
 
 
 def check_pictures(*, renderer: str, quality: str, weather: str, seed: int) -> None:
-    """Checks the settings of thumbnails, which are those of `write_town`.
+    """Checks the settings of the thumbnails that `gear.write_town` renders.
 
     Raises:
         UnknownNameError: there is no such renderer, quality or weather.

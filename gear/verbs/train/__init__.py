@@ -1,1 +1,1 @@
-"""`gear.train`: trains networks that have losses, for any task."""
+"""The verb `train`: trains networks for any task; the network's plugin supplies the losses."""

@@ -1,9 +1,10 @@
-"""Adversarial patch training: part of the training pictures show patches optimised against the network.
+"""Adversarial patch training: part of the training pictures contain patches that are optimised against the
+network.
 
-As in meta adversarial training (Metzen et al., "Meta Adversarial Training against Universal Patches", 2021) a pool of
-patches is kept: after every epoch a new set of patches is added and the oldest is removed. A compositor puts the
-patches into pictures before augmentation, so that they are cropped, mirrored and recoloured like the rest of the
-picture.
+As in meta adversarial training (Metzen et al., "Meta Adversarial Training against Universal Patches", 2021), a pool of
+patches is maintained. Before every pass over the data a new set of patches is added; if the pool is full, the oldest
+set is removed. A compositor puts the patches into pictures before augmentation, so patches are cropped, mirrored and
+recoloured like the rest of the picture.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ CACHE_BYTES = 1 << 30
 
 
 class Adversary:
-    """Optimises patches against the network and composes them into samples."""
+    """Optimises patches against the network during the training, and puts them into training samples."""
 
     def __init__(
         self,
@@ -47,10 +48,10 @@ class Adversary:
         cache_bytes: int = CACHE_BYTES,
     ) -> None:
         """Args:
-            samples: training samples; those of scenes with surfaces (and with probes, for `transport`) get patches.
+            samples: training samples; those of scenes with patch surfaces get patches.
             config: the attack with its settings.
             task: task that the attack must support.
-            seed: seed of all random draws of this class.
+            seed: seed of the draws of scenes and samples and of the attack.
             device: device of the compositor.
             cache_bytes: memory for the compositors of all scenes together.
 
@@ -93,8 +94,13 @@ class Adversary:
         self._lock = threading.Lock()
 
     def refresh(self, model: Any, epoch: int) -> None:
-        """Adds one set of patches to the pool, optimised against the model in its current state, in a scene drawn
-        at random.
+        """Optimises one set of patches against the model in its current state and adds the set to the pool.
+
+        The patches are optimised on samples of one scene, which is drawn at random.
+
+        Args:
+            model: the network that is attacked.
+            epoch: number of the pass over the data; it seeds the random draws.
         """
         rng = derive_rng(self._seed, "adversary", epoch)
         number = sorted(self._compositors)[int(rng.integers(len(self._compositors)))]
@@ -114,8 +120,17 @@ class Adversary:
         self._pool = [*self._pool, tensors][-self._config.pool :]
 
     def change(self, sample: Any, index: int, rng: np.random.Generator) -> Any:
-        """The sample, with patches of the pool on its surfaces in a random share of the calls. Several threads may
-        call it.
+        """Puts patches of the pool on the surfaces of a sample, with the probability `share` of the config.
+
+        Several threads may call this method at the same time.
+
+        Args:
+            sample: the training sample.
+            index: index of the sample in the training samples.
+            rng: generator of the random draws.
+
+        Returns:
+            A copy of the sample with changed pictures, or the sample itself.
         """
         dataset, place = self._samples.places[index]
         if dataset not in self._compositors or not self._pool or rng.random() >= self._config.share:
@@ -130,11 +145,11 @@ class Adversary:
         return dataclasses.replace(sample, images=images)
 
     def state(self) -> dict[str, Tensor]:
-        """The pool as arrays, for a checkpoint."""
+        """Returns all patches of the pool as named (3, h, w) tensors, for a checkpoint."""
         return {f"{n:04d}.{k:02d}": patch for n, patches in enumerate(self._pool) for k, patch in enumerate(patches)}
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
-        """Restores a pool from the arrays of `state`."""
+        """Replaces the pool by the patches in `state`, tensors that the method `state` returned."""
         sets: dict[str, list[Tensor]] = {}
         for key in sorted(state):
             sets.setdefault(key.partition(".")[0], []).append(state[key])
@@ -142,7 +157,7 @@ class Adversary:
 
 
 class _Chosen:
-    """A compositor for a subset of the samples of a split, indexed from 0."""
+    """A compositor for some of the samples of a split; the samples are indexed from 0."""
 
     def __init__(self, compositor: Any, indices: Sequence[int]) -> None:
         self._compositor, self._indices = compositor, tuple(indices)

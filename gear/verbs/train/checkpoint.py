@@ -1,6 +1,4 @@
-"""Checkpoints of a training: a safetensors file with everything on which the next step depends, always whole on
-disk.
-"""
+"""Checkpoints of a training: safetensors files with everything on which the next step depends, written atomically."""
 
 from __future__ import annotations
 
@@ -28,23 +26,23 @@ from gear.verbs.train.optimise import RunningMean
 FILE = "checkpoint.safetensors"
 
 BROKEN = (SafetensorError, OSError, KeyError, ValueError, RecursionError)
-"""Exceptions that occur when a file that is not a checkpoint is read."""
+"""Exceptions that reading a file raises if the file is no valid checkpoint."""
 
 
 @dataclass(slots=True)
 class TrainingState:
-    """The progress of a training.
+    """The progress of a training, as stored in a checkpoint.
 
     Attributes:
         step: number of finished steps.
-        position: position in the data.
-        elapsed_s: time that steps and validations have taken, in seconds.
-        best_step: step whose weights were the best in validation; -1 before the first validation.
-        best_sha256: hash of the file of those weights; "" in checkpoints of older versions.
+        position: epoch and batch at which the training continues.
+        elapsed_s: time of all steps and validations, in seconds.
+        best_step: step after which the weights were the best in validation; -1 before the first validation.
+        best_sha256: hash of the file with the best weights; "" in checkpoints of older versions.
         worse: number of validations since the best one.
-        broken: number of consecutive skipped steps, up to the last step.
-        steps: `step`, `loss` and `rate` of every stretch of the training.
-        open_losses: losses of the steps after the last complete stretch.
+        broken: number of consecutive steps, up to the last one, that were skipped because the loss was not finite.
+        steps: history of the training: `step`, mean `loss` and learning rate `rate`, one entry per 10 steps.
+        open_losses: losses of the steps after the last entry of `steps`.
         validations: `step`, `elapsed_s`, `took_s`, `loss` and metrics of every validation.
     """
 
@@ -60,16 +58,16 @@ class TrainingState:
     validations: list[dict[str, Any]] = field(default_factory=list)
 
     def as_json(self) -> Json:
-        """All fields as JSON."""
+        """Returns all fields as JSON."""
         return dataclasses.asdict(self)
 
     @staticmethod
     def from_json(value: Json) -> TrainingState:
-        """Reads the JSON of `as_json`.
+        """Reads the JSON that `as_json` returned.
 
         Raises:
-            ValueError, KeyError, TypeError: the JSON lacks a field that a training needs to continue, or has another
-                one.
+            ValueError, KeyError, TypeError: a field that a training needs to continue is missing or invalid, or there
+                is an unknown field.
         """
         kinds = {"step": int, "best_step": int, "worse": int, "elapsed_s": float}
         for name, kind in kinds.items():
@@ -96,7 +94,17 @@ def save(
     optimiser: torch.optim.Optimizer,
     extra: Mapping[str, Tensor],
 ) -> None:
-    """Replaces the checkpoint by a new one."""
+    """Writes a checkpoint and replaces the previous one.
+
+    Args:
+        root: folder of the training.
+        plan: everything on which the weights depend, as JSON.
+        progress: progress of the training.
+        module: the trained network.
+        mean: moving average of the network's weights.
+        optimiser: the optimiser.
+        extra: further tensors to store, such as adversarial patches.
+    """
     tensors = {f"module.{key}": value for key, value in module.state_dict().items()}
     tensors |= {f"mean.{key}": value for key, value in mean.state.items()}
     for number, entries in optimiser.state_dict()["state"].items():
@@ -110,10 +118,10 @@ def save(
 def load(
     root: Path, plan: Json, module: nn.Module, mean: RunningMean, optimiser: torch.optim.Optimizer
 ) -> tuple[TrainingState, dict[str, Tensor]] | None:
-    """Loads a checkpoint into the parts of a training; does nothing if there is none.
+    """Loads the checkpoint in the folder `root` into the network, the averaged weights and the optimiser.
 
     Returns:
-        The progress and the extra tensors.
+        The progress and the extra tensors; None if there is no checkpoint.
 
     Raises:
         DatasetError: the checkpoint belongs to a training with other settings or data, or is damaged.
@@ -140,8 +148,9 @@ def load(
 
 
 def begun_config(root: Path) -> Json:
-    """The config of the training in a folder; None if there is no checkpoint, or if it cannot be read, which `load`
-    reports.
+    """Returns the config of the training whose checkpoint is in the folder, as JSON.
+
+    The result is None if there is no checkpoint or if it cannot be read; `load` reports the latter.
     """
     path = root / FILE
     if not path.exists():
@@ -158,7 +167,9 @@ def _damaged(path: Path, error: Exception) -> DatasetError:
 
 
 def _fill(state: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> None:
-    """Copies every tensor after comparing shapes, because torch would broadcast a smaller tensor silently."""
+    """Copies tensors into the tensors of `state` after comparing shapes, because torch would broadcast smaller
+    tensors without an error.
+    """
     for key, tensor in state.items():
         if given[key].shape != tensor.shape:
             raise ValueError(f"mean.{key} is {tuple(given[key].shape)}, not {tuple(tensor.shape)}")
@@ -166,7 +177,7 @@ def _fill(state: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> None:
 
 
 def _states(tensors: Mapping[str, Tensor], optimiser: torch.optim.Optimizer) -> dict[int, dict[str, Tensor]]:
-    """The optimiser's state of each weight: counters, and tensors with the shape of the weight."""
+    """Returns the optimiser's state of each weight: counters, and tensors with the shape of the weight."""
     weights = [weight for group in optimiser.param_groups for weight in group["params"]]
     state: dict[int, dict[str, Tensor]] = {}
     for key, value in _below(tensors, "optimiser.").items():
@@ -182,10 +193,15 @@ def _states(tensors: Mapping[str, Tensor], optimiser: torch.optim.Optimizer) -> 
 
 
 def check_plan(root: Path, there: Json, wanted: Json) -> None:
-    """Checks that the training in a folder is the one that was requested.
+    """Checks that the training in a folder has the requested settings and data.
+
+    Args:
+        root: folder of the training, for the message.
+        there: plan in the checkpoint: everything on which the weights depend, as JSON.
+        wanted: plan of the requested training.
 
     Raises:
-        DatasetError: the training in the folder is another one; the message names the difference.
+        DatasetError: the plans differ; the message names the keys.
     """
     if there == wanted:
         return

@@ -1,4 +1,4 @@
-"""The configuration of a training: the network's recipe with the user's changes."""
+"""The configuration of a training: the recipe of the network (its default hyperparameters) with the user's changes."""
 
 from __future__ import annotations
 
@@ -16,28 +16,27 @@ from gear.contracts.models import Recipe
 from gear.values.errors import FieldError
 
 SCALES, CROPS_PX = (0.1, 100.0), (16, 8192)
-"""Ranges of scale factors and of the sides of crops in pixels; larger pictures need more memory than machines have."""
+"""Allowed ranges of scale factors, and of the sides of crops in pixels; larger pictures would need too much memory."""
 
 MOST_RATE = 1e6
-"""Largest learning rate. No network learns at this rate, and optimisers fail at rates that single precision cannot
-represent.
-"""
+"""Largest allowed learning rate, because optimisers fail at rates that float32 cannot represent."""
 
 SHARES = ("warm_up", "final_rate", "validation_share")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adversarial:
-    """Adversarial patch training: part of the pictures show patches optimised against the network during the
-    training.
+    """Settings of adversarial patch training: part of the pictures contain patches optimised against the network
+    during the training.
 
     Attributes:
         attack: name of the attack plugin; "" for no adversarial training.
-        share: probability that a sample with surfaces shows patches of the pool.
-        pool: number of patch sets that are kept.
+        share: probability that a sample with surfaces gets patches of the pool.
+        pool: largest number of patch sets in the pool.
         steps: optimisation steps of the attack for one set.
         samples: number of samples, of one scene, on which a set is optimised.
-        compositor: `transport` needs data collected with probes, `homography` does not.
+        compositor: method that puts patches into pictures: `transport` needs data collected with probes, `homography`
+            does not.
         options: options of the attack (`gear plugins show ATTACK` lists them).
     """
 
@@ -61,29 +60,29 @@ class Adversarial:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainConfig(Recipe):
-    """The configuration of one training: the network's recipe and further settings.
+    """The configuration of one training: the network's recipe (its default hyperparameters) and further settings.
 
     Attributes:
         seed: seed of initial weights, order, augmentation and the network's own random draws.
-        time_budget_s: training time in seconds instead of `epochs`; the learning rate then follows the time that is
-            left. 0 counts epochs.
-        precision: precision of the training steps; `auto` is bfloat16 where a time budget is set and the device is
+        time_budget_s: training time in seconds, which replaces `epochs`; the learning rate then follows the remaining
+            time. 0 counts epochs.
+        precision: precision of the training steps; `auto` is bfloat16 if there is a time budget and the device is
             faster with it, else float32. Validation always uses float32.
-        device: `auto` takes a GPU where there is one.
-        init: initial weights: "" is random, `shipped` the reference weights, a path a safetensors file, a name such as
-            `imagenet` one that the network knows, and `trunk:` with a file or a network with reference weights takes
-            the weights whose keys and shapes match.
+        device: `cpu`, `cuda`, or `auto`, which takes a GPU if there is one.
+        init: initial weights: "" for random weights; `shipped` for the reference weights; the path of a safetensors
+            file; a name that the network defines, such as `imagenet`; or `trunk:` followed by a file or by a network
+            with reference weights, which loads the weights whose keys and shapes match.
         picture_scale: factor by which pictures are resized in training and validation; null is 1, or, with a time
-            budget on a CPU, a factor that leaves time for enough steps (`gear.verbs.train.sizes`).
+            budget on a CPU, a factor that leaves time for enough steps.
         warm_up: share of the training during which the learning rate rises.
         final_rate: learning rate at the end, as a share of the peak.
-        ema: decay of the exponential moving average of the weights, which is validated and kept; 0 for none.
-        validation_share: share of the training data that is held out for validation where no validation data are given.
+        ema: decay of the exponential moving average of the weights, which is validated and saved; 0 for no averaging.
+        validation_share: share of the training data that is held out for validation if no validation data are given.
         validation_samples: largest number of samples of a validation, spread evenly over the data.
         patience: number of validations without improvement after which the training stops; 0 for never.
-        workers: threads that decode and augment; the result does not depend on them.
-        cache_gb: memory for decoded samples, and a quarter of it for what compositors precompute; what does not fit is
-            computed again. The result does not depend on it.
+        workers: number of threads that decode and augment; the result does not depend on it.
+        cache_gb: memory in GB for decoded training samples; decoded validation samples, and data that compositors
+            precompute, may each take a quarter of this size in addition. Data that do not fit are computed again.
         augmentation: augmentation of training samples.
         adversarial: adversarial patch training.
         options: options of the network (`gear plugins show MODEL` lists them).
@@ -130,19 +129,25 @@ class TrainConfig(Recipe):
 
     @property
     def framing(self) -> Framing:
-        """The window of a picture that training samples show."""
+        """The random crops and scale factors of training samples."""
         return Framing(crop_px=self.crop_px, scales=self.scales)
 
 
 FLAGS = {"learning_rate": "lr", "time_budget_s": "time-budget"}
-"""Flags of the command whose name differs from the key."""
+"""Command-line flags that differ from the name of the config key, by key."""
 
 
 def read_config(recipe: Recipe, flags: Mapping[str, Any], settings: Iterable[str] = ()) -> TrainConfig:
-    """Reads a recipe with flags (None for flags that were not given) and `KEY=VALUE` texts on top.
+    """Returns the training config: a recipe (default hyperparameters of the network), overridden by flags and by
+    settings.
+
+    Args:
+        recipe: recipe of the network.
+        flags: values by key of the config; None leaves the value of the recipe.
+        settings: `KEY=VALUE` texts; they override flags.
 
     Raises:
-        ConfigError: a key is unknown, or a value is refused.
+        ConfigError: a key is unknown, or a value is not allowed.
     """
     base = parse_text(to_yaml(recipe), "recipe")
     given: dict[str, tuple[Place, Node]] = {}

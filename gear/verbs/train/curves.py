@@ -1,4 +1,4 @@
-"""The curves of a training: losses, learning rate and the task's metric."""
+"""Plots the curves of a training: losses, learning rate and the task's metric."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ BLUE, RED, GREEN = "#1f5fa8", "#b3402a", "#2f7d4f"
 
 
 def write_curves(root: Path, spec: TaskSpec, progress: TrainingState, title: str) -> None:  # type: ignore[type-arg]
-    """Writes `curves.png`."""
+    """Writes `curves.png`: training and validation loss on the left, the task's metric and the learning rate on
+    the right.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -58,6 +60,6 @@ def write_curves(root: Path, spec: TaskSpec, progress: TrainingState, title: str
 
 
 def _line(axis: Axes, points: Sequence[tuple[float, float]], **style: Any) -> None:
-    """Draws a line through steps and values; a single point is drawn as a dot."""
+    """Draws a line through (step, value) points; a single point is drawn as a dot."""
     if points:
         axis.plot(*zip(*points, strict=True), marker="" if len(points) > 1 else "o", ms=3, **style)

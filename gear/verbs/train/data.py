@@ -1,4 +1,4 @@
-"""Selects training samples, and the share that is held out for validation."""
+"""Selects training samples, and splits off samples for validation."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ VALIDATION = ("val",)
 
 
 def spread(samples: Samples, most: int) -> Samples:
-    """At most `count` of the samples, evenly spread."""
+    """Returns at most `most` of the samples, evenly spaced."""
     count = min(most, len(samples))
     return Samples(samples.datasets, tuple(samples.places[i * len(samples) // count] for i in range(count)))
 
 
 def keep_some(samples: Samples, share: float, seed: int) -> tuple[Samples, Samples]:
-    """Splits samples into training and validation samples.
+    """Splits samples into training samples and validation samples.
 
-    Whole sequences go to one side, together with all their weathers and patches, so that no street of the validation is
-    seen in training.
+    All samples of a sequence, in every weather and with every patch, go to the same side. Therefore no scene content of
+    the validation occurs in training.
 
     Raises:
         GearError: there are too few samples.
@@ -43,12 +43,14 @@ def keep_some(samples: Samples, share: float, seed: int) -> tuple[Samples, Sampl
 
 
 def _streets(datasets: Sequence[Dataset[Any]]) -> list[int]:
-    """For each dataset the index of the first dataset that shows the same streets in any weather and with any patch."""
+    """Returns for each dataset the index of the first dataset with the same scene content, in any weather and with
+    any patch.
+    """
     keys = [scenes_of(dataset) for dataset in datasets]
     return [keys.index(key) for key in keys]
 
 
 def _sequence(samples: Samples, place: tuple[int, int], streets: Sequence[int]) -> tuple[int, int]:
-    """The driving sequence that a sample belongs to; most sequences are one picture long."""
+    """Returns an identifier of the driving sequence that a sample belongs to; most sequences consist of one picture."""
     frames = max(samples.datasets[place[0]].content(int, "frames"), 1)
     return streets[place[0]], place[1] // frames

@@ -1,4 +1,4 @@
-"""An endless supply of training batches, decoded and augmented in threads while the network trains."""
+"""Supplies training batches endlessly; threads decode and augment samples while the network trains."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Position:
     batch: int = 0
 
     def following(self, batches: int) -> Position:
-        """The position after one more batch, for passes of `batches` batches."""
+        """Returns the position after one more batch; `batches` is the number of batches per pass."""
         return Position(self.epoch, self.batch + 1) if self.batch + 1 < batches else Position(self.epoch + 1, 0)
 
 
 class Feed:
-    """Supplies batches from any position on. A batch depends only on the seed, the position and the samples."""
+    """Supplies batches, starting at any position. A batch depends only on the seed, the position and the samples."""
 
     def __init__(
         self,
@@ -51,10 +51,10 @@ class Feed:
     ) -> None:
         """Args:
             samples: training samples.
-            config: batch size, seed, framing, augmentation and number of threads.
+            config: config with batch size, seed, crops, augmentation and number of threads.
             views: names of the cameras that the network uses.
             change: function that is applied to each sample before augmentation.
-            device: device of the batches. Pictures are copied there as bytes and converted there.
+            device: device of the batches. Pictures are copied to it as uint8 and converted to floats on it.
 
         Raises:
             GearError: there are no samples.
@@ -68,7 +68,7 @@ class Feed:
         self.batches = len(samples) // self._size
 
     def from_position(self, position: Position) -> Generator[Batch]:
-        """Yields the remaining batches of this pass and all that follow. Close the iterator to end its threads."""
+        """Yields the batches from a position on, without end. Closing the generator ends its threads."""
         pool = ThreadPoolExecutor(self._config.workers, thread_name_prefix="gear-train")
         joining = ThreadPoolExecutor(1, thread_name_prefix="gear-train-batch")
         ahead: deque[Future[Batch]] = deque()
@@ -85,13 +85,13 @@ class Feed:
                 threads.shutdown(wait=True, cancel_futures=True)
 
     def _indices(self, position: Position) -> tuple[int, ...]:
-        """The indices of each batch of a pass; a last batch that would not be full is left out."""
+        """Returns the sample indices of the batch at a position; an incomplete last batch of a pass is left out."""
         shuffled = order(len(self._items), seed=self._config.seed, epoch=position.epoch)
         start = position.batch * self._size
         return tuple(shuffled[start : start + self._size])
 
     def _item(self, epoch: int, index: int) -> Item:
-        """An augmented sample whose pictures are uint8 tensors."""
+        """Returns an augmented sample whose pictures are uint8 tensors."""
         item = self._items.item(index, epoch)
         rng = derive_rng(self._config.seed, "augment", epoch, index)
         shown = replace(item, sample=augment(item.sample, self._config.augmentation, self._config.framing, rng))
@@ -99,7 +99,7 @@ class Feed:
         return shown
 
     def _batch(self, making: Sequence[Future[Item]]) -> Batch:
-        """Copies a batch to the network's device without making the training thread wait."""
+        """Stacks samples to a batch and copies it to the network's device without blocking the training thread."""
         items = [future.result() for future in making]
         try:
             batch = stacked(items)

@@ -1,4 +1,4 @@
-"""The training loop: steps, validations and checkpoints, in an order that depends only on seed and data."""
+"""The training loop: steps, validations and checkpoints, in an order that depends only on the seed and the data."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from gear.verbs.train.results import check_kept, is_kept, write_weights
 from gear.verbs.train.validate import rank, total, validate
 
 NOTE_EVERY = 10
-"""Number of steps whose mean loss is one point of the history."""
+"""Number of steps whose mean loss is one entry of the history."""
 
 CHECKPOINT_EVERY_S = 120.0
 VALIDATION_SHARE = 0.1
@@ -50,19 +50,19 @@ ONE_VALUE = "more than 1 value per channel"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Parts:
-    """The parts that a training works with.
+    """The objects that a training works with.
 
     Attributes:
-        spec, task: the task and its evaluator.
+        spec, task: spec of the task, and the task, which supplies the evaluator.
         found: plugin of the network.
         model: the network that is trained.
         twin: a float32 copy of the network that receives the averaged weights and is validated.
-        views: cameras that the network sees.
+        views: names of the cameras whose pictures the network uses.
         validation: held-out samples.
-        feed: training batches.
-        adversary: makes patches before every pass; None without adversarial training.
+        feed: supplies training batches.
+        adversary: makes adversarial patches before every pass; None without adversarial training.
         root: folder of the results.
-        plan: plan that a checkpoint must have to be continued.
+        plan: everything on which the weights depend, as JSON; a checkpoint is resumed only if its plan is equal.
     """
 
     spec: TaskSpec[Any]
@@ -79,14 +79,18 @@ class Parts:
 
 
 OnStep = Callable[[TrainingState, float, dict[str, float] | None], None]
-"""Called with the state, the finished share of the training (0..1), and, after a validation, its metrics."""
+"""A callback: gets the state, the finished share of the training (0..1), and the metrics after a validation or None."""
 
 Pack = Callable[[dict[str, torch.Tensor], TrainingState], bytes]
-"""A function that returns the bytes of the file with the averaged weights."""
+"""A function that packs averaged weights and the state of the training into the bytes of a weights file."""
 
 
 class Training:
-    """One training, new or continued from a checkpoint."""
+    """One training, new or resumed from a checkpoint.
+
+    Attributes:
+        progress: the progress of the training.
+    """
 
     def __init__(self, parts: Parts, config: TrainConfig, *, on_step: OnStep | None, pack: Pack) -> None:
         self._parts, self._config, self._on_step, self._pack = parts, config, on_step, pack
@@ -113,10 +117,11 @@ class Training:
         return min(1.0, self.progress.step / (self._config.epochs * self._parts.feed.batches))
 
     def run(self) -> TrainingState:
-        """Trains to the end.
+        """Trains to the end and returns the final progress.
 
         Raises:
-            DatasetError: the file of the best weights of a continued training is missing; raised at the start.
+            DatasetError: a training is resumed and the file of its best weights is missing; raised before the first
+                step.
         """
         _train_mode(self._parts.model, True)
         _train_mode(self._parts.twin, False)
@@ -134,8 +139,8 @@ class Training:
         return self.progress
 
     def _passes(self, batches: Iterator[Batch]) -> None:
-        """Yields steps until the end. With an adversary it ends with a pass, because the next pass shows other
-        patches.
+        """Runs steps until the training is over, or with an adversary until the end of the pass, because the next
+        pass uses other patches.
         """
         while not self._is_over:
             with self._timed():
@@ -150,7 +155,7 @@ class Training:
                 return
 
     def _make_patches(self) -> None:
-        """Makes patches against the averaged weights at the beginning of a pass."""
+        """Optimises patches against the averaged weights, if a pass begins and the training is adversarial."""
         adversary, position = self._parts.adversary, self.progress.position
         if adversary is None or position.batch:
             return
@@ -165,8 +170,8 @@ class Training:
 
     @property
     def _is_time_to_validate(self) -> bool:
-        """True after every pass; with a time budget also when validations have taken less than their share of the
-        time.
+        """True at the end of every pass; with a time budget instead, whenever validations have taken less than
+        their share of the time.
         """
         progress = self.progress
         if not self._config.time_budget_s:
@@ -220,7 +225,9 @@ class Training:
             return loss
 
     def _count_broken(self, is_finite: bool, loss: torch.Tensor) -> None:
-        """Counts steps that are skipped because the loss overflows; raises if all recent steps are skipped."""
+        """Counts consecutive steps with a loss or gradients that are not finite; raises an error after too many of
+        them.
+        """
         progress = self.progress
         progress.broken = 0 if is_finite else progress.broken + 1
         if progress.broken > MOST_BROKEN_STEPS:
@@ -249,8 +256,9 @@ class Training:
             self._on_step(progress, self.share, chosen | metrics)
 
     def _keep_best(self) -> None:
-        """Writes the checkpoint before the weights: the weights can be made from the checkpoint, but not the
-        reverse.
+        """Writes the checkpoint and then the weights file.
+
+        After an interruption, the weights file can be made from the checkpoint, but not the reverse.
         """
         mean = {key: value.detach().cpu().clone() for key, value in self._mean.state.items()}
         weights = self._pack(mean, self.progress)
@@ -267,7 +275,9 @@ class Training:
 
     @contextlib.contextmanager
     def _timed(self) -> Iterator[list[float]]:
-        """Adds the time spent inside to the elapsed time, and stores it as the only item of the yielded list."""
+        """Adds the time spent in the block to the elapsed time; yields a list whose only item is that time after
+        the block.
+        """
         spent, begin = [0.0], time.perf_counter()
         yield spent
         spent[0] = time.perf_counter() - begin

@@ -1,4 +1,4 @@
-"""Optimiser, learning rate schedule, and the moving average of the weights."""
+"""The optimiser, the learning rate schedule, and the moving average of the weights."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ MOMENTUM = 0.9
 
 
 def optimiser_of(module: nn.Module, config: TrainConfig) -> torch.optim.Optimizer:
-    """AdamW or SGD over the trainable parameters; one-dimensional parameters (biases, normalisation) have no
-    weight decay.
+    """Returns AdamW or SGD for the trainable parameters; one-dimensional parameters (biases, normalisation) have
+    no weight decay.
     """
     trained = [parameter for parameter in module.parameters() if parameter.requires_grad]
     groups = [
@@ -27,14 +27,14 @@ def optimiser_of(module: nn.Module, config: TrainConfig) -> torch.optim.Optimize
 
 
 def rate_share(progress: float, *, warm_up: float, final: float) -> float:
-    """The learning rate as a share of its peak: a linear rise, then half a cosine (Loshchilov and Hutter, "SGDR",
-    2017,
-    eq. 5, without restarts).
+    """Returns the learning rate as a share of its peak: a linear rise, then half a cosine.
+
+    The cosine is eq. 5 of Loshchilov and Hutter, "SGDR", 2017, without restarts.
 
     Args:
         progress: share of the training that is finished, 0..1.
-        warm_up: share during which the rate rises.
-        final: share of the peak at the end.
+        warm_up: share of the training during which the rate rises.
+        final: learning rate at the end, as a share of the peak.
     """
     if progress < warm_up:
         return final + (1 - final) * progress / warm_up
@@ -43,11 +43,12 @@ def rate_share(progress: float, *, warm_up: float, final: float) -> float:
 
 
 class RunningMean:
-    """An average of the weights over the last steps (Polyak and Juditsky, 1992), over fewer steps at the
-    beginning.
+    """An exponential moving average of a network's weights (cf. Polyak and Juditsky, 1992), with a smaller decay
+    in the first steps.
 
     Attributes:
-        state: averaged tensors by the module's keys; integer tensors are the module's newest.
+        decay: largest decay per step.
+        state: averaged tensors by key of the state dict; integer tensors are the network's current ones.
     """
 
     def __init__(self, module: nn.Module, decay: float) -> None:
@@ -56,7 +57,7 @@ class RunningMean:
 
     @torch.no_grad()
     def update(self, module: nn.Module, step: int) -> None:
-        """Adds the weights after a step to the average; steps count from 0."""
+        """Adds the current weights to the average; `step` is the number of the step, counted from 0."""
         decay = min(self.decay, (1 + step) / (10 + step))
         newest = module.state_dict()
         moving = [key for key, value in newest.items() if value.is_floating_point()]
@@ -67,7 +68,7 @@ class RunningMean:
 
 
 class Buffers:
-    """A copy of a module's buffers, such as running statistics, that can be restored."""
+    """A copy of a module's buffers, such as batch normalisation statistics, from which the buffers can be restored."""
 
     def __init__(self, module: nn.Module) -> None:
         self._module = module
@@ -77,7 +78,7 @@ class Buffers:
 
     @torch.no_grad()
     def keep(self) -> None:
-        """Stores the buffers in their current state."""
+        """Copies the current values of the module's buffers."""
         buffers = list(self._module.buffers())
         if list(map(id, buffers)) == list(map(id, self._buffers)) and buffers:
             torch._foreach_copy_(self._kept, buffers)
@@ -86,11 +87,11 @@ class Buffers:
 
     @torch.no_grad()
     def put_back(self) -> None:
-        """Restores the stored buffers."""
+        """Restores the buffers from the copy."""
         if self._kept:
             torch._foreach_copy_(self._buffers, self._kept)
 
 
 def clip_gradients(module: nn.Module, most: float) -> Tensor:
-    """Scales gradients to a norm of at most `most`, or not at all if that is 0; returns the original norm."""
+    """Scales the gradients to a total norm of at most `most` (0 means no limit) and returns the norm before scaling."""
     return nn.utils.clip_grad_norm_(module.parameters(), most if most > 0 else math.inf)

@@ -1,4 +1,4 @@
-"""The request of a training."""
+"""The arguments of `gear.train` as a dataclass."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gear.values.errors import GearError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainRequest:
-    """The arguments of `gear.train`, which documents them; None leaves a value to the network's recipe.
+    """The arguments of `gear.train`, which describes each of them; None means the value in the network's recipe.
 
     Raises:
         GearError: there are no data.
@@ -43,7 +43,7 @@ class TrainRequest:
 
     @property
     def config_values(self) -> dict[str, Any]:
-        """Keys of `TrainConfig` with their values; None for what was not given."""
+        """The arguments that are keys of `TrainConfig`, by key; None for arguments that were not given."""
         return {
             "epochs": self.epochs,
             "time_budget_s": self.time_budget_s,
@@ -58,12 +58,12 @@ class TrainRequest:
 
     @property
     def config_settings(self) -> tuple[str, ...]:
-        """`KEY=VALUE` texts for `TrainConfig`, with the one that `adversarial` stands for."""
+        """The `KEY=VALUE` texts for `TrainConfig`; the argument `adversarial` is included as such a text."""
         return self.settings if self.adversarial is None else (f"adversarial.attack={self.adversarial}", *self.settings)
 
     @property
     def command_flags(self) -> dict[str, Any]:
-        """Further flags, besides data and settings, of the command that repeats the training, by flag."""
+        """The values of the command-line flags that repeat this training, by flag, without data and settings."""
         return {
             "epochs": self.epochs,
             "time_budget": _budget(self.time_budget_s),
@@ -77,5 +77,7 @@ class TrainRequest:
 
 
 def _budget(seconds: float | None) -> str | None:
-    """The time budget as text for the command: all digits, no exponent, empty if epochs are counted."""
+    """Returns the time budget as text for the command line, without an exponent, such as `600.5s`; None if epochs
+    are counted.
+    """
     return None if not seconds else f"{np.format_float_positional(seconds, trim='-')}s"

@@ -1,4 +1,4 @@
-"""The results of a training: weights with their provenance, the history, and a model card."""
+"""The results of a training: weights with their metadata, the history of the training, and a model card."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ CARD = "card.md"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
-    """The provenance of weights.
+    """How weights were trained: network, task, config and data.
 
     Attributes:
         model: plugin of the network.
         spec, task: spec and name of the task.
         config: config of the training.
-        training, validation: facts of the data.
+        training, validation: training samples and validation samples.
         command: command line that repeats the training.
-        look: appearance of the training data.
-        picture_share: width of the training pictures, as a share of the task's default width.
+        look: hashes and versions of assets, light and renderer of the training pictures.
+        picture_share: width of the training pictures divided by the task's default width.
     """
 
     model: PluginEntry
@@ -63,7 +63,7 @@ class Origin:
     picture_share: float
 
     def metadata(self, metrics: AnyMapping[str, Any]) -> dict[str, str]:
-        """The metadata of the weights file: texts; structured values are JSON."""
+        """Returns the metadata of the weights file; all values are texts, structured values are JSON texts."""
         data = {"training": self.training.facts(), "validation": self.validation.facts()}
         return {
             "model": self.model.spec.name,
@@ -80,7 +80,7 @@ class Origin:
         }
 
     def _options(self) -> dict[str, Any]:
-        """The options given to the network, adapted to pictures of the task's default size."""
+        """Returns the options of the network that the user gave, adapted to pictures of the task's default size."""
         given = self.config.options.entries if isinstance(self.config.options, Mapping) else {}
         values: Any = to_plain(read_node(self.model.spec.config, self.config.options, "options"))
         options = {name: values[name] for name in given if name not in CIRCUMSTANCES}
@@ -90,19 +90,21 @@ class Origin:
 
 
 def known(metrics: AnyMapping[str, Any]) -> dict[str, Any]:
-    """The metrics that are finite, for JSON."""
+    """Returns the metrics without those that are NaN or infinite, which JSON does not allow."""
     return {key: value for key, value in metrics.items() if not isinstance(value, float) or math.isfinite(value)}
 
 
 def metrics_of(validation: AnyMapping[str, Any]) -> dict[str, float]:
-    """The metrics of a validation, without its times."""
+    """Returns the metrics of a validation entry, without its step and its times."""
     return {key: value for key, value in validation.items() if key not in ("step", "elapsed_s", "took_s")}
 
 
 def command_of(
     task: str, model: str, data: Sequence[str], val: Sequence[str], flags: AnyMapping[str, Any], settings: Sequence[str]
 ) -> str:
-    """The command line of a call; a flag that is True has no value, and one that is None or False is left out."""
+    """Returns the `gear train` command line for the given values; a flag that is True has no value, and None or
+    False leaves a flag out.
+    """
     words = ["gear", "train", "--task", task, "--model", model, "--data", *data, *(["--val", *val] if val else [])]
     for key, value in flags.items():
         if value is not None and value is not False:
@@ -113,30 +115,33 @@ def command_of(
 
 
 def packed(origin: Origin, state: AnyMapping[str, Tensor], progress: TrainingState) -> bytes:
-    """The validated weights as a safetensors file, with matrices in float16."""
+    """Returns the weights of the last validation as the bytes of a safetensors file, with matrices in float16."""
     metrics = metrics_of(progress.validations[-1])
     return serialised(state, origin.metadata(metrics), halves=True)
 
 
 def write_weights(root: Path, weights: bytes) -> None:
-    """Writes the weights. Files that describe earlier weights are deleted first and written again at the end."""
+    """Writes the weights file. Files that describe earlier weights are deleted first and written again at the end
+    of the training.
+    """
     remove_files(root, [CARD, HISTORY, CURVES])
     write_whole(root, WEIGHTS, weights)
 
 
 def is_kept(root: Path, progress: TrainingState) -> bool:
-    """Whether the file of the best weights exists with the recorded hash; any file counts if an old checkpoint records
-    no hash.
+    """Whether the file of the best weights exists and has the recorded hash.
+
+    Checkpoints of older versions record no hash; then any file counts.
     """
     path = root / WEIGHTS
     return path.is_file() and progress.best_sha256 in ("", sha256(read_bytes(path)))
 
 
 def check_kept(root: Path, progress: TrainingState) -> None:
-    """Checks that the file of the best weights exists.
+    """Checks that the file of the best weights exists and has the recorded hash.
 
     Raises:
-        DatasetError: the file is missing, or is another one.
+        DatasetError: the file is missing, or has other content.
     """
     if not (root / WEIGHTS).is_file():
         raise DatasetError(root / WEIGHTS, f"is gone; put it back, or delete {CHECKPOINT} beside it to train again")
@@ -147,7 +152,7 @@ def check_kept(root: Path, progress: TrainingState) -> None:
 
 
 def write_history(root: Path, origin: Origin, progress: TrainingState) -> None:
-    """Writes `train.json` and `card.md` into the folder of the training."""
+    """Writes `train.json`, the history of the training, and `card.md`, the model card, into the folder `root`."""
     config: Any = to_plain(origin.config)
     history = {
         "task": origin.task,
@@ -167,7 +172,12 @@ def write_history(root: Path, origin: Origin, progress: TrainingState) -> None:
 
 
 def card(root: Path, origin: Origin, progress: TrainingState) -> str:
-    """The model card as Markdown."""
+    """Returns the model card of the trained weights as Markdown: weights, settings, training data, validation
+    metrics and limits.
+
+    Raises:
+        DatasetError: the weights file is missing, or has other content than the training wrote.
+    """
     best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
     check_kept(root, progress)
     weights = read_bytes(root / WEIGHTS)
@@ -212,8 +222,8 @@ def card(root: Path, origin: Origin, progress: TrainingState) -> str:
 
 
 def _size_lines(origin: Origin) -> list[str]:
-    """Lines of the card on how to use the weights for pictures of the training's size, if that is not the task's
-    default.
+    """Returns lines of the model card on how to use the weights for pictures of the training's size; none if that
+    is the default size.
     """
     given = origin.config.options
     scale = read_node(origin.model.spec.config, given, "options") if isinstance(given, Mapping) else None

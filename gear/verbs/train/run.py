@@ -48,23 +48,23 @@ from gear.verbs.train.starting import (
 
 GIGABYTE = 1e9
 CHANGE_NOTHING = ("workers", "cache_gb", "device")
-"""Settings that may change when an interrupted training is resumed, because weights do not depend on them."""
+"""Config keys that may change when a training is resumed, because the weights do not depend on them."""
 
 Paths = str | Path | Sequence[str | Path]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainReport:
-    """The result of a training.
+    """The result of `gear.train`.
 
     Attributes:
         root: folder of the results.
-        weights: path of the weights file, for the option `weights=FILE` of the network.
+        weights: path of the weights file; pass it to the network as the option `weights=FILE`.
         steps: number of steps over all runs.
-        elapsed_s: time of steps and validations in seconds.
-        best_step: step after which the weights were saved.
-        metrics: metrics of these weights in validation.
-        metric: name of the metric by which they were chosen; "" for the loss.
+        elapsed_s: time of all steps and validations in seconds.
+        best_step: number of steps after which the saved weights were reached.
+        metrics: validation metrics of the saved weights.
+        metric: name of the metric by which the saved weights were chosen; "" for the loss.
     """
 
     root: Path
@@ -76,7 +76,7 @@ class TrainReport:
     metric: str
 
     def summary(self) -> str:
-        """The result in one line."""
+        """Returns the result as one line of text."""
         name = self.metric or "loss"
         value = self.metrics.get(name, float("nan"))
         return (
@@ -120,9 +120,9 @@ def train(
         data: roots of datasets, folders of roots, or `DIR:SPLIT`.
         out: folder of the results: `model.safetensors`, `train.json`, `card.md`, `curves.png`.
         val: validation data; by default some sequences of `data` are held out.
-        epochs, time_budget_s, batch, lr, seed, init, precision, device, workers: fields of `TrainConfig`, where `lr` is
-            `learning_rate`; by default those of the network's recipe.
-        adversarial: name of an attack; see `Adversarial`.
+        epochs, time_budget_s, batch, lr, seed, init, precision, device, workers: values of the config keys with these
+            names (`lr` is `learning_rate`); None takes the network's default. `TrainConfig` describes the keys.
+        adversarial: name of an attack plugin; training pictures then contain patches optimised against the network.
         settings: `KEY=VALUE` texts for any key of `TrainConfig`, such as `augmentation.flip=0`; options of the network
             are `options.KEY`.
         allow_test_data: whether `test` splits are accepted as training data.
@@ -159,7 +159,7 @@ def train(
 
 
 def run_train(request: TrainRequest, callbacks: Callbacks, on_step: OnStep | None = None) -> TrainReport:
-    """Runs a request; `train` documents it.
+    """Trains a network with the arguments in `request`, which `gear.train` describes.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -190,7 +190,9 @@ def run_train(request: TrainRequest, callbacks: Callbacks, on_step: OnStep | Non
 
 
 def with_progress(on_step: OnStep | None, callbacks: Callbacks) -> OnStep:
-    """Reports every step also as progress; with a time budget the number of all steps is an estimate."""
+    """Returns a step callback that also reports the progress; with a time budget, the number of all steps is an
+    estimate.
+    """
 
     def report(state: TrainingState, share: float, metrics: dict[str, float] | None) -> None:
         callbacks.on_progress(state.step, max(state.step, round(state.step / share)) if share > 0 else 0)
@@ -201,7 +203,7 @@ def with_progress(on_step: OnStep | None, callbacks: Callbacks) -> OnStep:
 
 
 def _origin(request: TrainRequest, callbacks: Callbacks) -> Origin:
-    """Opens, finds and checks everything that a request names, and chooses the values that depend on the data."""
+    """Opens and checks everything that a request names, and chooses the settings that depend on the data."""
     found, task_found = find("model", request.model), find("task", request.task)
     config = read_config(trainable(found, request.task), request.config_values, request.config_settings)
     check_options(found, config)
@@ -244,7 +246,7 @@ def _origin(request: TrainRequest, callbacks: Callbacks) -> Origin:
 
 
 def trainable(found: PluginEntry, task: str) -> Any:
-    """The recipe of a network for a task.
+    """Returns the recipe (default hyperparameters) of a network, after checking that it can be trained for a task.
 
     Raises:
         GearError: the network is for other tasks, or cannot be trained.
@@ -306,7 +308,7 @@ def _parts(origin: Origin, root: Path, callbacks: Callbacks) -> Parts:
 
 
 def _plan(origin: Origin) -> Json:
-    """Everything on which the weights depend, as JSON."""
+    """Returns everything on which the weights depend, as JSON."""
     config: Any = to_plain(origin.config)
     for name in CHANGE_NOTHING:
         config.pop(name)
@@ -321,7 +323,7 @@ def _plan(origin: Origin) -> Json:
 
 
 def _samples(request: TrainRequest, config: TrainConfig) -> tuple[Samples, Samples]:
-    """Training samples and validation samples."""
+    """Returns the training samples and the validation samples."""
     task, allowed = request.task, request.allow_test_data
     training = all_of(open_all(request.data, task, names=TRAINING, allow_test_data=allowed))
     if request.val:
@@ -339,5 +341,5 @@ def _samples(request: TrainRequest, config: TrainConfig) -> tuple[Samples, Sampl
 
 
 def as_texts(paths: Paths) -> tuple[str, ...]:
-    """One path or several as a tuple of texts."""
+    """Returns one path, or a sequence of paths, as a tuple of texts."""
     return (str(paths),) if isinstance(paths, (str, Path)) else tuple(str(path) for path in paths)

@@ -1,4 +1,4 @@
-"""The size of pictures and crops in a training: steps over large ones are slow on a CPU."""
+"""Chooses the size of pictures and crops in a training, because steps over large pictures are slow on a CPU."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ NEARLY_WHOLE = 0.9
 
 
 def picture_scale(found: PluginEntry, config: TrainConfig, samples: Samples) -> float:
-    """The factor by which pictures are scaled down for training, at most 1.
+    """Returns the factor, at most 1, by which pictures are resized in a training.
 
-    It is the value in the config, if there is one. Otherwise it is 1 without a time budget, on a GPU, with crops (which
-    are smaller than pictures), and for networks whose weights cannot record the factor for later use.
+    If the config gives a factor, that factor is returned. Otherwise the factor is below 1 only for a training on a CPU
+    with a time budget, without crops and without adversarial patches. The network's weights must be able to record the
+    factor, and the task's ground truth must not depend on the principal point, as 3D boxes do.
 
     Raises:
         GearError: smaller pictures are requested together with adversarial patches.
@@ -51,7 +52,9 @@ def picture_scale(found: PluginEntry, config: TrainConfig, samples: Samples) -> 
 
 
 def without_empty_margins(config: TrainConfig, samples: Samples) -> TrainConfig:
-    """The config with crops that are not larger than the largest scaled picture, beyond which there is only padding."""
+    """Returns the config with crops reduced to the size of the largest scaled picture, because larger crops would
+    only contain padding.
+    """
     if config.crop_px is None:
         return config
     cameras = [camera for dataset in samples.datasets for camera in dataset.sidecar(0).record.cameras]

@@ -23,21 +23,23 @@ from gear.values.serial import Json
 from gear.verbs.train.config import TrainConfig
 
 SCALE = "input_scale"
-"""Name of the networks' option for the factor by which they resize pictures; null takes it from the weights."""
+"""Network option: factor by which the network resizes its input pictures; null takes the value from the weights."""
 
 TRUNK = "trunk:"
 """Prefix of a file, or of a network's name, from which `--init` loads the weights with matching keys and shapes."""
 
 FLAGS = {"weights": "--init", "seed": "--seed", "device": "--device", "precision": "--precision"}
-"""Options of a network that the training sets, and the flags for them."""
+"""Network options that the training sets itself, with the command-line flag that controls each."""
 
 
 def check_options(found: PluginEntry, config: TrainConfig) -> None:
-    """Checks that no option of the network is given that the training itself sets: first weights given as an option
-    would be recorded as random ones, and a precision would apply to validation too.
+    """Checks that the user gave no network option that the training sets itself, such as `weights` or `precision`.
+
+    Initial weights given as an option would be recorded as random weights, and a precision would also apply to
+    validation.
 
     Raises:
-        GearError: one of these options is given.
+        GearError: such an option is given.
     """
     fields = {field.name for field in dataclasses.fields(found.spec.config)}
     given = config.options.entries if isinstance(config.options, Mapping) else {}
@@ -47,7 +49,9 @@ def check_options(found: PluginEntry, config: TrainConfig) -> None:
 
 
 def sizes_note(found: PluginEntry, config: TrainConfig, samples: Samples) -> str:
-    """A note for pictures of several sizes, if the weights would record the scale of one size; otherwise empty."""
+    """Returns a warning if the pictures have several sizes and the weights would record the scale of one size;
+    otherwise an empty text.
+    """
     widths_px = _widths_px(samples)
     if len(widths_px) == 1 or not _notes_share(found, config):
         return ""
@@ -58,7 +62,7 @@ def sizes_note(found: PluginEntry, config: TrainConfig, samples: Samples) -> str
 
 
 def picture_share(samples: Samples, spec: TaskSpec[Any]) -> float:
-    """Width of the pictures divided by the task's default width; 1 where pictures have several widths."""
+    """Returns the width of the pictures divided by the task's default width; 1 if the pictures have several widths."""
     usual = getattr(spec.config(), "width_px", None)
     widths_px = _widths_px(samples)
     return width_share(widths_px.pop(), usual) if usual and len(widths_px) == 1 else 1.0
@@ -69,22 +73,25 @@ def _widths_px(samples: Samples) -> set[int]:
 
 
 def _notes_share(found: PluginEntry, config: TrainConfig) -> bool:
-    """Whether the network's weights record the scale of the pictures that they are used on, and no option sets it."""
+    """Whether the network's weights record the scale of the pictures that they are for, and no option sets that
+    scale.
+    """
     is_given = isinstance(config.options, Mapping) and SCALE in config.options.entries
     return getattr(found.spec.config(), SCALE, 1.0) is None and not is_given
 
 
 def with_scale(found: PluginEntry, config: TrainConfig, share: float, begun: Json = None) -> TrainConfig:
-    """The config with the scale at which the network sees its pictures.
+    """Returns the config with the network option `input_scale`: the factor by which the network itself resizes its
+    input pictures.
 
-    A network that scales its pictures down sees small training pictures unscaled, and pictures of the task's default
-    size at the scale that its first weights were trained for. The new weights record the scale for their later use.
+    Training pictures that are smaller than the task's default are used unscaled. For pictures of the default size, the
+    scale of the initial weights is used. The new weights record the scale for their later use.
 
     Args:
         found: the network's plugin.
-        config: of the training.
-        share: result of `picture_share`.
-        begun: config of the resumed training; it records the scale of initial weights that were deleted since.
+        config: config of the training.
+        share: width of the training pictures divided by the task's default width.
+        begun: config of the resumed training; it records the scale of initial weights that have been deleted since.
     """
     if not _notes_share(found, config):
         return config
@@ -97,13 +104,14 @@ def with_scale(found: PluginEntry, config: TrainConfig, share: float, begun: Jso
 
 
 def goes_on_alone(found: PluginEntry, init: str, begun: Json) -> bool:
-    """Whether a resumed training continues without its first weights: their file is gone, and the checkpoint has
-    everything on which the next step depends.
+    """Whether a resumed training continues without its initial weights, because their file no longer exists.
+
+    The checkpoint contains everything on which the next step depends, so the initial weights are not needed.
 
     Args:
         found: the network's plugin.
-        init: the first weights, as in `TrainConfig`.
-        begun: config of the training in the folder; None without one.
+        init: the initial weights, as in `TrainConfig.init`.
+        begun: config of the training in the folder; None if there is none.
     """
     spec = found.spec
     assert isinstance(spec, ModelSpec)
@@ -121,7 +129,7 @@ def _given_scale(begun: Json) -> Json:
 
 
 def _scale_of_start(found: PluginEntry, init: str) -> Json:
-    """The scale of pictures that the first weights were trained for; None where they do not record one.
+    """Returns the input scale that the initial weights were trained for; None if they record none.
 
     Raises:
         GearError: the file is missing or no safetensors file.
@@ -134,10 +142,11 @@ def _scale_of_start(found: PluginEntry, init: str) -> Json:
 
 
 def precision_of(found: PluginEntry, config: TrainConfig) -> Literal["float32", "bfloat16"]:
-    """The precision of the training steps: the requested one; for `auto`, bfloat16 with a time budget where the device
-    is quicker in it.
+    """Returns the precision of the training steps.
 
-    Without a time budget the same command gives the same weights, so that `auto` does not depend on the device.
+    It is the requested precision. For `auto` it is bfloat16 if there is a time budget and the device is faster in
+    bfloat16, else float32. Without a time budget the same command gives the same weights, so `auto` then does not
+    depend on the device.
     """
     if config.precision != "auto":
         return config.precision
@@ -148,9 +157,9 @@ def precision_of(found: PluginEntry, config: TrainConfig) -> Literal["float32", 
 
 
 def build_network(found: PluginEntry, config: TrainConfig, *, precision: str) -> Any:
-    """The network with random weights from the seed, on the device.
+    """Builds the network on its device, with random weights drawn from the seed.
 
-    Options that a network does not have are left out: one without `precision` runs at torch's default.
+    The options `weights`, `seed`, `device` and `precision` are set only if the network has them.
 
     Raises:
         ConfigError: an option does not fit.
@@ -168,8 +177,9 @@ def build_network(found: PluginEntry, config: TrainConfig, *, precision: str) ->
 
 
 def go_on_from(model: Any, init: str) -> None:
-    """Freezes the parts that are not trained after published weights; a network with random or trunk weights is trained
-    as a whole.
+    """Freezes the parts of a network that are not trained further after published weights are loaded.
+
+    A network with random weights, or with weights loaded by `trunk:`, is trained as a whole.
     """
     if init not in ("", NONE) and not init.startswith(TRUNK):
         freeze_trunks(model.module())
@@ -181,15 +191,16 @@ def begin_with(found: PluginEntry, model: Any, init: str) -> str:
     Args:
         found: the network's plugin.
         model: the built network.
-        init: `shipped`, a file, a name that the network declares, or `trunk:` followed by a file or by the name of
-            another network with reference weights, of which the parts that both have in common are loaded.
+        init: "" or `none` for random weights, `shipped`, a safetensors file, a name that the network defines, or
+            `trunk:` followed by a file or by a network with reference weights; `trunk:` loads the weights whose keys
+            and shapes match.
 
     Returns:
-        A note for the user; empty where there is none.
+        A note for the user; empty if there is nothing to note.
 
     Raises:
         GearError: these weights do not exist, or do not fit the network.
-        UnknownNameError: `init` is neither a file nor a name that the network declares.
+        UnknownNameError: `init` is neither a file nor a name that the network defines.
     """
     spec = found.spec
     assert isinstance(spec, ModelSpec)
@@ -216,7 +227,7 @@ def begin_with(found: PluginEntry, model: Any, init: str) -> str:
 
 
 def _kept_at_random(spec: ModelSpec[Any], model: Any) -> str:
-    """A note for a network with random weights in a part that is never trained; empty where there is no such part."""
+    """Returns a warning if a part of the network has random weights and is never trained; otherwise an empty text."""
     kept = sum(one.numel() for one in model.module().parameters() if not one.requires_grad)
     if not kept:
         return ""
@@ -228,7 +239,9 @@ def _kept_at_random(spec: ModelSpec[Any], model: Any) -> str:
 
 
 def _trunk(source: str) -> Path:
-    """The weights file that follows `trunk:`, given as a path or as the name of a network with reference weights."""
+    """Returns the path of the weights file named after `trunk:`, by a path or by the name of a network with
+    reference weights.
+    """
     path = shipped(source) or Path(source)
     if not path.exists() and not path.suffix:
         raise UnknownNameError("reference weights", source, shipped_networks(), "or give a safetensors file")

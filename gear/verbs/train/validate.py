@@ -1,4 +1,4 @@
-"""Validation: the task's own metrics and the network's own losses over held-out samples."""
+"""Validation: computes the task's metrics and the network's losses on held-out samples."""
 
 from __future__ import annotations
 
@@ -23,10 +23,18 @@ LOSS = "loss"
 def validate(
     model: Any, found: PluginEntry, task: Task[Any, Any], samples: Sequence[Any], views: Sequence[str]
 ) -> dict[str, float]:
-    """Computes the metrics over samples, with the model in eval mode.
+    """Computes the validation metrics of a network over samples.
 
-    They are those of the task's evaluator, those of its reports as `<report>.<metric>`, and `loss`, the mean of summed
-    losses.
+    Args:
+        model: the network, in eval mode.
+        found: plugin of the network.
+        task: the task, which supplies the evaluators.
+        samples: held-out samples.
+        views: names of the cameras whose pictures the network uses.
+
+    Returns:
+        The metrics of the task's evaluator by name, the metrics of its further reports as `<report>.<metric>`, and
+        `loss`, the mean over samples of the sum of all losses.
 
     Raises:
         GearError: a prediction cannot be measured, or a metric of the task is not a number.
@@ -70,10 +78,10 @@ def _said(given: Any) -> dict[str, float]:
 
 
 def total(losses: Mapping[str, torch.Tensor]) -> torch.Tensor:
-    """The sum of named losses, which the training minimises.
+    """Returns the sum of named losses, which the training minimises.
 
     Raises:
-        TypeError: the losses are not tensors by name.
+        TypeError: `losses` is not a mapping, or is empty.
     """
     if not isinstance(losses, Mapping) or not losses:
         given = "none" if isinstance(losses, Mapping) else type(losses).__name__
@@ -82,7 +90,7 @@ def total(losses: Mapping[str, torch.Tensor]) -> torch.Tensor:
 
 
 def rank(metrics: Mapping[str, float], spec: TaskSpec[Any]) -> tuple[float, float]:
-    """A sort key of validations, where larger is better: the task's metric first, then the loss."""
+    """Returns a sort key for validations, larger for better ones: first the task's metric, then the loss."""
     loss = -metrics[LOSS] if metrics[LOSS] == metrics[LOSS] else -math.inf
     value = metrics.get(spec.metric, math.nan)
     if value != value:

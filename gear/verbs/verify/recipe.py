@@ -1,4 +1,4 @@
-"""Finds the collection job that made a split, from the split's plan or manifest."""
+"""Reconstructs the collection job that made a split from the recorded plan or manifest of the split."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from gear.values.errors import BackendError, ConfigError, DatasetError, PatchErr
 from gear.values.serial import Json
 
 HASH = 1 + 8
-"""Characters of the hash, and the hyphen before it, at the end of a patch's label."""
+"""Number of characters at the end of a patch's label: a hyphen and the hash."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sources:
-    """Files that a dataset does not name, because their paths depend on the machine.
+    """Files that a dataset needs for a repair but does not name, because their paths depend on the machine.
 
     Attributes:
-        patch: the patch, if the dataset's copy is damaged; otherwise None.
-        town: MJCF file of a town that is not part of gear; otherwise None.
-        scenes: its scene library.
-        simulation: simulation config, where it is none of gear's own.
+        patch: the patch in the pictures, if the dataset's copy of the patch is damaged; otherwise None.
+        town: MJCF file of the town, if the town is not part of gear; otherwise None.
+        scenes: scene library of that town.
+        simulation: simulation config, if it is not part of gear; otherwise None.
     """
 
     patch: str | Path | None = None
@@ -49,15 +49,16 @@ class Sources:
 
 
 def job_of(root: Path, check: SplitCheck, sources: Sources) -> Job:
-    """The collection job that made a split.
+    """Returns the collection job that made a split, so the split can be rendered again.
 
     Args:
-        root: of the dataset.
+        root: root of the dataset.
         check: result of the check of the split.
         sources: files that the dataset does not name.
 
     Raises:
-        DatasetError: neither plan nor manifest records how the split was made, or the same files cannot be made here.
+        DatasetError: neither plan nor manifest records how the split was made, or identical files cannot be made on
+            this machine.
     """
     known = _known(root, check)
     with _patch_folder(root, check, known, sources) as patch:
@@ -88,10 +89,10 @@ def job_of(root: Path, check: SplitCheck, sources: Sources) -> Job:
 
 
 def _known(root: Path, check: SplitCheck) -> dict[str, Json]:
-    """The recipe of a split from its plan, or from its manifest if the plan is damaged.
+    """Returns how a split was made, from its plan, or from its manifest if the plan is damaged.
 
     Raises:
-        DatasetError: neither records a recipe.
+        DatasetError: neither file records how the split was made.
     """
     plan, manifest = check.plan, check.manifest if isinstance(check.manifest, dict) else {}
     recipe = (plan.recipe if plan is not None else None) or manifest.get("config")
@@ -115,10 +116,11 @@ def _known(root: Path, check: SplitCheck) -> dict[str, Json]:
 
 @contextmanager
 def _patch_folder(root: Path, check: SplitCheck, known: dict[str, Json], sources: Sources) -> Iterator[str]:
-    """The value of `--patch` for a split: a word, or a temporary folder with the patch under its own name.
+    """Yields the value of `--patch` for a split: `none`, `random`, or a temporary folder with the patch under its
+    own name.
 
     Raises:
-        DatasetError: the patch is damaged and was not given, or another patch was given.
+        DatasetError: the dataset's copy of the patch is damaged and no patch was given, or another patch was given.
     """
     label, digest = known["patch"]["label"], known["patch"]["sha256"]
     if label in (NO_PATCH, RANDOM_PATCH):

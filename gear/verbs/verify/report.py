@@ -1,4 +1,4 @@
-"""The report of `gear verify`."""
+"""The result of `gear.verify`."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerifyReport:
-    """The state of a dataset.
+    """The result of `gear.verify`: the state of a dataset's files.
 
     Attributes:
-        root: its folder.
+        root: root of the dataset.
         files: number of checked files.
-        findings: files that are damaged, missing or unexpected; after a repair, those that remain so.
-        repaired: files that a repair has made again, or deleted as leftovers.
-        unrepaired: for each split that could not be repaired, one line with the reason.
+        findings: files that are damaged, missing or unexpected; after a repair, only those that could not be repaired.
+        repaired: files that were made again, or deleted as leftovers of an interrupted run.
+        unrepaired: one line with the reason for each split that could not be repaired.
     """
 
     root: Path
@@ -29,11 +29,13 @@ class VerifyReport:
 
     @property
     def is_whole(self) -> bool:
-        """Whether every file is as gear wrote it, and there are no unexpected files."""
+        """Whether every file has the content that gear wrote, and there are no unexpected files."""
         return not self.findings
 
     def lines(self) -> list[str]:
-        """One line for each file and each split that could not be repaired, and a last one for the whole."""
+        """Returns one line per repaired or faulty file, one per split that could not be repaired, and a summary
+        line.
+        """
         lines = [f"repaired   {one.path}" for one in self.repaired]
         lines += [one.line() for one in self.findings]
         lines += self.unrepaired
@@ -47,7 +49,7 @@ class VerifyReport:
         return [*lines, f"{self.root}: {', '.join(counts)} of {self.files} files"]
 
     def as_json(self) -> Json:
-        """The report as JSON, for programs."""
+        """Returns the report as JSON."""
         return {
             "root": str(self.root),
             "files": self.files,

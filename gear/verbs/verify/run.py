@@ -1,4 +1,4 @@
-"""`gear.verify`: checks a dataset, and makes damaged samples again."""
+"""`gear.verify`: checks every file of a dataset, and can make damaged samples again."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ def verify(
     progress: bool = False,
     on_progress: Progress | None = None,
 ) -> VerifyReport:
-    """Checks that every file of a dataset has the bytes that gear wrote, and that none is missing.
+    """Checks that every file of a dataset has the bytes that gear wrote, and that no file is missing.
 
-    A repair makes again what is damaged or missing: whole samples, indexes, manifest, plan and copies of patches. The
-    dataset then has its original bytes, if the same versions, renderer and device are used; if these would make other
-    bytes, nothing is changed. Files that do not belong to the dataset are reported and kept.
+    A repair makes damaged and missing files again: samples, indexes, manifest, plan and copies of patches. With the
+    same versions, renderer and device, the repaired dataset has its original bytes. If other bytes would result,
+    nothing is changed. Files that do not belong to the dataset are reported and not deleted.
 
     Args:
         dataset: root of a dataset.
         split: the split to check; all by default.
-        repair: whether to make again what is damaged or missing.
-        patch: for a repair, the patch that the dataset shows, if the dataset's copy is damaged.
+        repair: whether damaged and missing files are made again.
+        patch: for a repair, the patch in the pictures, if the dataset's copy of the patch is damaged.
         town: for a repair, the MJCF file of a town that is not part of gear.
-        scenes: for a repair, that town's scene library.
-        simulation: for a repair, the simulation config, where it is none of gear's own.
+        scenes: for a repair, the scene library of that town.
+        simulation: for a repair, the simulation config, if it is not part of gear.
         workers: number of processes that make samples again.
         progress: whether to show the progress on stderr.
         on_progress: called with (samples, samples of the split), while a split is checked and while it is repaired.
@@ -61,7 +61,7 @@ def verify(
 def _verified(
     root: Path, split: str | None, sources: Sources | None, workers: int, callbacks: Callbacks
 ) -> VerifyReport:
-    """Checks a dataset, and repairs it where sources for that are given."""
+    """Checks a dataset, and repairs it if `sources` is not None."""
     names = splits_in(root)
     if split is not None and split not in names:
         raise DatasetError(root, f"has no split {split!r}; there are: {', '.join(names)}")
@@ -93,7 +93,7 @@ def _verified(
 
 
 def _findings(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) -> list[Finding]:
-    """The findings of the chosen splits and of the cards.
+    """Returns the faulty files of the chosen splits and of the dataset's cards (its README and its Croissant metadata).
 
     Files that belong to no split are found only if all splits are checked.
     """
@@ -111,11 +111,11 @@ def _count(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) -> 
 
 
 def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callbacks: Callbacks) -> None:
-    """Repairs a split.
+    """Makes the damaged and missing files of a split again.
 
     Raises:
-        DatasetError: it is not recorded how the split was made, other bytes would be made here, or another run is
-            writing it.
+        DatasetError: it is not recorded how the split was made, other bytes would be made on this machine, or another
+            run is writing the split.
     """
     job = job_of(root, check, sources)
     with turn(root):

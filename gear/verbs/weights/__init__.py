@@ -1,1 +1,1 @@
-"""Weights files: converting published ones, averaging, and reading their metadata."""
+"""The verb `weights`: converts published weights files, averages two weights files, and reads their metadata."""

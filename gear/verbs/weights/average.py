@@ -1,8 +1,8 @@
-"""`gear.average_weights`: the mean of two states of one network.
+"""`gear.average_weights`: the weighted mean of two sets of weights of one network.
 
-A fine-tuned network and the network from which it was trained often lie in one valley of the loss. On scenes that
-neither was trained on, an average of both can be better than either (Wortsman et al., "Robust fine-tuning of zero-shot
-models", CVPR 2022, section 3).
+A fine-tuned network and the network from which it was trained often lie in the same valley of the loss. On scenes that
+neither was trained on, the average of both sets of weights can be better than either (Wortsman et al., "Robust
+fine-tuning of zero-shot models", CVPR 2022, section 3).
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from gear.verbs.weights.convert import ConvertReport, check_target
 from gear.verbs.weights.show import file_of
 
 NETWORK = ("model", "task", "options")
-"""Metadata keys that must have equal values in both files, or be missing in one of them."""
+"""Metadata keys whose values must be equal if both files have them."""
 
 MEASURED = ("metrics", "intervals", "source", "source_sha256")
-"""Metadata keys that do not apply to the average."""
+"""Metadata keys that are not copied, because they describe only one of the averaged files."""
 
 
 def average_weights(
@@ -35,15 +35,15 @@ def average_weights(
 ) -> ConvertReport:
     """Writes the weights `(1 - share) * first + share * second`; integer tensors are those of `second`.
 
-    The metadata are those of `second` without metrics, with the training data of both files and their hashes under
-    `averaged`.
+    The new file has the metadata of `second`, without metrics. The training data of both files are listed, and the
+    hashes of both files are stored under `averaged`.
 
     Args:
         first: a safetensors file, or the name of a model with shipped weights.
-        second: another such file or name.
+        second: a safetensors file, or the name of a model with shipped weights.
         out: file to write.
-        share: weight of the second file, between 0 and 1.
-        halves: whether tensors of two and more dimensions are stored in float16.
+        share: weight of the second file, between 0 and 1 (both excluded).
+        halves: whether tensors with two or more dimensions are stored in float16.
 
     Raises:
         GearError: the files belong to different networks, cannot be read, or cannot be written.
@@ -88,7 +88,9 @@ def _between(one: Tensor, two: Tensor, share: float) -> Tensor:
 
 
 def _both(one: Json, two: Json) -> Json:
-    """The training data of both files, by part; only those of the second if the first records none."""
+    """Returns the training data of both files; if the data of one file are not recorded, only those of the other
+    file.
+    """
     if not (isinstance(one, Mapping) and isinstance(two, Mapping)):
         return two if two is not None else one
     merged: dict[str, Any] = dict(two)

@@ -1,4 +1,4 @@
-"""Chooses the state of a checkpoint that fits a network, or explains why none does."""
+"""Chooses the state dict in a checkpoint that fits a network, or explains why none fits."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from gear.plugins.text import printable
 from gear.values.errors import GearError
 
 LONGEST = 2000
-"""Largest length of a message in characters, since keys and names in a checkpoint may be long."""
+"""Largest number of characters of an error message, because names in a checkpoint may be long."""
 
 SHOWN = 6
-"""Largest number of a checkpoint's entries that a message names."""
+"""Largest number of checkpoint entries that an error message lists."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Chosen:
-    """A state dict that fits the network.
+    """A state dict of a checkpoint that fits the network.
 
     Attributes:
         name: path of the entry in the checkpoint; "" for the whole checkpoint.
         state: tensors by the network's keys.
-        others: names of further states that fit.
+        others: paths of further entries that also fit the network.
     """
 
     name: str
@@ -43,14 +43,14 @@ class Chosen:
 def choose_state(
     found: PluginEntry, wanted: Mapping[str, Tensor], entries: list[Candidate], path: Path, entry: str = ""
 ) -> Chosen:
-    """The first candidate with exactly the keys and shapes of the network.
+    """Returns the first entry of a checkpoint that has exactly the keys and shapes of the network.
 
     Args:
-        found: the model; its spec may translate keys of published files.
+        found: plugin of the model; its spec may translate the keys of published files.
         wanted: state dict of the network.
         entries: entries of the checkpoint, the most probable first.
         path: path of the checkpoint, for messages.
-        entry: path of the entry to take; "" tries all.
+        entry: path of the entry to take; "" tries all entries.
 
     Raises:
         GearError: no entry fits, or the named entry does not exist.
@@ -76,12 +76,12 @@ def choose_state(
 
 
 def _same(one: Mapping[str, Tensor], other: Mapping[str, Tensor]) -> bool:
-    """Whether two states of one network hold the same numbers."""
+    """Whether two state dicts of one network have equal tensors."""
     return one.keys() == other.keys() and all(torch.equal(one[key], other[key]) for key in one)
 
 
 def _translated(found: PluginEntry, candidate: Candidate) -> Mapping[str, Tensor] | None:
-    """The state with the network's keys; None if the model's `convert` does not apply to it."""
+    """Returns the state dict with the network's keys; None if the model's `convert` function cannot translate it."""
     convert = _convert_of(found)
     if convert is None:
         return candidate.state
@@ -99,7 +99,9 @@ def _refusal(
     entries: list[Candidate],
     path: Path,
 ) -> GearError:
-    """The error message for the candidate that shares most keys with the network."""
+    """Returns the error for the case that no entry fits; it describes the entry that shares most keys with the
+    network.
+    """
 
     def shared(one: Candidate) -> int:
         state = _translated(found, one)

@@ -1,4 +1,4 @@
-"""`gear.convert_weights`: converts a published file to safetensors, checked against the network."""
+"""`gear.convert_weights`: converts a published weights file to safetensors and checks it against the network."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ from gear.verbs.weights.choose import choose_state
 SUFFIX = ".safetensors"
 
 PLAIN_BUILD = {"weights": NONE, "device": "cpu"}
-"""Options with which a network is built to compare keys; options that a config does not have are left out."""
+"""Options with which a network is built only to compare keys; they are omitted where the network has no such option."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConvertReport:
-    """The result of a conversion.
+    """The result of `gear.convert_weights` or `gear.average_weights`.
 
     Attributes:
         model: name of the model.
         path: path of the new file.
         sha256: hash of the new file.
         size_mb: size of the new file in 10^6 bytes.
-        tensors: number of tensors in the file.
-        entry: path of the converted entry of the published file, such as `model` or `checkpoint.net.module`; "" for
-            all.
-        others: paths of further entries that fit the network.
+        tensors: number of tensors in the new file.
+        entry: path of the converted entry of the published file, such as `model` or `checkpoint.net.module`; "" for the
+            whole file.
+        others: paths of further entries that also fit the network.
     """
 
     model: str
@@ -58,12 +58,12 @@ class ConvertReport:
 
     @classmethod
     def of(cls, model: str, path: Path, tensors: int) -> ConvertReport:
-        """The report on a file that was just written."""
+        """Returns the report on a weights file that was just written."""
         data = read_bytes(path)
         return cls(model=model, path=path, sha256=sha256(data), size_mb=len(data) / 1e6, tensors=tensors)
 
     def summary(self) -> str:
-        """The result as lines of text."""
+        """Returns the result as a few lines of text."""
         taken = f"taken from: {self.entry}\n" if self.entry else ""
         others = f"fits, too, and was not taken (--entry NAME): {', '.join(self.others)}\n" if self.others else ""
         return (
@@ -81,20 +81,24 @@ def convert_weights(
     entry: str = "",
     halves: bool = False,
 ) -> ConvertReport:
-    """Converts a published weights file to safetensors, strictly checked against the network.
+    """Converts a published weights file to safetensors; all keys and shapes are checked against the network.
 
-    No code in the published file is run. Parts that do not belong to the network, such as the state of an optimiser,
-    are left out. Prefixes of wrappers (`module.`, `_orig_mod.`, `net.module.`) are removed from the keys. If several
-    entries of a checkpoint fit, such as `model` and `ema`, the report names the converted one. The metadata of a
-    safetensors file are kept, and given options are added to them.
+    No code in the published file is executed. Data that do not belong to the network, such as the state of an
+    optimiser, are left out. Prefixes of wrappers (`module.`, `_orig_mod.`, `net.module.`) are removed from the keys. If
+    several entries of a checkpoint fit, such as `model` and `ema`, the report names the converted entry and the others.
+    The metadata of a safetensors file are preserved, and the options in `settings` are added.
 
     Args:
         model: name of a model plugin.
         source: a PyTorch checkpoint (zip or older format), or a safetensors file.
-        out: file to write.
+        out: file to write; must end in `.safetensors`.
         settings: `KEY=VALUE` texts for the model's options that change its graph.
-        entry: path of the checkpoint's entry to take, such as `ema` or `checkpoint.model`; "" chooses one that fits.
-        halves: whether weights of two dimensions and more are stored in float16.
+        entry: path of the checkpoint's entry to convert, such as `ema` or `checkpoint.model`; "" takes the first one
+            that fits.
+        halves: whether tensors with two or more dimensions are stored in float16.
+
+    Returns:
+        A report with the path, hash and size of the new file.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -123,10 +127,10 @@ def convert_weights(
 
 
 def check_target(target: Path, *origins: Path) -> None:
-    """Checks the path of the new weights file and returns it.
+    """Checks the path of a weights file that will be written.
 
     Raises:
-        GearError: the suffix of the path is wrong, or it is one of the files to read.
+        GearError: the path does not end in `.safetensors`, or is one of the source files.
     """
     if target.suffix != SUFFIX:
         raise GearError(f"{target}: the file to write is to end in {SUFFIX}")
@@ -135,7 +139,7 @@ def check_target(target: Path, *origins: Path) -> None:
 
 
 def _graph(found: PluginEntry, settings: Iterable[str]) -> Any:
-    """The network's module, with random weights.
+    """Returns the network's torch module with random weights.
 
     Raises:
         GearError: the options do not fit, a required module is not installed, or the model has no torch module.
@@ -149,12 +153,12 @@ def _graph(found: PluginEntry, settings: Iterable[str]) -> Any:
 
 
 def _said(origin: Path) -> dict[str, str]:
-    """The metadata of the published file."""
+    """Returns the metadata of the published file; empty if it is not a safetensors file."""
     return dict(inspect(origin).metadata) if origin.suffix == SUFFIX else {}
 
 
 def _options(spec: ModelSpec[Any], settings: Iterable[str], said: str) -> dict[str, Json]:
-    """Options of the model: those in the file's metadata, overridden by the given ones."""
+    """Returns the options of the model: those in the file's metadata, overridden by those in `settings`."""
     try:
         options = json.loads(said)
     except ValueError:

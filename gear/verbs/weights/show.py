@@ -1,4 +1,4 @@
-"""The metadata of a weights file."""
+"""Reads the metadata of a weights file."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ CHUNK_BYTES = 1 << 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WeightsFacts:
-    """A weights file with its hash.
+    """The metadata of a weights file, and its hash.
 
     Attributes:
-        file: metadata in its header.
+        file: path, size, tensor shapes and metadata from the header of the file.
         sha256: hash of the whole file.
     """
 
@@ -39,14 +39,14 @@ class WeightsFacts:
 
 
 def show_weights(name: str | Path) -> WeightsFacts:
-    """Reads the header of a weights file and hashes the file.
+    """Reads the header of a weights file and computes the hash of the file.
 
     Args:
         name: a safetensors file, or the name of a model with shipped weights.
 
     Raises:
         UnknownNameError: there is neither such a file nor such a model.
-        GearError: the file is missing or no safetensors file, or no weights are shipped under that name.
+        GearError: the file is missing or is no safetensors file, or no weights are shipped under that name.
     """
     path = file_of(name)
     file = inspect(path)
@@ -58,7 +58,7 @@ def show_weights(name: str | Path) -> WeightsFacts:
 
 
 def file_of(name: str | Path) -> Path:
-    """The path of a weights file, or of the shipped weights of a model.
+    """Returns the path of a weights file; the name of a model gives the path of its shipped weights.
 
     Raises:
         UnknownNameError: there is neither such a file nor such a model.
