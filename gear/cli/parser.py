@@ -14,7 +14,7 @@ class Parser(argparse.ArgumentParser):
     """An argparse parser that prints errors as one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Prints the message as one line and exits with code 2."""
+        """Prints a usage error as one line on stderr and exits with code 2."""
         self.exit(2, f"{self.prog}: {one_line(message)}; {self.prog} --help says more\n")
 
     def command(self, name: str) -> Parser:

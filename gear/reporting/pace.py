@@ -1,4 +1,4 @@
-"""The rate and the remaining time of a job, as numbers and as text."""
+"""Estimates the rate and the remaining time of a job, as numbers and as text."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def rate_text(per_second: float) -> str:
 
 
 def duration_text(seconds: float) -> str:
-    """A duration as text, such as `40 seconds`, `12 minutes`, `3.5 hours` or `2.1 days`."""
+    """Returns a duration as text, such as `40 seconds`, `12 minutes`, `3.5 hours` or `2.1 days`."""
     if seconds < 99.5:
         return f"{max(seconds, 1):.0f} {plural('second', round(max(seconds, 1)))}"
     if seconds < 99.5 * 60:

@@ -131,10 +131,10 @@ def _size_of(root: Path, files: Iterable[str]) -> int:
 
 
 def _write_tree(root: Path, tree: Iterable[tuple[str, bytes]], on_progress: Progress) -> None:
-    """Writes the missing files of a tree, and deletes other files that an earlier, killed export left.
+    """Writes the missing files of an export, and deletes other files that an earlier, interrupted export wrote.
 
     Raises:
-        DatasetError: two samples are to be in one file, or a file cannot be written.
+        DatasetError: two samples would be in one file, or a file cannot be written.
     """
     written: set[str] = set()
     for relative, data in tree:

@@ -64,7 +64,7 @@ def merge(
 
     Raises:
         GearError: no folder was given.
-        DatasetError: the folders were made with different configurations, a sample is in none of them, a file is
+        DatasetError: the folders were made with different configurations; a sample is in none of them; a file is
             damaged or a path leads outside its folder, `out` is not empty, or a file cannot be written.
         UnknownNameError: the plugin of the task is not installed.
     """

@@ -1,4 +1,4 @@
-"""`gear.list_models`: the installed networks with their published and their shipped weights."""
+"""`gear.list_models`: describes the installed networks, with their published and their shipped weights."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class ModelFacts:
 
     @property
     def spec(self) -> ModelSpec[Any]:
-        """The spec of the model plugin."""
+        """The spec of the network's plugin: name, tasks, cameras, options and published weights."""
         assert isinstance(self.found.spec, ModelSpec)
         return self.found.spec
 

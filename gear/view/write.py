@@ -142,6 +142,6 @@ def base_url(root: Path, page: Path) -> str:
 
 
 def _write(target: Path, pieces: Iterable[str]) -> int:
-    """Writes the file whole or not at all; returns its size."""
+    """Writes the file atomically and returns its size in bytes."""
     with streamed_alone(target) as stream:
         return sum(stream.write(piece.encode("utf-8", errors="replace")) for piece in pieces)

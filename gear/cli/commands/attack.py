@@ -107,7 +107,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the attack, prints the folder of the patches and returns exit code 0."""
+    """Runs the attack, prints the patch folder and the result, and returns exit code 0."""
     import json
 
     from gear.cli.requests import guard_of, request_of

@@ -89,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Collects the split, prints its folder and returns exit code 0."""
+    """Collects the split, prints the dataset's folder and returns exit code 0."""
     from gear.cli.requests import request_of
     from gear.reporting.display import Display
     from gear.verbs.collect.request import CollectRequest

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Cleans the pictures, prints their folder and returns exit code 0."""
+    """Applies the defense to the pictures, prints the output folder and returns exit code 0."""
     from gear.cli.requests import request_of
     from gear.reporting.display import Display
     from gear.verbs.defend.request import DefendRequest

@@ -82,7 +82,7 @@ def add_calibration(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the evaluation, prints its table and returns exit code 0."""
+    """Evaluates the model on the datasets, prints the table of results and returns exit code 0."""
     import json
 
     from gear.cli.requests import guard_of, request_of

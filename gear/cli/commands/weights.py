@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the chosen action (convert, average or show) and returns its exit code."""
+    """Runs the chosen action (convert, average or show) and returns exit code 0."""
     return {"convert": convert, "average": average, "show": show}[args.action](args)
 
 

@@ -273,10 +273,11 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
 
 
 def _calibrated(network: Model, on_warning: Warn) -> tuple[float, Json]:
-    """Calibrates the defenses before the first step, so that the time of the steps does not include it.
+    """Calibrates the defenses before the first step, so the time of the steps does not include the calibration.
 
     Returns:
-        Seconds of the calibration, and the fit report of each model's defense, if it gives one.
+        Seconds of the calibration, and by model the report of its defense on the calibration, if the defense returns
+        one.
     """
     begun, fits = time.monotonic(), {}
     for name, member in members_of(network).items():
@@ -290,7 +291,7 @@ def _calibrated(network: Model, on_warning: Warn) -> tuple[float, Json]:
 
 
 def _facts(job: Job, network: Model, plan: Json, made: _Made) -> Json:
-    """The content of `attack.json`."""
+    """Returns the content of `attack.json`."""
     recorder, done = made.recorder, made.steps_done
     seconds = recorder.clock()
     promised, kept = (0.0, 0.0) if job.spec.is_control else made.seen.masking(network, made.objective, made.patches)
@@ -313,7 +314,9 @@ def _facts(job: Job, network: Model, plan: Json, made: _Made) -> Json:
 
 
 def _achieved(job: Job, network: Model, made: _Made) -> Json:
-    """The objective with random patches and with those of the attack, on training and on validation samples."""
+    """Returns the objective with random patches and with the optimised patches, on training samples and on
+    validation samples.
+    """
     found = {
         "training": compared(made.seen, network, made.objective, made.patches, job.seed, MOST_SAMPLES),
         "validation": None,

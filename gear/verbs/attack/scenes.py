@@ -25,7 +25,7 @@ from gear.values.frames import UInt8Image
 from gear.verbs.attack.data import JoinedCompositor
 
 RANDOM_PX = (32, 64)
-"""Height and width of the random patches with which gradients are checked."""
+"""Height and width in pixels of the random patches at which gradients are checked."""
 
 PICTURES = "defense_pictures"
 """Name of the gradient of a defense's output pictures with respect to the patches."""

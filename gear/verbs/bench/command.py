@@ -18,7 +18,7 @@ FLAGS: dict[str, str] = {
 """Names of the flags that differ from the name of the Python argument, by argument."""
 
 ONCE: dict[Verb, tuple[str, ...]] = {"evaluate": ("data",)}
-"""Arguments whose values all follow one flag; for other arguments the flag is repeated."""
+"""Arguments, by verb, whose values all follow one flag (`--data A B`); other flags are repeated for each value."""
 
 ONLY_IN_PYTHON = ("pools",)
 

@@ -95,14 +95,14 @@ class Samples:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttackBench:
-    """The attack that makes the patches.
+    """The attack that makes the patches of the benchmark.
 
     Attributes:
         plugin: name of the attack plugin.
-        steps: optimisation steps.
+        steps: number of optimisation steps.
         queries: number of forward passes for attacks without gradients; 0 for attacks with gradients.
-        compositor: `transport` (exact) or `homography`.
-        set: options of the attack.
+        compositor: method that puts patches into pictures: `transport` (exact), or `homography`, which needs no probes.
+        set: options of the attack (`gear plugins show ATTACK` lists them).
     """
 
     plugin: str = "scene_specific"

@@ -25,7 +25,7 @@ from gear.verbs.bench.table import columns, legend, title
 from gear.verbs.bench.validation import Contest
 
 PICTURE_PX, PATCH_PX, QUALITY = 560, 220, 82
-"""Widths of the pictures in pixels, and their JPEG quality."""
+"""Width of pictures and width of patches in pixels, and JPEG quality of both."""
 
 STYLE = """
 body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, "Noto Sans", sans-serif; color: #1b2027; background: #fff;

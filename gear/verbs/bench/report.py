@@ -52,7 +52,7 @@ class Metric:
 
     @classmethod
     def of(cls, metric: str, *, less_is_better: bool) -> Metric:
-        """Parses a text such as `miou` or `reference.car_bev_moderate_r40`."""
+        """Parses the name of a metric, such as `miou`, or with its report, such as `reference.car_bev_moderate_r40`."""
         report, dot, name = metric.rpartition(".")
         return cls(report=report if dot else TASK, name=name, less_is_better=less_is_better)
 
@@ -185,8 +185,8 @@ class BenchReport:
     def records(self) -> Iterator[Mapping[str, Json]]:
         """Yields the lines of bench.csv as flat records.
 
-        There is one record per pool (all scenes with one kind of patch) and one per scene for the task's main metric,
-        and one per pool for each kind of change of detected objects.
+        A pool is all scenes with one kind of patch. The task's main metric has one record per pool and one per scene.
+        For detectors, each kind of change of the detected objects has one record per pool.
         """
         for task in self.tasks:
             for one in task.results:

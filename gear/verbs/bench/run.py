@@ -1,4 +1,4 @@
-"""`gear.bench`: collects pictures, makes patches, evaluates networks and defenses, and writes one report."""
+"""`gear.bench`: collects pictures, optimises patches, evaluates networks and defenses, and writes one report."""
 
 from __future__ import annotations
 

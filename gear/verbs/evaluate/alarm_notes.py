@@ -17,8 +17,8 @@ EXPECTED = "false_alarms_high"
 def alarm_notes(rows: Sequence[RowReport], fit: Json) -> list[str]:
     """Returns one warning for each clean dataset that raises clearly more alarms than the calibration explains.
 
-    Clearly means: the lower end of the exact 95 % interval of the dataset's share of alarms (Clopper and Pearson, 1934)
-    is above the largest share that new pictures like the calibration pictures would have.
+    Clearly means that two intervals do not overlap: the exact 95 % interval of the dataset's share of alarms (Clopper
+    and Pearson, 1934), and the range of shares that new pictures like the calibration pictures would have.
 
     Args:
         rows: the results of the datasets.

@@ -27,7 +27,7 @@ from gear.verbs.evaluate.report import ALARMS, Difference, Estimate, ObjectChang
 from gear.verbs.evaluate.twin_objects import object_changes
 
 ALARM = 0.5
-"""Scores of a defense above this value are alarms."""
+"""A picture whose defense score is above this value raises an alarm."""
 
 Street = tuple[str, int, int]
 """Identifier of what a sample shows, independently of weather and patch: `town/scene`, seed and sample index."""

@@ -209,7 +209,7 @@ def _measured(
     guarded: GuardedModel,
     callbacks: Callbacks,
 ) -> list[Measured]:
-    """Runs the model over the datasets, one after the other."""
+    """Runs the model over the datasets, one after the other, and returns their samples' scores."""
     done = _counter(callbacks.on_progress, sum(len(one) for one in datasets))
     rows = []
     for dataset, name in zip(datasets, names, strict=True):
@@ -234,9 +234,7 @@ def _measured(
 
 
 def _begin(root: Path, facts: Json) -> None:
-    """Writes the plan of the evaluation, or checks that an existing plan agrees in everything on which a prediction
-    depends.
-    """
+    """Writes `plan.json`, all inputs of the evaluation, or checks that an existing plan is equal."""
     clear_scratch(root)
     path = inside(root, "plan.json")
     plain = to_plain(facts)

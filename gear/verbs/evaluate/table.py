@@ -126,7 +126,9 @@ def row_labels(rows: Sequence[RowReport]) -> dict[str, str]:
 
 
 def _paired(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
-    """Lines with the mean change of single samples between twins, and its p-value."""
+    """Returns lines with the mean change of single samples between twins (datasets that differ only in their
+    patch), and p-values.
+    """
     lines = []
     for one in report.differences:
         against = next(row for row in report.rows if row.name == one.against)
@@ -145,7 +147,7 @@ SHOWN_CHANGES = ("hidden", "misclassified", "moved", "invented_on_patch", "inven
 
 
 def _objects(report: EvaluateReport, labels: Mapping[str, str], width: int) -> list[str]:
-    """A table of what happens to objects between twins."""
+    """Returns a table of how the detected objects differ between twins, datasets that differ only in their patch."""
     lines = []
     for one in report.differences:
         if one.objects is not None:
@@ -181,7 +183,9 @@ def number(value: float | None, *, is_signed: bool = False) -> str:
 
 
 def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]], labels: Mapping[str, str]) -> list[str]:
-    """Notes on metrics that stay below 1 even for perfect predictions, because a dataset has too few objects."""
+    """Returns notes on metrics that stay below 1 even for perfect predictions, because a dataset has too few
+    objects.
+    """
     rows = [(labels[row.name], row.metrics) for row in report.rows]
     rows += [(f"all with patch {pooled.patch}", pooled.metrics) for pooled in report.together]
     lines = []
@@ -193,7 +197,7 @@ def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]], labels:
 
 
 def _absent(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
-    """Notes on metrics that are undefined; rows and reports with the same undefined metrics share a line."""
+    """Returns notes on undefined metrics; rows and reports with the same undefined metrics share a line."""
     where: dict[tuple[str, ...], list[str]] = {}
     for row in report.rows:
         for name, metrics in row.metrics.items():
@@ -206,8 +210,8 @@ def _absent(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
 
 
 def _families(missing: Sequence[str], every: Iterable[str]) -> tuple[str, ...]:
-    """Names of the metrics; several names with the same prefix, none of which has a value, are written as
-    `prefix_*`.
+    """Returns names of metrics; several names with the same prefix become `prefix_*` if no metric with this prefix
+    has a value.
     """
     there = {name.partition("_")[0] for name in set(every) - set(missing)}
     heads = Counter(name.partition("_")[0] for name in missing)

@@ -124,7 +124,7 @@ def _ratio(counts: Values, bases: Values) -> float:
 
 
 def _tests(differences: Values, streets: Sequence[Hashable], seed: int) -> list[PairedTest]:
-    """A sign-flip test of each column of (N, F) differences."""
+    """Returns a paired sign-flip test of each column of (N, F) differences."""
     found = paired_p(clustered(differences, streets), seed)
     means = differences.mean(axis=0) if len(differences) else np.full(differences.shape[1], math.nan)
     return [

@@ -39,7 +39,7 @@ def gap(
     """Compares composed patches (pasted into pictures) with the same patches rendered: in pixels and in their effect.
 
     Args:
-        dataset: root of a split that was collected with probes.
+        dataset: root of a dataset that was collected with probes and without a patch.
         patch: patch folder, picture or `random`; the same samples are rendered with this patch into `out/twin`.
         twin: root of an existing dataset with the same samples and a patch; replaces `patch`.
         split: split of the dataset; optional if there is only one.

@@ -83,7 +83,7 @@ class Canvas:
     def line(
         self, points_px: npt.ArrayLike, colour: Colour, width_px: float, *, closed: bool = False, opacity: float = 1.0
     ) -> None:
-        """Draws a line through (N, 2) points."""
+        """Draws a line of `width_px` through the (N, 2) points; `closed` joins the last point to the first."""
         width = max(1, round(width_px * OVERSAMPLING))
         if opacity >= 1.0:
             cv2.polylines(self._pixels, [_fixed(points_px)], closed, colour, width, cv2.LINE_AA, SHIFT)
@@ -96,7 +96,7 @@ class Canvas:
         self, points_px: npt.ArrayLike, colour: Colour, width_px: float, *, dash_px: float, gap_px: float,
         closed: bool = False,
     ) -> None:  # fmt: skip
-        """Draws a dashed line through (N, 2) points."""
+        """Draws a dashed line through the (N, 2) points; `closed` joins the last point to the first."""
         points = np.asarray(points_px, dtype=np.float64)
         if closed:
             points = np.concatenate([points, points[:1]])
@@ -117,7 +117,9 @@ class Canvas:
         return np.zeros(self._pixels.shape[:2], np.uint8)
 
     def fill_triangles(self, mask: Mask, triangles_m: Points) -> None:
-        """Adds (N, 3, 2) triangles in the world to a mask, in place."""
+        """Sets the pixels of a mask inside (N, 3, 2) triangles, given in metres in the world; the mask is changed
+        in place.
+        """
         for triangle in _fixed_many(self.to_px(triangles_m.reshape(-1, 2))).reshape(-1, 3, 2):
             cv2.fillConvexPoly(mask, triangle, 255, cv2.LINE_8, SHIFT)
 

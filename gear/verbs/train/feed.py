@@ -17,7 +17,7 @@ from gear.values.rng import derive_rng
 from gear.verbs.train.config import TrainConfig
 
 BATCHES_AHEAD = 3
-"""Number of batches that are prepared in advance."""
+"""Number of training batches that threads prepare in advance."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,15 +37,15 @@ NOTE_EVERY = 10
 
 CHECKPOINT_EVERY_S = 120.0
 VALIDATION_SHARE = 0.1
-"""Largest share of a time budget that validations take."""
+"""Largest share of the training time that validations take if there is a time budget."""
 
 MOST_VALIDATIONS = 8
-"""Largest number of validations in a time budget."""
+"""Largest number of validations of a training with a time budget."""
 
 MOST_BROKEN_STEPS = 20
 
 ONE_VALUE = "more than 1 value per channel"
-"""Beginning of torch's message for a batch that has only one value per channel to normalise."""
+"""Part of torch's error message for batch normalisation with only one value per channel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -16,8 +16,8 @@ from gear.values.errors import GearError
 from gear.verbs.train.config import CROPS_PX, TrainConfig
 
 PIXELS_A_SECOND = (1 << 18) / 600
-"""Pixels of a picture per second of the time budget: 724 x 362 for ten minutes, in which two cores make about 700 steps
-over batches of eight pictures with a network of DDRNet's size."""
+"""Pixels per picture and second of the time budget. Ten minutes give 724 x 362 pixels: two cores then finish about 700
+steps with batches of eight pictures and a network of DDRNet's size."""
 
 LEAST_PIXELS = 1 << 16
 

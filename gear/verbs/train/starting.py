@@ -26,7 +26,7 @@ SCALE = "input_scale"
 """Network option: factor by which the network resizes its input pictures; null takes the value from the weights."""
 
 TRUNK = "trunk:"
-"""Prefix of a file, or of a network's name, from which `--init` loads the weights with matching keys and shapes."""
+"""Prefix in `--init`: of the file or network named after it, only weights with matching keys and shapes are loaded."""
 
 FLAGS = {"weights": "--init", "seed": "--seed", "device": "--device", "precision": "--precision"}
 """Network options that the training sets itself, with the command-line flag that controls each."""

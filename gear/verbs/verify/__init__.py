@@ -1,1 +1,1 @@
-"""The verb `verify`: checks every file of a dataset, and can make damaged files again."""
+"""The verb `verify`: compares every file of a dataset with its recorded hash, and can make damaged files again."""

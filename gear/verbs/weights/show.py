@@ -27,7 +27,7 @@ class WeightsFacts:
     sha256: str
 
     def to_json(self) -> Json:
-        """The metadata as JSON, without the shapes of the tensors."""
+        """Returns the metadata and the hash as JSON, without the shapes of the tensors."""
         return {
             "path": str(self.file.path),
             "size_mb": round(self.file.size_mb, 3),
