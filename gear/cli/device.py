@@ -1,4 +1,6 @@
-"""The flag `--device`, which all commands that run networks share."""
+"""The flag `--device` of `gear attack`, `gear evaluate` and `gear gap`, which sets the option `device` of their
+models.
+"""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Writes the picture, prints its path and returns exit code 0."""
+    """Writes the contact sheet, prints its path and returns exit code 0."""
     from gear.reporting.display import Display
     from gear.verbs.sheet import sheet
 

@@ -52,7 +52,7 @@ def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[s
 
 
 def verify(request: VerifyRequest, callbacks: Callbacks) -> dict[str, GapReport]:
-    """Renders finished patches in a held-out dataset, and compares composed and rendered patches in pictures and
+    """Renders finished patches in a held-out dataset, and compares rendered with composed patches: in pixels and
     in their effect.
 
     A defense draws its random numbers from the seed of the attack, so a calibrated defense is the same one that was

@@ -135,8 +135,8 @@ class TaskResult:
     results: tuple[Result, ...]
 
     def value(self, pool: Pool) -> Estimate | None:
-        """Returns the task's main metric over a pool, the datasets of all scenes with one kind of patch; None if
-        it is missing.
+        """Returns the task's main metric of a pool (the datasets of all scenes with one kind of patch); None if it
+        is missing.
         """
         return None if self.metric is None else self.metric.among(pool.metrics)
 

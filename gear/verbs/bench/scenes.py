@@ -97,8 +97,8 @@ def _surfaces(scene: SceneSpec) -> int:
 
 
 def place_of(node: Node, *path: str) -> Place:
-    """Returns the position (file and line) of a key in the config file; of the nearest key above it if the key is
-    missing.
+    """Returns the position (file and line) of a key in the config file; if the key is missing, that of the nearest
+    existing key above.
     """
     place = node.place
     for key in path:

@@ -81,7 +81,9 @@ def write_sample(
 
 
 def marker_path(split: str, index: int) -> str:
-    """Returns the path of a sample's marker, relative to the output folder."""
+    """Returns the path of a sample's marker (the JSON record that the sample was cleaned), relative to the output
+    folder.
+    """
     return f"{FOLDER}/{split}/samples/{index:06d}.json"
 
 

@@ -115,11 +115,12 @@ class Together:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairedTest:
-    """A paired test of one metric of single samples between twins, datasets that differ only in their patch.
+    """A paired test of a metric that is defined for single samples, between twins: datasets that differ only in
+    their patch.
 
     Attributes:
         mean: mean difference over the pairs of samples; NaN without pairs.
-        p: two-sided p-value of `gear.measuring.statistics.paired_p`; NaN without pairs.
+        p: two-sided p-value of a paired permutation test (`gear.measuring.statistics.paired_p`); NaN without pairs.
         pairs: number of samples with a value in both datasets.
     """
 
@@ -163,8 +164,9 @@ class ChangeCount:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DistanceBin:
-    """The objects that are detected in the twin (the same samples with another patch) and lie within a range of
-    distances from the patch.
+    """Objects within a range of distances from the patch, and how many of them are lost.
+
+    Only objects that are detected in the twin, the same sample with another patch, are counted.
 
     Attributes:
         low, high: the distances are at least `low` and less than `high`, in metres or pixels.

@@ -84,7 +84,7 @@ def new_package(kind: str, name: str, *, out: str | Path = ".") -> Path:
 
 
 def contents(kind: Kind, words: dict[str, str]) -> dict[str, str]:
-    """Returns the texts of the package's files, by path relative to the package's folder."""
+    """Returns the texts of all files of a new plugin package, by path relative to the package's folder."""
     words = words | {"use": _filled(USE[kind], words)}
     places = {
         "pyproject.toml": "common/pyproject.toml",

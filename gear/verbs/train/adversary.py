@@ -35,7 +35,7 @@ CACHE_BYTES = 1 << 30
 
 
 class Adversary:
-    """Optimises patches against the network during the training, and puts them into training samples."""
+    """Optimises patches against the network during its training, and puts these patches into training samples."""
 
     def __init__(
         self,

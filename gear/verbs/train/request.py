@@ -43,7 +43,9 @@ class TrainRequest:
 
     @property
     def config_values(self) -> dict[str, Any]:
-        """The arguments that are keys of `TrainConfig`, by key; None for arguments that were not given."""
+        """The arguments that are fields of `TrainConfig`, by name of the field; None for arguments that the user
+        did not give.
+        """
         return {
             "epochs": self.epochs,
             "time_budget_s": self.time_budget_s,
