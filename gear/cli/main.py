@@ -90,7 +90,7 @@ def main(argv: Sequence[str]) -> int:
     prepare_streams()
     try:
         code = _run(argv)
-        sys.stdout.flush()  # a failing flush at the interpreter's exit could not be caught
+        sys.stdout.flush()  # an error of the flush at exit could not be caught
     except BrokenPipeError:
         discard_output()
         return 0

@@ -47,10 +47,12 @@ class Display:
     """
 
     def __init__(self, verb: str, *, unit: str = "sample", python: bool = False) -> None:
-        """Args:
-        verb: name of the verb, such as `collect`; plain lines begin with this name.
-        unit: unit, in the singular, that `on_progress` counts.
-        python: True for a call from Python, which may run in a notebook; False for the command line.
+        """Opens the display on stderr.
+
+        Args:
+            verb: name of the verb, such as `collect`; plain lines begin with this name.
+            unit: unit, in the singular, that `on_progress` counts.
+            python: True for a call from Python, which may run in a notebook; False for the command line.
         """
         self._unit = unit
         has_bars = sys.stderr.isatty() or (python and _is_notebook())
@@ -190,7 +192,7 @@ class _Lines:
 
     def _work(self) -> None:
         while not self._ended.wait(EVERY_S):
-            with contextlib.suppress(ValueError, OSError):  # a stream that was closed under the thread
+            with contextlib.suppress(ValueError, OSError):  # the stream was closed by another thread
                 self.write(self._line())
                 self._has_written = True
 

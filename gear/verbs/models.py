@@ -98,7 +98,7 @@ def list_models(task: str | None = None) -> list[ModelFacts]:
     plugins = catalogue()
     if task is not None:
         task = plugins.get("task", task).spec.name
-    digests: dict[str, str] = {}  # reading a town's assets takes a while, and several networks know the same towns
+    digests: dict[str, str] = {}  # cache: reading a town's assets is slow, and several networks use the same towns
     return [
         ModelFacts(found=found, missing=_missing(found.spec.needs), shipped=_shipped(found.spec.name, digests))
         for found in plugins.of_kind("model")
@@ -122,7 +122,7 @@ def _changes(file: WeightsFile, digests: dict[str, str]) -> tuple[str, ...] | No
     value = file.facts().get("look")
     if value is None:
         return None
-    # Comparing looks reads the towns' assets; nobody pays for it who has no shipped weights.
+    # Imported here because the comparison reads the towns' assets, which only shipped weights need.
     from gear.measuring.appearance_hash import current_look, read_look
 
     look = read_look(value)

@@ -63,7 +63,7 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
     finished, wanted = root / NOTES, json.loads(json.dumps(plan))
     if force:
         remove_files(root, [NOTES, CHECKPOINT, *(path.name for path in root.glob("patch_*.png"))])
-        remove_tree(root, VERIFY)  # the rendered check of the patches that were deleted
+        remove_tree(root, VERIFY)  # results of the rendered check of the deleted patches
     if finished.exists():
         there = _read_notes(finished)
         what = ", ".join(differences({key: there.get(key) for key in wanted}, wanted)[:3])
@@ -151,7 +151,7 @@ def _check_whole(root: Path, notes: Json) -> None:
         raise ReplaceableError(root / NOTES, BROKEN) from error
     for name, digest in notes["patches"].items():
         path = root / f"{name}.png"
-        if not NAME.fullmatch(name):  # it may lead anywhere
+        if not NAME.fullmatch(name):  # the name could be a path outside the folder
             raise ReplaceableError(root / NOTES, BROKEN)
         if not path.is_file() or sha256(read_patch(path).tobytes()) != digest:
             raise ReplaceableError(path, BROKEN)

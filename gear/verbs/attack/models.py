@@ -142,7 +142,7 @@ def _behind(opened: OpenedGuard, model: Model, cameras: Sequence[str], seed: int
             "would be an attack without it (gear.contracts.defenses.DifferentiableDetector)"
         )
     if spec.gradient == "none":
-        # What it draws, it draws alike each time it is asked.
+        # The generator is seeded anew in each call, so the defense draws the same numbers every time.
         return Cleaned(
             wrapped,
             product,

@@ -136,7 +136,7 @@ class Recorder:
             self._validate(done, patches())
         self._queries_left = values.get("queries_left")
         now = time.monotonic()
-        if now - self._saved >= SECONDS_BETWEEN and not self.stopped:  # what resumes is to come to the same end
+        if now - self._saved >= SECONDS_BETWEEN and not self.stopped:  # a resumed run must stop at the same step
             self.save(done, state())
         self.tell(done, self._queries_left)
         return bool(self.stopped)

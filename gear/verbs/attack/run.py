@@ -126,7 +126,7 @@ def attack(
         score_weight: weight of the term that lowers the defense's score; 0 for no such term.
         mask_weight: weight of the term that lowers the defense's mask on the patch; 0 for no such term.
         allow_test_data: whether `test` splits are accepted as training data.
-        force: whether existing files of another attack in `out` are replaced.
+        force: whether patches and results of an earlier attack in `out` are deleted first.
         progress: shows a progress bar.
         on_progress: called after every step with the finished and the allowed steps, or queries if these are limited.
         on_fit_progress: called after every calibration sample that the defense reads for the first time.
@@ -227,7 +227,7 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
     seen, held = (Scenes(group, job.compositor, device, cache) for group in (job.datasets, job.validation))
     if job.spec.needs_gradients:
         seen.check_adaptive(network, job.surfaces, derive_rng(job.seed, "adaptive"))
-    # One each: an objective remembers the clean answers of its samples by their numbers.
+    # Two objectives, because each caches the clean predictions of its samples by their index.
     make = product.objective if isinstance(product, WithObjective) else default_objective
     settings = product.settings(seen.samples[0]) if isinstance(product, WithTaskOptions) else job.config
     objective, held_objective = make(seen.samples[0]), make(seen.samples[0])

@@ -39,11 +39,13 @@ class Scenes:
     """The samples of an attack, with the compositor that puts patches into them."""
 
     def __init__(self, datasets: Sequence[Dataset[Any]], compositor: str, device: str, cache: Cache[Prepared]) -> None:
-        """Args:
-        datasets: datasets of the samples.
-        compositor: name of the compositor.
-        device: device of the compositor.
-        cache: cache for prepared samples, shared by all datasets.
+        """Joins the samples of several datasets and opens a compositor for each dataset.
+
+        Args:
+            datasets: datasets of the samples.
+            compositor: name of the compositor, the method that puts patches into pictures.
+            device: device of the compositor.
+            cache: cache for the data that compositors precompute, shared by all datasets.
         """
         samples = all_of(tuple(datasets))
         self.samples = Kept(samples, KEPT_BYTES)

@@ -43,7 +43,7 @@ def check_held_out(data: Sequence[str | Path], held: str | Path, val: Sequence[s
         try:
             found = open_all(paths, wanted.plan.task["name"], names=names, allow_test_data=True)
         except GearError:
-            continue  # the attack knows what is wrong
+            continue  # the attack itself reports this error
         for one in found:
             check_joined([one, wanted])
             if scenes_of(one) == scenes_of(wanted):

@@ -105,7 +105,7 @@ def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | Non
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
     config = to_yaml(plan.config).encode()
-    if not (root / CONFIG).exists():  # an older one belongs to the reports beside it, until there are new reports
+    if not (root / CONFIG).exists():  # an existing config belongs to the existing reports
         write_whole(root, CONFIG, config)
     evaluations: dict[str, EvaluateReport] = {}
     steps = list(plan.steps())

@@ -65,7 +65,7 @@ def draw_sheet(
     Raises:
         BackendError: the renderer cannot start.
     """
-    assert town.scenes is not None  # the caller has made sure
+    assert town.scenes is not None  # checked by the caller
     cells: list[UInt8Image] = []
     problems: list[GearError] = []
     for number, (name, scene) in enumerate(town.scenes.scenes.items()):

@@ -83,7 +83,7 @@ def write_town(
     check_pictures(renderer=renderer, quality=quality, weather=weather, seed=seed)
     found = _drawable(read_town(town, scenes))
     folder = Path(out)
-    with explained(folder):  # before minutes are spent on drawing
+    with explained(folder):  # fails before minutes are spent on drawing
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
     map_path = _write(folder / f"{found.name}_map.png", draw_map(found, TownGeometry.of(found.library.town)))

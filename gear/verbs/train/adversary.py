@@ -47,7 +47,9 @@ class Adversary:
         device: torch.device,
         cache_bytes: int = CACHE_BYTES,
     ) -> None:
-        """Args:
+        """Builds the attack, and opens a compositor for each training dataset with patch surfaces.
+
+        Args:
             samples: training samples; those of scenes with patch surfaces get patches.
             config: the attack with its settings.
             task: task that the attack must support.
@@ -56,8 +58,8 @@ class Adversary:
             cache_bytes: memory for the compositors of all scenes together.
 
         Raises:
-            GearError: the attack does not support the task, has a budget of queries, makes fewer patches than a scene
-                has surfaces, or no sample has what the compositor needs.
+            GearError: the attack does not support the task, is limited by queries instead of steps, or makes fewer
+                patches than a scene has surfaces; or no training scene has a patch surface.
             DatasetError: a scene lacks probes.
         """
         self._samples, self._config, self._seed = samples, config, seed

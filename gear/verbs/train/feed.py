@@ -49,11 +49,13 @@ class Feed:
         *,
         device: torch.device | str = "cpu",
     ) -> None:
-        """Args:
+        """Prepares the supply; threads start with `from_position`.
+
+        Args:
             samples: training samples.
             config: config with batch size, seed, crops, augmentation and number of threads.
-            views: names of the cameras that the network uses.
-            change: function that is applied to each sample before augmentation.
+            views: names of the cameras whose pictures the network uses.
+            change: function that is applied to each sample before augmentation, such as `Adversary.change`.
             device: device of the batches. Pictures are copied to it as uint8 and converted to floats on it.
 
         Raises:
@@ -95,7 +97,7 @@ class Feed:
         item = self._items.item(index, epoch)
         rng = derive_rng(self._config.seed, "augment", epoch, index)
         shown = replace(item, sample=augment(item.sample, self._config.augmentation, self._config.framing, rng))
-        _ = shown.views  # made in this thread: one alone makes batches
+        _ = shown.views  # converts the pictures in this thread, because a single thread stacks batches
         return shown
 
     def _batch(self, making: Sequence[Future[Item]]) -> Batch:

@@ -66,7 +66,7 @@ def choose_state(
         state = _translated(found, one)
         if state is None or mismatches(wanted, state):
             continue
-        # A model's own translation may have taken the prefix off already.
+        # Two candidates may be equal after translation, because `convert` may remove the prefix.
         if not any(_same(state, known.state) for known in fitting):
             fitting.append(Chosen(name=one.name, state=state, others=()))
     if fitting:
@@ -87,7 +87,7 @@ def _translated(found: PluginEntry, candidate: Candidate) -> Mapping[str, Tensor
         return candidate.state
     try:
         translated: Mapping[str, Tensor] = convert(candidate.state)
-    except Exception:  # it expects other keys; `_refusal` reports why for the likeliest candidate
+    except Exception:  # other keys were expected; `_refusal` reports the error of the best candidate
         return None
     return translated
 
@@ -107,7 +107,7 @@ def _refusal(
         state = _translated(found, one)
         return 0 if state is None else len(wanted.keys() & state.keys())
 
-    best = max(candidates, key=shared)  # the first of equals, which is the likeliest
+    best = max(candidates, key=shared)  # among equals the first, the most probable candidate
     state, convert = best.state, _convert_of(found)
     if convert is not None:
         with blamed(found, "convert"):
