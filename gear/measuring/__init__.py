@@ -1,1 +1,3 @@
-"""Shared parts of the verbs that measure models: guarded models, runs over datasets, scores and statistics."""
+"""Parts that the verbs `evaluate`, `attack` and `gap` share: models with a defense, runs over datasets, scores,
+statistics.
+"""

@@ -1,7 +1,8 @@
-"""The appearance of pictures, as far as trained weights depend on it: assets, light and renderer.
+"""Hashes of a dataset's appearance: the assets, light, camera response and renderer on which trained weights
+depend.
 
-Weights record the appearance (the *look*) that they were trained on. When towns, light, camera or renderer change, the
-networks may have to be trained again, and `gear models` says so.
+Weights files record the appearance (`Look`) of their training data. If the appearance of the installed version differs
+from it, the networks may have to be trained again, and `gear models` says so.
 """
 
 from __future__ import annotations
@@ -29,28 +30,28 @@ from gear.world.weather.light import lighting_of
 from gear.world.weather.presets import PRESETS, wetness
 
 SKY_FACE_PX = 8
-"""Size of the sky map that is hashed; a small map is enough to detect changes of the light."""
+"""Side length in pixels of the sky map that is hashed; a small map is enough to detect changes of the light."""
 
 HASH_LENGTH = 16
 
 PLANNED = (("town",), ("assets",), ("renderer", "name"), ("versions", "mujoco"))
-"""Keys in the content of plans that `look_of` reads: names and hashes."""
+"""Key paths in the content of a plan that decide the appearance of a dataset."""
 
 ALIKE = {"raster": "filament"}
-"""Common name of renderers for which no network was found to give different results (docs/explanation/rendering.md)."""
+"""Renderers that count as another renderer, because networks give the same results (docs/explanation/rendering.md)."""
 
 RAMP = (0.01, 0.05, 0.2, 0.5, 0.8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """Everything that decides how pictures look, apart from seeds and scenes.
+    """The appearance of pictures: everything that decides how they look, apart from seeds and scenes.
 
     Attributes:
         assets: sha256 of all assets that the pictures of a town can show, by name of the town.
-        renderers: names of the renderers, sorted; renderers with the same look share one name.
-        light: sha256 of the sun and sky of all weather presets, and of the camera's response to them.
-        mujoco: minor release of MuJoCo, with which renderers change.
+        renderers: names of the renderers, sorted; renderers with the same appearance share one name.
+        light: sha256 of the light and the camera's response in all weather presets by day.
+        mujoco: major and minor version of MuJoCo, such as `3.2`, because its renderer changes between minor releases.
     """
 
     assets: dict[str, str]
@@ -60,11 +61,13 @@ class Look:
 
     @property
     def hash(self) -> str:
-        """16 hexadecimal digits; equal looks have equal hashes."""
+        """The first 16 hexadecimal digits of the appearance's sha256; equal appearances have equal hashes."""
         return _digest(to_json(self))[:HASH_LENGTH]
 
     def differences(self, other: Look) -> list[str]:
-        """The differences between two looks, as words; empty for equal looks."""
+        """Names the parts in which two appearances differ, such as `light` or `assets of town10`; empty if they
+        are equal.
+        """
         towns = sorted(
             town for town in self.assets.keys() | other.assets.keys() if self.assets.get(town) != other.assets.get(town)
         )
@@ -75,9 +78,9 @@ class Look:
 
 
 def look_of(plans: Iterable[Plan]) -> Look:
-    """The look of datasets, from the plans that they were collected with.
+    """The appearance of datasets, computed from the plans that they were collected with.
 
-    The light is that of the installed version of gear, because plans record only the version's name.
+    The light is computed with the installed version of gear, because plans record only the number of their version.
     """
     contents = [plan.content for plan in plans]
     return Look(
@@ -89,11 +92,13 @@ def look_of(plans: Iterable[Plan]) -> Look:
 
 
 def current_look(trained: Look, digests: dict[str, str] | None = None) -> Look:
-    """The look that the same towns have in the installed version; towns that are not installed are left out.
+    """The appearance that the towns of a training run have in the installed version of gear.
+
+    Towns that are not installed are left out.
 
     Args:
-        trained: look to compare with.
-        digests: asset hashes of towns that were read before; hashes that are computed are added.
+        trained: appearance of the training data, which names the towns.
+        digests: sha256 of assets by town, as a cache: hashes in it are used, and newly computed ones are added.
     """
     known = {} if digests is None else digests
     for town in trained.assets.keys() - known.keys():
@@ -108,7 +113,7 @@ def current_look(trained: Look, digests: dict[str, str] | None = None) -> Look:
 
 
 def read_look(value: Json) -> Look | None:
-    """Reads a look from JSON; None if the JSON is not a look."""
+    """Reads an appearance from JSON; returns None if the JSON does not describe an appearance."""
     try:
         return from_json(Look, value, "look")
     except FieldError:
@@ -117,10 +122,10 @@ def read_look(value: Json) -> Look | None:
 
 @cache
 def light_digest() -> str:
-    """sha256 of the light of every preset by day: sun and sky, the ambient occlusion of road users, the reflections of
-    wet ground, and the camera's response to a ramp.
+    """The sha256 of the light in every weather preset by day.
 
-    Shipped weights are not trained on nights, so nights are left out.
+    It covers sun and sky, the ambient occlusion of road users, the reflections of wet ground, and the camera's response
+    to a ramp of grey values. Presets by night are left out, because shipped weights are not trained on them.
     """
     presets: dict[str, Any] = {}
     for name, weather in PRESETS.items():

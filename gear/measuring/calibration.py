@@ -1,4 +1,4 @@
-"""The data on which a defense is calibrated."""
+"""Calibration data of a defense: a clean dataset and, optionally, the same dataset with patches."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Calibration:
     """The calibration data of a defense.
 
     Attributes:
-        clean: dataset without patches; None if none was given.
-        patched: the same dataset with patches; None if none was given.
-        on_fit_progress: called with (samples read for the first time, samples of both datasets).
+        clean: dataset without patches; None without calibration data.
+        patched: the same dataset with patches; None if the user gave only clean data.
+        on_fit_progress: called with (number of samples that the defense has read, total number of samples).
     """
 
     clean: Dataset[Any] | None = None
@@ -39,7 +39,7 @@ class Calibration:
     on_fit_progress: Progress | None = None
 
     def fit(self, defense: Chosen, product: Defense, model: Model, cameras: Sequence[str], seed: int) -> Any:
-        """The defense's state after calibration for a model with these cameras; None without calibration data.
+        """Calibrates a defense for one model and returns the defense's state; None without calibration data.
 
         Raises:
             GearError: the data do not fit the defense, or code of another package fails.
@@ -60,22 +60,28 @@ class Calibration:
             return product.fit(clean, patched, model, derive_rng(seed, "calibrate", defense.found.spec.name))
 
     def facts(self) -> list[str | None]:
-        """Content keys of both datasets."""
+        """The content keys (hashes of everything that decides the bytes) of the clean and the patched dataset;
+        None for a missing one.
+        """
         return [None if one is None else one.plan.content_key for one in (self.clean, self.patched)]
 
     def counted(self) -> Json:
-        """Number of samples of both datasets, which the keys do not contain; empty without data."""
+        """The numbers of samples of the clean and the patched dataset, as JSON for the results; empty without
+        calibration data.
+        """
         if self.clean is None:
             return {}
         return {"calibration_samples": [None if one is None else len(one) for one in (self.clean, self.patched)]}
 
     @property
     def shows_patch(self) -> bool:
-        """Whether the pictures that should be clean show a patch."""
+        """Whether the dataset that should be clean shows a patch."""
         return self.clean is not None and _label(self.clean) != NO_PATCH
 
     def doubts(self) -> list[str]:
-        """One line per property of the data that may be unintended."""
+        """Warnings about the calibration data, one line each: clean pictures that show a patch, or datasets that
+        differ in more than the patch.
+        """
         clean, patched, lines = self.clean, self.patched, []
         if clean is not None and self.shows_patch:
             lines.append(f"{clean.root}: shows the patch {_label(clean)}, which the defense takes for clean")
@@ -84,7 +90,7 @@ class Calibration:
         return lines
 
     def note(self, measured: Dataset[Any]) -> str | None:
-        """A note if a defense is evaluated on scenes of its calibration data; otherwise None."""
+        """A warning if a defense is evaluated on scenes of its own calibration data; otherwise None."""
         if self.clean is None or scenes_of(self.clean) != scenes_of(measured):
             return None
         return f"{measured.root}: the defense learnt from scenes that it is measured on; other scenes are harder for it"
@@ -105,11 +111,11 @@ def opened_calibration(
     """Opens the calibration data and checks them.
 
     Args:
-        clean, patched: roots of datasets; None for none.
+        clean, patched: roots of the datasets without and with patches; None for no dataset.
         models: models that the defense guards.
         defense: name of the defense.
-        flag: flag of the models' options, for messages.
-        on_fit_progress: called with (samples that the defense has read for the first time, samples of both).
+        flag: the command-line flag that sets options of the models, for error messages.
+        on_fit_progress: called with (number of samples that the defense has read, total number of samples).
 
     Raises:
         GearError: a dataset cannot be read or does not fit a model, the two datasets are swapped, or there is no
@@ -137,7 +143,11 @@ def _label(dataset: Dataset[Any]) -> str:
 
 
 class CalibrationViews(Sequence[Views]):
-    """The pictures of a dataset, read when they are used; `took` is called with the index of each."""
+    """The pictures of a dataset as a sequence; each sample is a mapping from camera names to (H, W, 3) uint8
+    pictures.
+
+    A sample is read from disk when it is indexed; the callback `took` is called with its index.
+    """
 
     def __init__(self, dataset: Dataset[Any], names: Sequence[str], took: Callable[[int], None]) -> None:
         self._dataset, self._names, self._took = dataset, tuple(names), took

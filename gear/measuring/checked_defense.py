@@ -1,4 +1,4 @@
-"""A built defense, whose result for every sample is checked against the contract."""
+"""Wraps a defense and checks each of its results against the contract of defenses."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NUMBERS = (int, float, np.floating, np.integer)
 
 
 class CheckedDefense:
-    """A defense whose errors name its plugin."""
+    """A defense whose results are checked; errors name the plugin that the defense comes from."""
 
     def __init__(
         self,
@@ -33,25 +33,26 @@ class CheckedDefense:
         """Args:
         found: plugin of the defense.
         defense: the built defense.
-        model: the guarded model, for a defense that uses its feature maps or predictions.
-        learn: calibrates the defense and returns its state; called once, before the first sample.
+        model: the model without the defense, for a defense that uses its feature maps or predictions.
+        learn: function that calibrates the defense and returns its state; called once, before the first sample.
         """
         self._found, self._defense, self._model, self._learn = found, defense, model, learn
 
     @functools.cached_property
     def state(self) -> Any:
-        """The result of calibration. It is computed when it is first needed, because calibration takes minutes."""
+        """The calibrated state of the defense, computed on first access because calibration takes minutes."""
         return self._learn()
 
     def fit_report(self) -> FitReport | None:
-        """The fit report of the calibrated defense; None if it is not calibrated or gives none. Does not start a
-        calibration.
+        """The defense's summary of what it learnt; None if it is not calibrated yet or provides no summary.
+
+        This call does not start a calibration.
         """
         state = self.__dict__.get("state")
         return state.fit_report() if isinstance(state, ReportsFit) else None
 
     def apply(self, views: Mapping[str, UInt8Image], rng: np.random.Generator, index: int) -> DefenseResult:
-        """Cleans one sample.
+        """Applies the defense to the pictures of one sample and checks the result.
 
         Raises:
             PluginError: the defense fails, or returns something that its contract does not allow.

@@ -1,5 +1,7 @@
-"""Runs a model over one dataset: samples are read in advance and predicted in batches; metrics and files of a batch are
-made while the next one is predicted.
+"""Evaluates a model on one dataset.
+
+Samples are read in advance and predicted in batches. The metrics and files of one batch are computed while the next
+batch is predicted.
 """
 
 from __future__ import annotations
@@ -20,17 +22,17 @@ from gear.readers import TorchDataset, read_ahead
 from gear.values.errors import DatasetError
 
 SampleDone = Callable[[], None]
-"""Called after every sample, when all of its files are written."""
+"""A callback without arguments, called whenever all files of one more sample are written."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """The result for one dataset.
+    """The result of a model on one dataset.
 
     Attributes:
-        notes: stored scores of every sample, in order.
-        made: number of samples predicted in this run.
-        damaged: one line per stored prediction that could not be read and was made again.
+        notes: stored result of every sample, in the order of the samples.
+        made: number of samples that this run predicted; an earlier run predicted all other samples.
+        damaged: one error per stored prediction that could not be read and was predicted again.
     """
 
     notes: list[Note]
@@ -41,14 +43,15 @@ class Row:
 def evaluate_row(
     dataset: Dataset[Any], scorer: Scorer, guarded: GuardedModel, *, batch: int, workers: int, done: SampleDone
 ) -> Row:
-    """Reads the predictions of an earlier run, and makes the missing ones.
+    """Evaluates a model on one dataset: reads the predictions of an earlier run and computes the missing ones.
 
     The rounding of a network depends on the batch size and on the number of threads, and an interrupted run must end
-    with the same bytes. So batches always consist of the same samples, including finished ones, and the number of lanes
-    depends on the whole dataset. With several lanes, each lane processes its batches completely, from reading to
-    metrics, because handing them over takes time; further threads write the files. With one lane, other threads decode
-    pictures, compute metrics and write files. The number of waiting samples is bounded, so that memory does not grow
-    with the dataset.
+    with the same bytes. Batches therefore always consist of the same samples, including finished ones, and the number
+    of lanes (batches that are processed in parallel) depends only on the whole dataset.
+
+    With several lanes, each lane processes its batches completely, from reading to metrics, and further threads write
+    the files. With one lane, other threads decode pictures, compute metrics and write files. The number of waiting
+    samples is bounded, so memory does not grow with the dataset.
     """
     items = TorchDataset(dataset)
     with ThreadPoolExecutor(workers) as scorers:

@@ -1,4 +1,4 @@
-"""A defense as the user requests it: name, options and calibration data, as one value that every verb passes on."""
+"""A guard: a defense as the user requests it, with name, options and calibration data."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Guard:
 
     Attributes:
         defense: name of a defense plugin.
-        settings: `KEY=VALUE` texts for its options.
-        calibration: root of the clean calibration dataset; None for none.
-        calibration_patched: root of the same dataset with patches; None for none.
+        settings: options of the defense as `KEY=VALUE` texts.
+        calibration: root of the clean calibration dataset; None without calibration data.
+        calibration_patched: root of the same dataset with patches; None without patched calibration data.
     """
 
     defense: str
@@ -35,7 +35,7 @@ class Guard:
         calibration: str | Path | None = None,
         calibration_patched: str | Path | None = None,
     ) -> Guard | None:
-        """Makes a guard from the arguments of a verb; None without a defense.
+        """Makes a guard from the arguments of a verb such as `evaluate`; None without a defense.
 
         Raises:
             GearError: options or calibration data are given without a defense.
@@ -54,7 +54,7 @@ class Guard:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class OpenedGuard:
-    """A guard whose plugin was found and whose calibration data were opened.
+    """A requested defense whose plugin was found and whose calibration data were opened.
 
     Attributes:
         defense: the plugin with its options; None without a defense.
@@ -76,14 +76,15 @@ def open_guard(
     flag: str = "--set ",
     on_fit_progress: Progress | None = None,
 ) -> OpenedGuard:
-    """Finds the defense, opens its calibration data, and checks that both suit the models and the task.
+    """Finds the plugin of a requested defense, opens its calibration data, and checks that they fit the models and
+    the task.
 
     Args:
         guard: the request; None for no defense.
         models: models that the defense guards, one after the other.
-        task: task of the data.
-        flag: flag of the models' options, for messages.
-        on_fit_progress: called with (calibration samples that the defense has read, their number).
+        task: name of the dataset's task.
+        flag: the command-line flag that sets options of the models, for error messages.
+        on_fit_progress: called with (number of samples that the defense has read, total number of samples).
 
     Raises:
         GearError: there is no such defense, an option does not fit, the data cannot be read, or the defense does not

@@ -1,4 +1,4 @@
-"""A model guarded by a defense: predicts from pictures, and measures the time."""
+"""A model with its defense: predicts from pictures and measures the computing time."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ from gear.values.errors import PluginError
 from gear.values.rng import derive_rng
 
 SMALL_PX, MOST_TOGETHER = 1_400_000, 4
-"""Limits of a default batch: with more pixels per batch none of gear's networks is faster on a CPU, and some are
-slower.
+"""Largest number of pixels and of samples in a default batch; larger batches make no network of gear faster on a CPU,
+and some slower.
 """
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Answer:
-    """The result for one sample.
+    """The prediction for one sample, with the defense's outputs and the computing time.
 
     Attributes:
         prediction: prediction in the task's format.
-        model_s, defense_s: wall time in seconds; the time of a batch is divided by its samples and by the number of
-            parallel batches.
-        mask: the defense's patch mask by camera name, (H, W) float32 in 0..1.
-        score: the defense's score for "the sample shows a patch".
+        model_s, defense_s: wall time in seconds; the model's time for a batch is divided by the number of its samples
+            and by the number of parallel batches.
+        mask: the defense's patch mask by camera name, (H, W) float32 in 0..1; None if there is none.
+        score: the defense's confidence in 0..1 that the sample is attacked; None if there is none.
     """
 
     prediction: Any
@@ -62,8 +62,8 @@ class GuardedModel:
     Attributes:
         plugin: plugin of the model.
         model: the model, wrapped by its defense if there is one.
-        weights_sha256: hash of the bare model's weights; None for a model that is no torch module.
-        lanes: number of threads that may call `predict` at a time; 1 for defenses and models of third parties.
+        weights_sha256: hash of the weights of the model without its defense; None for a model that is no torch module.
+        lanes: number of threads that may call `predict` at a time; 1 with a defense and for models of other packages.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class GuardedModel:
         *,
         seed: int = 0,
     ) -> None:
-        """Builds the model, and wraps it by its defense. Calibration is done before the first sample.
+        """Builds the model and wraps it by its defense; calibration starts with the first call of `predict`.
 
         Raises:
             GearError: options or weights do not fit, or code of another package fails.
@@ -97,7 +97,7 @@ class GuardedModel:
         self._at_work, self._counting = 0, threading.Lock()
 
     def fit_report(self) -> FitReport | None:
-        """The fit report of the defense, if it was calibrated in this run and gives one."""
+        """The defense's summary of what it learnt in this run; None without a defense, a calibration or a summary."""
         return None if self._guard is None else self._guard.fit_report()
 
     def _guarded(self, defense: Chosen, bare: Model, calibration: Calibration) -> tuple[CheckedDefense, Model]:
@@ -111,9 +111,10 @@ class GuardedModel:
         return CheckedDefense(found, product, bare if spec.needs_model or spec.taps else None, learn), wrapped
 
     def usual_batch(self, dataset: Dataset[Any]) -> int:
-        """Default batch size of a dataset: for gear's own models as many small samples as make `SMALL_PX` pixels,
-        at most
-        `MOST_TOGETHER`; one for third parties' models and guarded ones.
+        """The default number of samples in a batch of a dataset.
+
+        For gear's own models it is the largest number whose pictures have at most `SMALL_PX` pixels, but at least 1 and
+        at most `MOST_TOGETHER`. It is 1 for models with a defense and for models of other packages.
         """
         if not self._is_ours or self._many is None or not len(dataset):
             return 1
@@ -122,7 +123,11 @@ class GuardedModel:
         return max(1, min(MOST_TOGETHER, SMALL_PX // max(pixels, 1)))
 
     def predict(self, pictures: Sequence[Views], indices: Sequence[int]) -> list[Answer]:
-        """Cleans and predicts a batch of samples.
+        """Applies the defense to a batch of samples and predicts from its output.
+
+        Args:
+            pictures: (H, W, 3) uint8 pictures by camera name, for each sample.
+            indices: indices of the samples in the split.
 
         Raises:
             PluginError: a model or defense of another package fails.
@@ -179,12 +184,14 @@ class GuardedModel:
 
 
 def plugin_error(found: PluginEntry, stage: str, problem: str) -> PluginError:
-    """An error that names the plugin."""
+    """Makes an error whose message names the plugin, its package and version, and the stage at which it failed."""
     return PluginError(f"{found.spec.name} ({found.owner.package} {found.owner.version})", stage, problem)
 
 
 def weights_digest(model: Any) -> str | None:
-    """sha256 over names and bytes of a torch module's parameters and buffers; None for anything else."""
+    """The sha256 over names and bytes of a torch module's parameters and buffers; None for a model without torch
+    modules.
+    """
     torch = sys.modules.get("torch")
     if torch is None:
         return None

@@ -1,16 +1,17 @@
-"""95 % confidence intervals by the jackknife: the change of a metric when one street is left out.
+"""95 % confidence intervals of metrics by the jackknife: the change of a metric when one street is left out.
 
-A metric is computed without each cluster of samples in turn; the samples of one street are a cluster, because they are
-not independent. The spread of these replicates gives the standard error (Tukey, 1958; Efron and Stein, Annals of
-Statistics 1981). Student's t gives the width, with degrees of freedom for replicates of unequal weight (Satterthwaite,
-Biometrics 1946).
+The samples of one street form a cluster, because they are not independent. The metric is computed once without each
+cluster. The spread of these replicates gives the standard error (Tukey, 1958; Efron and Stein, Annals of Statistics
+1981). Student's t gives the width, with degrees of freedom for replicates of unequal weight (Satterthwaite, Biometrics
+1946).
 
 The bootstrap is not used, because a mean over classes, such as mIoU or mAP, leaves out classes that no drawn sample
 shows. Resamples show fewer classes than the dataset, so bootstrap percentiles are biased, and they are too narrow for
-few streets. In simulations with a known truth (docs/results/intervals.md, `benchmarks/coverage.py`) percentiles of 95 %
-cover 80 to 94 % for mIoU, BCa 75 to 93 %, and these intervals 95 to 97 % for mIoU and 92 to 97 % for other metrics.
+few streets. In simulations with a known true value (docs/results/intervals.md, `benchmarks/coverage.py`), 95 %
+bootstrap percentiles cover it in 80 to 94 % of the cases for mIoU, and BCa intervals in 75 to 93 %. The intervals of
+this module cover it in 95 to 97 % for mIoU, and in 92 to 97 % for other metrics.
 
-The interval is for the metric over the classes that the dataset shows; nothing is known about other classes.
+The interval is valid for the classes that the dataset shows, and not for any other classes.
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ import numpy.typing as npt
 from gear.contracts.evaluation import Draws
 
 LEFT_OUT = -1
-"""Value with which the rows of `leave_one_out` are padded."""
+"""Value in the index arrays of the jackknife that stands for no sample; rows are padded with it."""
 
 MOST_GROUPS = 500
-"""Largest number of replicates. If there are more clusters, several are left out at a time (delete-a-group
-jackknife).
+"""Largest number of jackknife replicates. If there are more clusters, each replicate leaves out a group of clusters
+(delete-a-group jackknife).
 """
 
 CONFIDENCE = 0.95
@@ -37,27 +38,27 @@ REAL = (-math.inf, math.inf)
 """Smallest and largest value of a metric without bounds."""
 
 NEGLIGIBLE = 1e-12
-"""Largest relative difference of replicates that is attributed to rounding."""
+"""Largest relative difference between jackknife replicates that is attributed to rounding."""
 
 Values = npt.NDArray[np.float64]
 Interval = tuple[float, float]
 
 
 def numbered(clusters: Sequence[Hashable]) -> npt.NDArray[np.int64]:
-    """(N,) number of each sample's cluster, counted in the order in which clusters first occur."""
+    """The (N,) cluster numbers of N samples: clusters are numbered from 0 in the order of their first sample."""
     known: dict[Hashable, int] = {}
     return np.array([known.setdefault(one, len(known)) for one in clusters], np.int64)
 
 
 def leave_one_out(clusters: Sequence[Hashable]) -> Draws:
-    """(C, N) indices of samples: row c holds those outside cluster c, padded with `LEFT_OUT`.
+    """Index sets for the jackknife: each row holds the indices of all samples outside one cluster.
 
     Args:
         clusters: the cluster of each of the N samples.
 
     Returns:
-        One row per cluster, or per group of clusters if there are more than `MOST_GROUPS`; no rows for fewer than two
-        clusters, whose spread is unknown.
+        (C, N) indices, padded with `LEFT_OUT`: one row per cluster, or per group of clusters if there are more than
+        `MOST_GROUPS`. There are no rows for fewer than two clusters, whose spread is unknown.
     """
     owners = numbered(clusters) % MOST_GROUPS
     count = int(owners.max(initial=-1)) + 1
@@ -69,13 +70,13 @@ def leave_one_out(clusters: Sequence[Hashable]) -> Draws:
 
 
 def jackknife_interval(value: float, replicates: Values, limits: Interval = REAL) -> Interval | None:
-    """The 95 % interval of a metric.
+    """The 95 % confidence interval of a metric.
 
-    If all replicates are equal, both ends are the value itself.
+    If all replicates are equal, both ends are the metric's value itself.
 
     Args:
         value: the metric over all samples.
-        replicates: (C,) the metric without each cluster in turn.
+        replicates: (C,) values of the metric, each computed without one of the C clusters.
         limits: smallest and largest possible value of the metric, to which the interval is clipped.
 
     Returns:
@@ -111,11 +112,15 @@ def _students_t(degrees: float) -> float:
 
 
 def separated_interval(value: float, clusters: int) -> Interval:
-    """The interval of an area under the ROC curve of 0 or 1, for which all replicates are equal.
+    """The 95 % confidence interval of an area under the ROC curve that is exactly 0 or 1.
 
-    The scores of these samples are separated, but those of other samples may not be. The ends solve |A - a| = z
-    sqrt(V(A)) with Hanley and McNeil's variance, in which both sample sizes are the number of clusters (Newcombe,
-    Statistics in Medicine 2006, method 5).
+    All jackknife replicates are equal in this case, so their spread cannot be used. The interval's end a solves |A - a|
+    = z sqrt(V(a)), where A is the area and V is Hanley and McNeil's variance with the number of clusters as both sample
+    sizes (Newcombe, Statistics in Medicine 2006, method 5).
+
+    Args:
+        value: the area, 0 or 1.
+        clusters: number of clusters of samples.
     """
     from scipy import optimize, stats
 

@@ -1,4 +1,4 @@
-"""Checks that the metrics of a task's evaluator keep its contract."""
+"""Checks that the evaluator of a task returns metrics as names and numbers."""
 
 from __future__ import annotations
 
@@ -11,10 +11,15 @@ from gear.plugins.build import find, name_of_task
 
 
 def said_of(plan: Plan, given: Any, method: str) -> dict[str, float]:
-    """The metrics that `method` of an evaluator returned, by name; `plan` is the dataset's.
+    """Checks the metrics that an evaluator of the dataset's task returned, and returns them by name.
+
+    Args:
+        plan: plan of the dataset.
+        given: value that the evaluator returned.
+        method: method of the evaluator, for the error message.
 
     Raises:
-        PluginError: the return value is not a mapping of names to numbers; the error names the task's plugin.
+        PluginError: the value is not a mapping of names to numbers; the error names the task's plugin.
     """
     try:
         return check_metrics(given, method)

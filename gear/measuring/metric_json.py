@@ -1,4 +1,4 @@
-"""Metrics as JSON."""
+"""Converts metrics to JSON values."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from gear.values.serial import Json
 
 
 def known_json(metrics: Mapping[str, float]) -> Json:
-    """Metrics by name; values that are not finite become null, because JSON has no number for them."""
+    """Converts metrics by name to JSON; NaN and infinite values become null, because JSON cannot represent them."""
     return {name: float(value) if math.isfinite(value) else None for name, value in metrics.items()}

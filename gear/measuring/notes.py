@@ -1,4 +1,4 @@
-"""Notes on datasets, with equal notes combined."""
+"""Combines equal warnings about several datasets into one line."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Iterable
 
 
 def grouped(notes: Iterable[str | None]) -> list[str]:
-    """Combines notes of the form `ROOT: text` to one line per text, with the first root and the number of others."""
+    """Combines warnings of the form `ROOT: text`: one line per text, with the first root and the number of further
+    roots.
+    """
     roots: dict[str, dict[str, None]] = {}
     for note in notes:
         if note is not None:

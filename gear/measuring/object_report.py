@@ -1,4 +1,4 @@
-"""The report `objects`: the outcomes of objects, and false alarms on the patch and elsewhere."""
+"""The report `objects`: how many objects were found or missed, and false alarms on the patch and elsewhere."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from gear.values.picture_objects import ObjectState, PictureOutcomes
 from gear.values.scene import Vec3
 
 OBJECTS = "objects"
-"""Name of the report."""
+"""Name of the report on objects."""
 
 ALARM_METRICS = ("false_alarms_on_patch", "false_alarms_elsewhere")
-"""Numbers of false alarms per picture."""
+"""Metrics that are numbers of false alarms per picture."""
 
 STATES: tuple[ObjectState, ...] = ("found", "missed", "misclassified", "moved")
 
 STATE_METRICS = {f"{state}_share": state for state in STATES}
-"""Shares of the objects in each state."""
+"""Metrics that are shares of the objects in one state, with that state."""
 
 
 class ObjectEvaluator:
-    """Gathers the outcomes of the objects of each picture."""
+    """An evaluator that counts, for each picture, found and missed objects and false alarms."""
 
     def __init__(self, task: WithObjects) -> None:
-        """Args: task: of the samples."""
+        """Args: task: the task of the samples."""
         self._task = task
         self.pictures: list[PictureOutcomes] = []
 
     def update(self, sample: Sample, prediction: Any) -> Mapping[str, float]:
-        """Adds one sample; returns the metrics of `result` for it."""
+        """Adds one sample; returns the metrics of this sample alone, with the names of `result`."""
         given = self._task.picture_objects(sample, prediction)
         middles_m = [
             _middle_m(surface.camera_from_surface)
@@ -51,26 +51,34 @@ class ObjectEvaluator:
         return _values(_counts(self.pictures[-1]))
 
     def merge(self, other: Any) -> None:
-        """Adds the pictures of another evaluator."""
+        """Adds the pictures that another evaluator has gathered."""
         self.pictures += other.pictures
 
     def result(self) -> Mapping[str, float]:
-        """False alarms per picture on the patch and elsewhere, and the share of the objects in each state; NaN where
-        there is nothing to count.
+        """The metrics over all gathered pictures, by name.
+
+        They are the false alarms per picture on the patch and elsewhere, and the share of the objects in each state
+        (`found`, `missed`, `misclassified`, `moved`). A metric is NaN if there are no pictures or no objects.
         """
         return _values(self.totals()["counts"])
 
     def totals(self) -> Mapping[str, npt.NDArray[Any]]:
-        """(7,) sums: pictures, false alarms on the patch and elsewhere, and objects by state."""
+        """The sums over all gathered pictures, as one (7,) float64 array.
+
+        Its entries are the numbers of pictures, false alarms on the patch, false alarms elsewhere, and objects that are
+        found, missed, misclassified and moved.
+        """
         return {"counts": np.sum([_counts(one) for one in self.pictures], axis=0) if self.pictures else np.zeros(7)}
 
     def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> Spread:
-        """The metrics of R sets of sums."""
+        """The metrics by name, (R,) values each, from an (R, 7) array of sums as in `totals`."""
         rows = [_values(row) for row in totals["counts"]]
         return {name: np.array([row[name] for row in rows]) for name in (*ALARM_METRICS, *STATE_METRICS)}
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """0 and 1 for shares; 0 and infinity for false alarms per picture."""
+        """The smallest and largest possible value of a metric: 0 and 1 for shares, 0 and infinity for false alarms
+        per picture.
+        """
         return 0.0, 1.0 if metric in STATE_METRICS else math.inf
 
 

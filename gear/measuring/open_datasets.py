@@ -1,4 +1,4 @@
-"""Opens the datasets of an evaluation: all of one task, each given once."""
+"""Opens the datasets of an evaluation, which must have one task and differ from each other."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def opened(paths: Sequence[str | Path], split: str | None, model: Chosen, report
     """Opens the datasets of an evaluation.
 
     Args:
-        paths: roots, folders of roots, or `DIR:SPLIT`.
-        split: split for paths that name none; None if each has only one.
+        paths: roots of datasets, folders of such roots, or `DIR:SPLIT`.
+        split: split for paths that name none; None if each dataset has only one.
         model: model that must fit the datasets.
-        reports: names of reports that must be available for them.
+        reports: names of reports that must be available for the datasets.
 
     Raises:
         GearError: there is no dataset, one is empty or of another task, or the model or a report does not fit it.
@@ -44,7 +44,7 @@ def opened(paths: Sequence[str | Path], split: str | None, model: Chosen, report
 
 
 def row_names(datasets: Sequence[Dataset[Any]]) -> list[str]:
-    """Names of the datasets' folders in the evaluation, which do not depend on the order of the datasets.
+    """The folder names of datasets in an evaluation: split, patch and a hash of the content.
 
     Raises:
         GearError: a dataset was given twice.

@@ -1,4 +1,7 @@
-"""Runs several batches through one network in parallel, which is faster on a CPU than one batch on all cores."""
+"""Runs several batches through one network in parallel, each in a lane (a thread of its own).
+
+On a CPU this is faster than one batch on all cores.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +13,18 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 Submit = Callable[..., "Future[Any]"]
-"""A function that takes another function with its arguments and returns a future."""
+"""Type of a function that submits a call (function and arguments) to a thread and returns its future."""
 
 MOST = 4
-"""Largest number of lanes, because each lane holds the activations of its batch; with more cores each lane gets more
-threads.
+"""Largest number of lanes (batches that are processed in parallel). It is small because each lane holds the activations
+of its batch; with more cores each lane gets more threads.
 """
 
 
 def lanes_of(model: Any) -> int:
-    """Number of batches that a model may process at a time: torch's number of threads, at most `MOST`, for gear's
-    own models on a
-    CPU; 1 on a GPU and for other models.
+    """The number of batches that a model may process in parallel.
+
+    It is torch's number of threads, at most `MOST`, for gear's own models on a CPU, and 1 for all other models.
     """
     torch, network = sys.modules.get("torch"), sys.modules.get("gear.networks.network")
     if torch is None or network is None or not isinstance(model, network.Network) or model.device.type != "cpu":
@@ -31,9 +34,12 @@ def lanes_of(model: Any) -> int:
 
 @contextlib.contextmanager
 def lanes(count: int) -> Iterator[Submit]:
-    """Runs submitted functions in a number of threads that share torch's cores.
+    """A context with threads for parallel batches; yields the function that submits a call to them.
 
-    Output that is printed meanwhile is redirected to stderr, as always when a plugin runs.
+    Each thread gets an equal share of torch's threads. Output that is printed inside the context goes to stderr.
+
+    Args:
+        count: number of threads.
     """
     import torch
 

@@ -1,4 +1,4 @@
-"""The true patch area of a sample, and its agreement with a defense's mask."""
+"""The true patch area of a sample, and its agreement with the mask that a defense returns."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from gear.formats import rle
 Mask = npt.NDArray[np.bool_]
 
 MARGIN_PX = 5
-"""Distance in pixels from the patch up to which pixels are excluded with it, because of the patch's light and the
-network's smoothing.
+"""Distance from the patch, in pixels, up to which the report `outside_patch` also excludes pixels: light from the patch
+and the network's smoothing reach them.
 """
 
 MASK_METRICS = ("mask_iou", "mask_precision", "mask_recall", "mask_area")
-"""Names of the metrics of masks. The last one is the share of the pictures that a mask covers; the others compare the
-mask with the patch.
+"""Names of the metrics of masks. `mask_area` is the share of the pictures that the mask covers; the others compare
+the mask with the patch.
 """
 
 SURE = 0.5
-"""Threshold at which a soft mask is binarised."""
+"""Probability from which a pixel of a defense's mask counts as patch."""
 
 
 def patch_masks(sample: Sample) -> dict[str, Mask]:
-    """(H, W) bool masks of the visible pixels of all surfaces, by camera name."""
+    """The (H, W) bool masks of the pixels that show a patch surface, by camera name."""
     masks: dict[str, Mask] = {name: np.zeros(image.shape[:2], dtype=np.bool_) for name, image in sample.images.items()}
     for surface in sample.surfaces:
         if surface.visible_px:
@@ -39,15 +39,21 @@ def patch_masks(sample: Sample) -> dict[str, Mask]:
 
 
 def widened(masks: Mapping[str, Mask], margin_px: int = MARGIN_PX) -> dict[str, Mask]:
-    """Each mask, dilated by a distance in pixels."""
+    """Dilates bool masks by a distance in pixels."""
     size = 2 * margin_px + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     return {name: cv2.dilate(mask.astype(np.uint8), disc).astype(np.bool_) for name, mask in masks.items()}
 
 
 def mask_metrics(sample: Sample, found: Mapping[str, Any]) -> dict[str, float]:
-    """Agreement of a defense's mask with the true patch area, over all cameras together: the metrics `MASK_METRICS`,
-    NaN where there is nothing to compare.
+    """The agreement of a defense's mask with the true patch area, over the pixels of all cameras together.
+
+    Args:
+        sample: the sample with its ground truth.
+        found: the defense's mask, (H, W) in 0..1, by camera name.
+
+    Returns:
+        The metrics `MASK_METRICS` by name, in 0..1; NaN for a metric that is undefined, such as IoU without a patch.
     """
     truth = patch_masks(sample)
     real = np.concatenate([truth[name].reshape(-1) for name in found])

@@ -1,4 +1,4 @@
-"""Checks of the patches that an attack returns."""
+"""Checks the patches that an attack returns."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gear.plugins.catalogue import PluginEntry
 
 
 def check_patches(patches: Any, surfaces: int, found: PluginEntry) -> None:
-    """Checks that an attack returned one patch per surface.
+    """Checks that an attack returned one patch per surface, each (H, W, 3) float32 in 0..1.
 
     Raises:
         PluginError: the attack returned something else; the error names the attack.

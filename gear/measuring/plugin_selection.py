@@ -1,4 +1,4 @@
-"""Looks up models and defenses by name, and checks that they fit the data, before anything is loaded."""
+"""Finds models and defenses by name, and checks that they fit a dataset, without building them."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from gear.values.errors import GearError
 from gear.values.serial import Json
 
 CAMERA = ("hfov_deg", "baseline_m")
-"""Options that a model and its task must have in common, because pictures do not contain them."""
+"""Camera options whose values must be equal for a model and a dataset, because pictures do not contain them."""
 
 OWN_PINHOLE = ("focal_px", "focal_y_px", "principal_px")
-"""Options of tasks for cameras that `hfov_deg` does not describe."""
+"""Options of tasks for cameras that the horizontal field of view alone (`hfov_deg`) does not describe."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class Chosen:
     options: Node
 
     def facts(self) -> Json:
-        """Name, package, version and options with all defaults; JSON."""
+        """The plugin's name, package, version and options (including defaults), as JSON for the results."""
         owner = self.found.owner
         config = read_node(self.found.spec.config, self.options, "")
         named = {"name": self.found.spec.name, "package": owner.package, "version": owner.version}
@@ -40,12 +40,12 @@ class Chosen:
 
 
 def chosen_model(name: str, settings: Iterable[str], flag: str = "--set") -> Chosen:
-    """Looks up a model by name.
+    """Finds a model by name and checks its options.
 
     Args:
         name: name of the plugin.
-        settings: `KEY=VALUE` texts.
-        flag: flag with which the settings were given, for messages.
+        settings: options as `KEY=VALUE` texts.
+        flag: the command-line flag that sets these options, for error messages.
 
     Raises:
         GearError: there is no such model, or an option does not fit.
@@ -56,7 +56,7 @@ def chosen_model(name: str, settings: Iterable[str], flag: str = "--set") -> Cho
 
 
 def chosen_defense(name: str | None, settings: Iterable[str]) -> Chosen | None:
-    """Looks up a defense by name.
+    """Finds a defense by name and checks its options; returns None without a name.
 
     Raises:
         GearError: there is no such defense, an option does not fit, or options are given without a defense.
@@ -72,12 +72,12 @@ def chosen_defense(name: str | None, settings: Iterable[str]) -> Chosen | None:
 
 
 def check_model(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> None:
-    """Checks that the model supports the dataset's task and cameras.
+    """Checks that a model supports the task and the cameras of a dataset.
 
     Args:
         model: the model with its options.
-        dataset: dataset whose pictures the model is shown.
-        flag: flag of the model's options, for messages.
+        dataset: dataset on which the model predicts.
+        flag: the command-line flag that sets options of the model, for error messages.
 
     Raises:
         GearError: the model does not support the task or a camera.
@@ -94,13 +94,12 @@ def check_model(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> N
 
 
 def check_camera(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> None:
-    """Checks that the model assumes the camera that took the pictures; with another one, its distances would be
-    wrong.
+    """Checks that a model assumes the camera of a dataset; otherwise its predicted distances would be wrong.
 
     Args:
         model: the model with its options.
         dataset: dataset whose task options describe the camera.
-        flag: flag of the model's options, for messages.
+        flag: the command-line flag that sets options of the model, for error messages.
 
     Raises:
         GearError: the model assumes another camera.
@@ -109,7 +108,13 @@ def check_camera(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> 
 
 
 def check_optics(model: Chosen, options: Json, collected: str, flag: str) -> None:
-    """Checks a model against the camera of a task; see `check_camera`.
+    """Checks that a model assumes the camera that the options of a task describe.
+
+    Args:
+        model: the model with its options.
+        options: the task's options, such as `hfov_deg` (horizontal field of view) and `baseline_m`.
+        collected: beginning of the error message, such as `DIR was collected`.
+        flag: the command-line flag that sets options of the model, for error messages.
 
     Raises:
         GearError: the model assumes another camera.
@@ -132,11 +137,12 @@ def check_optics(model: Chosen, options: Json, collected: str, flag: str) -> Non
 
 
 def check_defense(defense: Chosen, model: Chosen, task: str, *, is_calibrated: bool) -> None:
-    """Checks that the defense supports the task, that the model has its feature maps, and that required calibration
-    data are given.
+    """Checks that a defense supports the task and the model, and that required calibration data are given.
+
+    The model must provide all feature maps that the defense reads.
 
     Raises:
-        GearError: one of these does not hold.
+        GearError: the defense fits the task or the model badly, or calibration data are missing.
     """
     spec, guarded = defense.found.spec, model.found.spec
     assert isinstance(spec, DefenseSpec) and isinstance(guarded, ModelSpec)

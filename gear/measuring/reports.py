@@ -1,8 +1,12 @@
-"""The reports of an evaluation: the task's own metric, further reports of the task, and metrics of plugins.
+"""The reports of an evaluation, each of which is a set of metrics.
 
-Tasks of objects always have the report `objects`. Other reports are requested by name. `outside_patch` is the task's
-own metric without the ground truth on and next to the patch. A task may have further reports, such as `reference`. Any
-other name is that of a metric plugin (`gear_metrics`), with options after a colon: `boundary_iou:width_share=0.01`.
+Every evaluation has the task's own metrics; tasks with objects also have the report `objects`. Other reports are
+requested by name:
+
+- `outside_patch` is the task's own metrics without the ground truth on and next to the patch.
+- A task may have further reports, such as `reference`.
+- Any other name is that of a metric plugin (`gear_metrics`), with options after a colon:
+  `boundary_iou:width_share=0.01`.
 """
 
 from __future__ import annotations
@@ -31,23 +35,23 @@ from gear.values.errors import GearError, UnknownNameError
 from gear.values.serial import Json
 
 TASK = "task"
-"""Name of the task's own metric among the reports."""
+"""Name of the report with the task's own metrics."""
 
 OUTSIDE_PATCH = "outside_patch"
 
 NEXT_OPTION = re.compile(r",(?=[\w.]+=)")
-"""Pattern of a comma that is followed by another `KEY=VALUE`; other commas belong to a value."""
+"""Pattern of a comma between two options `KEY=VALUE`; other commas belong to a value."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Report:
-    """One report of an evaluation.
+    """One report of an evaluation: a set of metrics over a dataset.
 
     Attributes:
-        name: name as given by the user.
+        name: name as the user gave it.
         make: function that returns a new, empty evaluator.
         plan: plan of the evaluated dataset.
-        plugin: the metric plugin with its options; None for the task's own metric and reports.
+        plugin: the metric plugin with its options; None for the task's own metrics and reports.
     """
 
     name: str
@@ -56,10 +60,10 @@ class Report:
     plugin: Chosen | None = None
 
     def checked(self, given: Any, method: str) -> dict[str, float]:
-        """Checks the metrics that `method` of the evaluator returned.
+        """Checks the metrics that a method of the evaluator returned, and returns them by name.
 
         Raises:
-            PluginError: the return value is not a mapping of names to numbers; the error names the plugin.
+            PluginError: the value is not a mapping of names to numbers; the error names the plugin.
         """
         try:
             return check_metrics(given, method)
@@ -69,7 +73,7 @@ class Report:
 
     @contextlib.contextmanager
     def blamed(self, method: str) -> Iterator[None]:
-        """A context for an evaluator's code, in any thread: errors of another package's metric name its plugin.
+        """A context for calls of the evaluator's code; an error in a metric of another package names its plugin.
 
         Raises:
             PluginError: the evaluator of another package's metric raised something other than a `GearError`.
@@ -84,7 +88,9 @@ class Report:
             raise plugin_error(self.plugin.found, f"{method} of its evaluator", one_line(error)) from error
 
     def facts(self) -> Json:
-        """Facts about a plugin's metric for the results; None for the task's own reports."""
+        """A plugin metric's name, package, version, options and unit, as JSON for the results; None for the task's
+        own reports.
+        """
         if self.plugin is None:
             return None
         spec = self.plugin.found.spec
@@ -94,12 +100,13 @@ class Report:
 
 
 def task_report(dataset: Dataset[Any]) -> Report:
-    """The task's own metric."""
+    """The report with the task's own metrics."""
     return Report(name=TASK, make=dataset.task.evaluator, plan=dataset.plan)
 
 
 def reports_of(names: Iterable[str], dataset: Dataset[Any]) -> dict[str, Report]:
-    """The task's own metric, `objects` for tasks of objects, and the requested reports, by name.
+    """The reports of an evaluation by name: the task's own metrics, `objects` if the task has objects, and the
+    requested ones.
 
     Raises:
         UnknownNameError: neither the task nor a plugin has a report of this name.

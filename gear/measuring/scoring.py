@@ -1,4 +1,7 @@
-"""Scores predictions: computes metrics, writes result files, and writes a note per sample that marks it as finished."""
+"""Computes the metrics of predictions and stores the results, one sample after another.
+
+The last file of a sample is its note, a JSON file that marks the sample as finished.
+"""
 
 from __future__ import annotations
 
@@ -33,21 +36,21 @@ KEPT: Any = {
     "facts": Any, "sha256": dict[str, str], "model_s": float, "defense_s": float, "score": float | None,
     "mask": dict[str, float | None] | None,
 }  # fmt: skip
-"""Keys of a note that are read again."""
+"""Keys and types of a stored note that a later run reads."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Note:
-    """The stored score of one finished sample.
+    """The stored result of one finished sample.
 
     Attributes:
         index: index of the sample in the split.
-        metrics: metrics of this sample, by report.
-        parts: evaluators that have seen only this sample, by report.
-        cost: `model_s` and `defense_s` in seconds.
-        score: the defense's score, or None.
-        mask: agreement of the defense's mask with the patch, or None.
-        facts: facts that the task needs to read the prediction back; JSON.
+        metrics: metrics of this sample by name, for each report.
+        parts: evaluators that hold only this sample, by report.
+        cost: computing times `model_s` and `defense_s` in seconds.
+        score: the defense's confidence in 0..1 that the sample is attacked; None if there is none.
+        mask: agreement of the defense's mask with the patch, by metric; None without a mask.
+        facts: JSON that the task needs to read the prediction from its files.
         sha256: hashes of the prediction's files, by name.
     """
 
@@ -61,7 +64,7 @@ class Note:
     sha256: Mapping[str, str]
 
     def as_json(self) -> Json:
-        """The note as JSON, which is written next to the predictions."""
+        """The content of the note's file, which is written next to the predictions."""
         return {
             "index": self.index,
             "metrics": {name: known_json(one) for name, one in self.metrics.items()},
@@ -75,18 +78,18 @@ class Note:
 
     @property
     def outcomes(self) -> PictureOutcomes | None:
-        """What became of the sample's objects; None for tasks without objects."""
+        """The objects of the sample with their states, and its detections; None for tasks without objects."""
         part = self.parts.get(OBJECTS)
         return part.pictures[0] if isinstance(part, ObjectEvaluator) else None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Unwritten:
-    """A measured sample whose files are not written yet.
+    """The result of one sample whose files are not written yet.
 
     Attributes:
-        note: its note.
-        files: files of the prediction, content by name.
+        note: the sample's note, a JSON file that marks it as finished.
+        files: bytes of the prediction's files, by name.
     """
 
     note: Note
@@ -94,16 +97,16 @@ class Unwritten:
 
 
 class Scorer:
-    """Measures the samples of one dataset and stores the results; its methods may run in several threads."""
+    """Computes the metrics of a dataset's samples and stores the results; several threads may use it."""
 
     def __init__(
         self, dataset: Dataset[Any], root: Path, folder: str, reports: tuple[str, ...], model: PluginEntry
     ) -> None:
         """Args:
-        dataset: the samples.
+        dataset: the evaluated dataset.
         root: folder of the evaluation.
-        folder: name of this dataset's folder in it.
-        reports: names of further reports.
+        folder: name of this dataset's folder in the folder of the evaluation.
+        reports: names of the requested reports.
         model: plugin of the model that predicts.
         """
         self._dataset, self._root, self._folder, self._model = dataset, root, folder, model
@@ -112,14 +115,14 @@ class Scorer:
         self.reports: dict[str, Report] = reports_of(reports, dataset)
 
     def kept(self) -> set[int]:
-        """Indices of the finished samples, whose predictions are not made again."""
+        """The indices of the samples that an earlier run finished; they are not predicted again."""
         folder = inside(self._root, f"{self._folder}/samples")
         if self._keeper is None or not folder.is_dir():
             return set()
         return {int(p.stem) for p in folder.glob("*.json") if p.stem.isdecimal() and int(p.stem) < len(self._dataset)}
 
     def measured(self, index: int, sample: Sample, answer: Answer) -> Unwritten:
-        """Measures a prediction; returns its note and files."""
+        """Computes the metrics of a prediction and encodes it as files, which are not written yet."""
         with self._blamed(index):
             metrics, parts = self._measure(sample, answer.prediction)
             encoded = self._keeper and check_encoded(
@@ -139,7 +142,7 @@ class Scorer:
         return Unwritten(note=note, files=files)
 
     def write(self, unwritten: Unwritten) -> Note:
-        """Writes a prediction's files, the note last."""
+        """Writes the files of a prediction and, last, the note that marks the sample as finished."""
         note = unwritten.note
         for relative, data in unwritten.files.items():
             write_whole(self._root, f"{self._folder}/{PREDICTIONS}/{relative}", data)
@@ -147,11 +150,14 @@ class Scorer:
         return note
 
     def first(self, index: int, sample: Sample, answer: Answer) -> Note:
-        """Measures a prediction and writes it."""
+        """Computes the metrics of a new prediction and writes its files."""
         return self.write(self.measured(index, sample, answer))
 
     def again(self, index: int) -> Note | DatasetError:
-        """Measures the stored prediction of an earlier run, or returns the problem with its note or files as text.
+        """Reads the stored prediction of an earlier run and computes its metrics.
+
+        Returns:
+            The sample's result, or the error if its note or its files cannot be read.
 
         Raises:
             DatasetError: the sample itself cannot be read.
@@ -184,7 +190,7 @@ class Scorer:
         )
 
     def finish(self, notes: list[Note]) -> None:
-        """Writes the split's own result files."""
+        """Writes the result files that cover the whole split, for tasks whose format has such files."""
         if self._keeper is None:
             return
         rows = [(self._dataset.sidecar(note.index).record, note.facts) for note in notes]

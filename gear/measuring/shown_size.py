@@ -1,8 +1,8 @@
-"""Notes on pictures whose size is not the task's default, in which objects have another size than in training.
+"""Warns if pictures have another size than in training, in which objects appear larger or smaller.
 
-Weights record the input scale for pictures of the task's default size. A network applies this scale to any picture, so
-objects in smaller pictures become smaller still. Weights without a record were trained on the default size, at the
-network's default scale.
+Weights files state the input scale, the factor by which pictures of the task's default size are resized. A network
+applies the same factor to pictures of any size, so objects in smaller pictures become smaller still. Weights files that
+state no scale were trained on the default size, with the network's default scale.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ from gear.values.errors import ConfigError
 
 
 def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str | None:
-    """A note if the dataset's pictures have another size than the input scale of the weights is for; None if they fit,
-    if nothing is known, or if the user gave the scale.
+    """A warning if the dataset's pictures have another size than those that the model was trained on.
+
+    It is None if the sizes agree, if the training size is unknown, or if the user set the input scale.
 
     Args:
         model: the model with its options.
-        dataset: dataset whose pictures the model predicts from.
-        flag: flag of the model's options, for messages.
+        dataset: dataset on which the model predicts.
+        flag: the command-line flag that sets options of the model, for the message.
     """
     spec = model.found.spec
     assert isinstance(spec, ModelSpec)

@@ -1,6 +1,6 @@
-"""Uncertainty of metrics: intervals by the jackknife, and a permutation test for pairs of samples.
+"""Uncertainty of metrics: confidence intervals by the jackknife, and a permutation test for paired samples.
 
-Samples of the same street are a cluster: they are left out together, and the signs of their differences are flipped
+The samples of one street form a cluster: they are left out together, and the signs of their differences are flipped
 together.
 """
 
@@ -28,13 +28,13 @@ from gear.measuring.intervals import (
 from gear.values.rng import derive_rng
 
 FLIPS = 9_999
-"""Number of sign patterns that are drawn if there are too many to try all; the smallest p is then 0.0001."""
+"""Number of sign patterns that the test draws if there are too many to try all; the smallest possible p is 0.0001."""
 
 FLIPS_AT_ONCE = 1_000
-"""Number of sign patterns that are processed at a time, which bounds the memory of a test."""
+"""Number of sign patterns that the test processes at a time, which bounds its memory."""
 
 ROUNDING = 1e-9
-"""Relative difference below which two sums count as equal."""
+"""Relative difference up to which two sums of differences count as equal."""
 
 AnyEvaluator = Evaluator[Any, Any]
 
@@ -45,9 +45,9 @@ class Metrics:
 
     Attributes:
         overall: metrics over all samples, by name.
-        replicates: (C,) values without each cluster in turn, by name, for the metrics that have intervals.
-        ceilings: metrics that perfect predictions of the same samples would reach, for those below 1.
-        limits: smallest and largest possible value of a metric, if the evaluator states them.
+        replicates: (C,) values of a metric, each computed without one of the C clusters, by name of the metric.
+        ceilings: values that perfect predictions of the same samples would reach, for metrics where this is below 1.
+        limits: smallest and largest possible value of a metric, by name, if the evaluator states them.
     """
 
     overall: Mapping[str, float]
@@ -56,16 +56,17 @@ class Metrics:
     limits: Mapping[str, Interval] = field(default_factory=dict)
 
     def interval(self, name: str) -> Interval | None:
-        """Ends of the 95 % interval by `jackknife_interval`; None if it is undefined."""
+        """The ends of a metric's 95 % confidence interval by the jackknife; None if it is undefined."""
         if name not in self.replicates:
             return None
         return jackknife_interval(self.overall[name], self.replicates[name], self.limits.get(name, REAL))
 
 
 def difference_interval(one: Metrics, other: Metrics, name: str) -> Interval | None:
-    """The 95 % interval of the difference of a metric between a dataset and its twin.
+    """The 95 % confidence interval of the difference of a metric between two datasets with the same scenes.
 
-    The same cluster is left out of both, so the interval is that of the paired difference.
+    Each jackknife replicate leaves the same cluster out of both datasets, so the interval is that of the paired
+    difference.
     """
     if name not in one.replicates or name not in other.replicates:
         return None
@@ -82,13 +83,13 @@ def gather(
     draws: Draws,
     held: Callable[[Any], dict[str, float]] = dict,
 ) -> Metrics:
-    """Metrics over evaluators that have gathered one sample each.
+    """Merges evaluators of single samples and computes their metrics, with the replicates for intervals.
 
     Args:
         fresh: returns a new, empty evaluator.
         parts: one evaluator for each sample, in order.
-        draws: (R, N) indices of samples, padded with `LEFT_OUT`; metrics are computed for each row.
-        held: checks the metrics of an evaluator against its contract.
+        draws: (R, N) indices of samples, padded with `LEFT_OUT`; one replicate is computed from each row.
+        held: checks the metrics that an evaluator returns.
     """
     whole = fresh()
     for part in parts:
@@ -139,8 +140,9 @@ def _added(parts: Sequence[Any], draws: Draws) -> dict[str, npt.NDArray[Any]]:
 
 
 def auroc(positives: Sequence[float], negatives: Sequence[float]) -> float:
-    """Area under the ROC curve: the share of pairs in which the positive's score is above the negative's, where ties
-    count half; NaN without positives or negatives.
+    """The area under the ROC curve: the share of pairs in which the positive sample scores above the negative one.
+
+    Ties count half. The area is NaN without positives or negatives.
     """
     if not len(positives) or not len(negatives):
         return float("nan")
@@ -153,11 +155,11 @@ def auroc(positives: Sequence[float], negatives: Sequence[float]) -> float:
 def auroc_interval(
     positives: Sequence[float], negatives: Sequence[float], clusters: Sequence[Hashable]
 ) -> Interval | None:
-    """The 95 % interval of the area under the ROC curve over pairs of twins, by the jackknife over clusters of pairs.
+    """The 95 % confidence interval of the area under the ROC curve, by the jackknife over clusters.
 
     Args:
-        positives, negatives: (N,) scores of the pairs.
-        clusters: the cluster of each pair.
+        positives, negatives: (N,) scores of the same N scenes with and without the patch.
+        clusters: the cluster of each scene.
     """
     high, low = np.asarray(positives, np.float64), np.asarray(negatives, np.float64)
     kept = [row[row != LEFT_OUT] for row in leave_one_out(clusters)]
@@ -168,10 +170,17 @@ def auroc_interval(
 
 
 def clustered(differences: Values, clusters: Sequence[Hashable]) -> Values:
-    """Sums of differences within each cluster: (N, F), N samples and F metrics, to (C, F).
+    """Adds up differences within each cluster of samples, as the input of `paired_p`.
 
-    `paired_p` flips the sign of a whole cluster, because the samples of a cluster are not independent.
-    NaN if all differences of a cluster are NaN. Sums that differ from 0 only by rounding are 0.
+    The test flips the sign of a whole cluster, because the samples of a cluster are not independent.
+
+    Args:
+        differences: (N, F) differences of N samples and F metrics; NaN if a sample has none.
+        clusters: the cluster of each sample.
+
+    Returns:
+        (C, F) sums. A sum is NaN if all differences of the cluster are NaN, and 0 if it differs from 0 only by
+        rounding.
     """
     owners = numbered(clusters)
     known = np.where(np.isnan(differences), 0.0, differences)
@@ -186,13 +195,13 @@ def paired_p(differences: Values, seed: int) -> Values:
 
     Under the null hypothesis each difference is equally likely with either sign. p is the share of all sign patterns
     for which the mean is at least as far from 0 as the observed one (Fisher, The Design of Experiments, 1935, sec. 21).
-    With up to 13 pairs all patterns are tried and p is exact. With more, `FLIPS` patterns are drawn and the observed
-    pattern is counted with them, so that p is never too small (Phipson and Smyth, 2010). Unlike Wilcoxon's test it
-    tests the mean, which is reported, and handles ties.
+    With up to 13 pairs all patterns are tried and p is exact. With more pairs, `FLIPS` patterns are drawn and the
+    observed pattern is counted as well, so p is never too small (Phipson and Smyth, 2010). In contrast to Wilcoxon's
+    test, this test is about the mean, which is the reported number, and it handles ties.
 
     Args:
         differences: (N, F) differences, one column per metric; NaN if a sample has none. If samples are not
-            independent, sums over clusters (`clustered`).
+            independent, these are sums over clusters (`clustered`).
         seed: seed of the drawn patterns.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Tables as plain text that fit a terminal, drawn by rich."""
+"""Plain-text tables that fit the width of a terminal."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ import io
 from collections.abc import Sequence
 
 WIDTH = 100
-"""Width of a line in characters, if the output is not a terminal."""
+"""Default width of a table in characters."""
 
 GAP = 2
-"""Spaces between columns."""
+"""Number of spaces between two columns."""
 
 SHORTEST = 20
-"""Smallest width of the last column of a list in characters."""
+"""Smallest width of a list's last column, in characters."""
 
 
 def text_table(
     head: Sequence[str], rows: Sequence[Sequence[str]], *, width: int = WIDTH, wrap: bool = False
 ) -> list[str]:
-    """A table for lists with a description in the last column.
+    """Formats a list with a description in the last column as a table.
 
     Args:
         head: titles of the columns.
-        rows: cells, one sequence as long as `head` per row. The last column takes the remaining width.
+        rows: cells of each row, one per column. The last column takes the remaining width.
         width: largest number of characters per line, unless the last column would be narrower than `SHORTEST`.
-        wrap: whether long descriptions are continued on the next line instead of cut.
+        wrap: whether long descriptions continue on the next line; otherwise they are cut.
 
     Returns:
         Lines without trailing spaces.
@@ -47,7 +47,8 @@ def text_table(
 
 
 def number_table(cells: Sequence[Sequence[str]], *, width: int = WIDTH) -> list[str]:
-    """A table of numbers that is never wrapped: columns that do not fit follow in further blocks.
+    """Formats a table of numbers without wrapping cells; columns that do not fit the width follow in further
+    blocks.
 
     Args:
         cells: the titles and the rows, all of one length. The first column names the row and is repeated in each block.

@@ -1,4 +1,4 @@
-"""How much a patch harms a model, measured on composed and on rendered pictures, each with its own evaluator."""
+"""Measures how much a patch harms a model, on pictures with the patch composed and with the patch rendered."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from gear.values.progress import Callbacks
 CLEAN, RENDERED = "clean", "rendered"
 
 Metrics = Mapping[str, float]
-"""A task's metric by name."""
+"""Values of metrics by name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +33,9 @@ class SampleEffect:
 
     Attributes:
         index: index of the sample.
-        clean: its metrics without a patch, if they are defined for single samples.
-        change: changes of these metrics, by name of the compositor and `rendered`; NaN if either value is NaN.
+        clean: metrics of the sample without a patch; empty if the task has no metrics of single samples.
+        change: metric with the patch minus metric without, by metric, for each compositor and for `rendered`; NaN if
+            either value is NaN.
     """
 
     index: int
@@ -44,14 +45,14 @@ class SampleEffect:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Effect:
-    """The task's metric on clean, composed and rendered pictures of the same samples.
+    """The task's metrics on clean, composed and rendered pictures of the same samples.
 
     Attributes:
-        guarded: the model, guarded by its defense if there is one.
-        plan: plan of the dataset.
-        evaluators: evaluators by `clean`, name of the compositor, or `rendered`.
-        metric: the task's main metric.
-        samples: effects of the samples so far.
+        guarded: the model, with its defense if there is one.
+        plan: plan of the clean dataset.
+        evaluators: one evaluator for `clean`, one for each compositor by its name, and one for `rendered`.
+        metric: name of the task's main metric.
+        samples: effects of the samples that were added with `update`.
     """
 
     guarded: GuardedModel
@@ -62,8 +63,7 @@ class Effect:
 
     @staticmethod
     def of(request: GapRequest, dataset: Dataset[Any], callbacks: Callbacks) -> Effect:
-        """Opens the model of a request, guarded by its defense if there is one; warns of settings that may be
-        unintended.
+        """Opens the model and the defense of a request, and warns about settings that may be unintended.
 
         Raises:
             UnknownNameError: there is no such model or defense.
@@ -91,7 +91,13 @@ class Effect:
         )
 
     def update(self, index: int, clean: Any, shown: Mapping[str, Any]) -> None:
-        """Adds one sample: its clean picture, the composed ones and the rendered one."""
+        """Adds the predictions on one sample to the metrics.
+
+        Args:
+            index: index of the sample.
+            clean: the sample without a patch.
+            shown: the sample with the patch, by name of the compositor and for `rendered`.
+        """
         alone: dict[str, Metrics] = {}
         for name, sample in {CLEAN: clean, **shown}.items():
             (answer,) = self.guarded.predict([sample.images], [index])
@@ -104,9 +110,11 @@ class Effect:
         self.samples.append(SampleEffect(index=index, clean=before, change=change))
 
     def fit_report(self) -> FitReport | None:
-        """What the defense learnt, if there is one that says so; known after the first sample."""
+        """The defense's summary of what it learnt; None without a defense, without a summary, or when no sample
+        was added yet.
+        """
         return self.guarded.fit_report()
 
     def result(self) -> dict[str, Metrics]:
-        """The metrics by `clean`, name of the compositor, and `rendered`."""
+        """The metrics over all samples, by metric, for `clean`, each compositor and `rendered`."""
         return {name: said_of(self.plan, one.result(), "result") for name, one in self.evaluators.items()}

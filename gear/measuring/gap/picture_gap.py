@@ -1,4 +1,4 @@
-"""The difference between two pictures, inside the visible patch and outside."""
+"""The difference between two pictures, inside and outside the visible patch."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ PERFECT_DB = 99.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureGap:
-    """The difference between the composed and the rendered picture.
+    """The difference between a picture with the patch composed and one with the patch rendered.
 
     Attributes:
-        psnr_db: peak signal-to-noise ratio over the pixels that show a patch, on sRGB bytes; at most `PERFECT_DB`.
-        worst: largest difference in these pixels, in levels of 0..255.
-        outside_rms: root mean square difference over all other pixels, in levels.
-        outside_worst: largest difference in all other pixels, in levels.
-        outside_px: number of other pixels that differ.
+        psnr_db: peak signal-to-noise ratio in dB over the patch's pixels, from sRGB values 0..255; at most
+            `PERFECT_DB`.
+        worst: largest difference in the patch's pixels, in levels of 0..255.
+        outside_rms: root mean square difference over all pixels outside the patch, in levels of 0..255.
+        outside_worst: largest difference in the pixels outside the patch, in levels of 0..255.
+        outside_px: number of pixels outside the patch that differ.
     """
 
     psnr_db: float
@@ -39,7 +40,7 @@ class PictureGap:
 
 
 def visible_mask(surfaces: Sequence[SurfaceTruth], view: str, height_px: int, width_px: int) -> Mask:
-    """(H, W) bool: the pixels of a view that show any of the surfaces, by the id buffer."""
+    """The (H, W) bool mask of the pixels in one view that show a patch surface, decoded from the ground truth."""
     mask = np.zeros((height_px, width_px), np.bool_)
     for surface in surfaces:
         if surface.camera == view and surface.visible_px:
@@ -48,7 +49,9 @@ def visible_mask(surfaces: Sequence[SurfaceTruth], view: str, height_px: int, wi
 
 
 def picture_gap(digital: UInt8Image, rendered: UInt8Image, mask: Mask) -> PictureGap:
-    """Compares two (H, W, 3) uint8 pictures inside and outside a (H, W) mask that is not empty."""
+    """Compares two (H, W, 3) uint8 pictures inside and outside a (H, W) bool mask of the patch, which must not be
+    empty.
+    """
     difference = np.abs(digital.astype(np.int16) - rendered)
     inside, outside = difference[mask], difference[~mask]
     return PictureGap(
@@ -61,5 +64,5 @@ def picture_gap(digital: UInt8Image, rendered: UInt8Image, mask: Mask) -> Pictur
 
 
 def psnr_db(mean_square: float) -> float:
-    """Peak signal-to-noise ratio in dB of a mean squared difference in levels of 255."""
+    """The peak signal-to-noise ratio in dB for a mean squared difference of pixel values in 0..255."""
     return min(PERFECT_DB, 10 * math.log10(255**2 / mean_square)) if mean_square > 0 else PERFECT_DB

@@ -14,7 +14,7 @@ from gear.measuring.gap.picture_gap import PictureGap
 from gear.values.serial import Json, to_json
 
 UNMOVED = 1e-9
-"""Smaller changes of a metric count as no change, so that no share of them is computed."""
+"""Smallest change of a metric from which a share is computed; smaller changes count as no change."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,11 +22,11 @@ class SampleGap:
     """The comparison of one picture that shows a patch.
 
     Attributes:
-        index, view: index of the sample and name of its camera.
+        index, view: index of the sample and name of the camera.
         visible_px: number of pixels that show a patch.
-        distance_m: distance to the nearest visible surface.
-        incidence_deg: largest angle between line of sight and normal among the visible surfaces.
-        gaps: differences by name of the compositor.
+        distance_m: distance from the camera to the nearest visible surface.
+        incidence_deg: largest angle between the line of sight and the normal of a visible surface.
+        gaps: difference between the composed and the rendered picture, by name of the compositor.
     """
 
     index: int
@@ -39,19 +39,19 @@ class SampleGap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GapReport:
-    """The comparison of composed and rendered patches on a split.
+    """The comparison of composed and rendered patches on one split.
 
     Attributes:
-        dataset, twin: roots of both datasets.
-        split, patch, renderer, quality: properties of both.
-        samples: pictures that show a patch; other pictures have no gap.
-        effect: the task's metrics by `clean`, compositor and `rendered`; empty without a model.
+        dataset, twin: roots of the clean dataset and of the same dataset rendered with the patch.
+        split, patch, renderer, quality: split, label of the patch, renderer and render quality of the pictures.
+        samples: comparisons of the pictures that show a patch; other pictures are left out.
+        effect: the task's metrics for `clean`, each compositor and `rendered`; empty without a model.
         sample_effects: changes of the metrics of single samples.
-        metric: metric that the table shows by sample.
-        model: name of the model.
-        defense: name of the defense that guards it.
+        metric: name of the metric in the table of single samples.
+        model: name of the model; None without a model.
+        defense: name of the model's defense; None without a defense.
         seed: seed of the defense's random draws.
-        fit: what the defense learnt, on its own calibration data; None for a defense that reports nothing.
+        fit: the defense's summary of what it learnt from its calibration data; None if it provides none.
     """
 
     dataset: str
@@ -70,18 +70,20 @@ class GapReport:
     fit: FitReport | None = None
 
     def median_db(self, compositor: str) -> float:
-        """Median PSNR over all pictures in dB; NaN where none shows a patch."""
+        """The median PSNR in dB over all pictures that show a patch; NaN if there are none."""
         values = [sample.gaps[compositor].psnr_db for sample in self.samples]
         return float(np.median(values)) if values else math.nan
 
     @property
     def compositors(self) -> tuple[str, ...]:
-        """The names of the compositors."""
+        """The names of the compared compositors; empty if no picture shows a patch."""
         return tuple(self.samples[0].gaps) if self.samples else ()
 
     def kept(self, compositor: str) -> dict[str, float]:
-        """Rendered change of each metric as a share of the composed change; metrics that the patch does not change
-        are left out.
+        """The share of a patch's effect that remains when the patch is rendered instead of composed, by metric.
+
+        The share is (rendered - clean) / (composed - clean). Metrics that the composed patch does not change are left
+        out.
         """
         if not self.effect:
             return {}
@@ -93,14 +95,14 @@ class GapReport:
         }
 
     def as_json(self) -> Json:
-        """The whole report as JSON; null for metrics that are not finite."""
+        """The whole report as JSON; numbers that are not finite become null."""
         content = to_json(self)
         content["median_psnr_db"] = {name: self.median_db(name) for name in self.compositors}
         content["rendered_share_of_digital_effect"] = {name: self.kept(name) for name in self.compositors}
         return _finite(content)
 
     def table(self) -> str:
-        """The report as a table of plain text."""
+        """The report as a plain-text table."""
         names = self.compositors
         lines = [f"{self.dataset} {self.split}: {self.patch}, {self.renderer} {self.quality}; PSNR inside the patch"]
         head = f"{'sample':>6} {'view':8}{'pixels':>8}{'m':>6}{'slant':>6}"
@@ -115,7 +117,9 @@ class GapReport:
         return "\n".join(lines + self._sample_lines() + self._effect_lines())
 
     def shown_metric(self) -> str:
-        """The metric of single samples that the table shows: the task's, or the first that has a value."""
+        """The metric in the table of single samples: the task's main metric, or the first one with a finite value;
+        empty if there is none.
+        """
         known = [name for one in self.sample_effects for name, value in one.clean.items() if math.isfinite(value)]
         return self.metric if self.metric in known else next(iter(known), "")
 
@@ -156,7 +160,7 @@ class GapReport:
         return lines
 
     def summary(self) -> str:
-        """The report in one line."""
+        """The number of pictures and the median PSNR of each compositor, as one line of text."""
         found = ", ".join(f"{name} {self.median_db(name):.1f} dB" for name in self.compositors)
         return f"{len(self.samples)} pictures with a patch: {found or 'none'}"
 

@@ -1,4 +1,4 @@
-"""The request of a comparison of composed and rendered patches."""
+"""The arguments of a comparison of composed and rendered patches, with their checks."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GapRequest:
-    """The arguments of `gear.gap`, which documents them; `guard` is the defense with its calibration data.
+    """The arguments of `gear.gap`, where they are documented; `guard` is the defense with its calibration data.
 
     Raises:
-        GearError: the values contradict each other.
+        GearError: the arguments contradict each other.
     """
 
     dataset: str | Path
@@ -52,10 +52,10 @@ class GapRequest:
 
     @property
     def folder(self) -> Path | None:
-        """Folder of the report; None if it is not written."""
+        """The folder of the report's files; None if no files are written."""
         return None if self.out is None else Path(self.out)
 
     @property
     def twin_root(self) -> Path:
-        """Root of the rendered twin: the given one, or the one to be collected."""
+        """The root of the dataset rendered with the patch: the user's own, or the one that `gear.gap` collects."""
         return Path(self.twin) if self.twin is not None else Path(self.out or "") / "twin"

@@ -1,7 +1,7 @@
-"""The comparison of composed patches with the same patches rendered: check, open, measure, write.
+"""Compares composed patches with the same patches rendered.
 
-The patches need not be adversarial, because the pictures themselves are compared. With a model, the task's metric is
-also measured on the clean, the composed and the rendered pictures.
+The patches need not be adversarial, because the pictures themselves are compared. With a model, the task's metrics are
+also computed on the clean, the composed and the rendered pictures.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class _Comparison:
 
 
 def measure_gap(request: GapRequest, callbacks: Callbacks) -> GapReport:
-    """Runs a request; `gear.gap` documents it.
+    """Compares composed and rendered patches, and writes the report if the request names a folder.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -135,7 +135,15 @@ def sample_gaps(
     index: int,
     effect: Effect | None,
 ) -> list[SampleGap]:
-    """Compares each view of one sample that shows a patch; also adds the sample to the effect, if there is one."""
+    """Compares the views of one sample that show a patch.
+
+    Args:
+        pairs: the clean dataset and the same dataset rendered with the patch.
+        engines: compositors by name.
+        images: the patches, (h, w, 3) uint8 sRGB, one per surface.
+        index: index of the sample.
+        effect: receives the sample, to measure the effect on a model; None without a model.
+    """
     clean, rendered = pairs[index]
     composed: dict[str, dict[str, UInt8Image]] = {name: dict(clean.images) for name in engines}
     found = []
@@ -165,10 +173,10 @@ def sample_gaps(
 
 
 def composed_picture(engine: BaseCompositor, images: Sequence[UInt8Image], index: int, view: str) -> UInt8Image:
-    """Composes patches into one view of a sample; returns (H, W, 3) uint8 sRGB.
+    """Composes patches into one view of a sample; returns the (H, W, 3) uint8 sRGB picture.
 
     Args:
-        engine: compositor that rounds to bytes.
+        engine: compositor that rounds its result to whole levels of 0..255.
         images: patches, (h, w, 3) uint8 sRGB, one per surface.
         index, view: index of the sample and name of the camera.
     """
@@ -181,11 +189,10 @@ def composed_picture(engine: BaseCompositor, images: Sequence[UInt8Image], index
 
 
 def shown_patches(twin: Dataset[Any], surfaces: int) -> list[UInt8Image]:
-    """The patches that a twin shows, read from the copy in its dataset.
+    """Reads the patches that a dataset was rendered with, from the copies that the dataset holds.
 
     Raises:
-        DatasetError: the twin shows no patch or fewer patches than surfaces, or the copy differs from the patches that
-            were shown.
+        DatasetError: the dataset has fewer patches than surfaces, or the copies differ from the rendered patches.
     """
     label = twin.plan.patch["label"]
     paths = [inside(twin.root, patch_path(label, f"patch_{i}.png")) for i in range(surfaces)]

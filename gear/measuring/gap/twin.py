@@ -1,4 +1,4 @@
-"""The rendered twin of a split: an existing one, or one collected from the recipe in the manifest."""
+"""Collects the twin of a clean split: the same scenes rendered with a patch, from the config in the manifest."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gear.values.errors import ConfigError, DatasetError, UnknownNameError
 
 
 def check_clean(clean: Dataset[Any]) -> None:
-    """Checks that a split shows no patch.
+    """Checks that a split was rendered without a patch.
 
     Raises:
         DatasetError: the split shows a patch.
@@ -39,15 +39,15 @@ def collect_twin(
     town: str | Path | None = None,
     scenes: str | Path | None = None,
 ) -> None:
-    """Collects the twin of a split with a patch; completes an existing one.
+    """Renders the scenes of a clean split with a patch, into a dataset of its own; completes an existing one.
 
     Args:
         clean: the split without a patch.
-        patch: patch to show.
-        root: root of the twin.
+        patch: the patch, as a value of `--patch`.
+        root: root of the new dataset.
         samples: number of samples from the first one on, rounded up to whole sequences; all by default.
-        town, scenes: files of the town and of its scene library (`FILE`, or `FILE:SCENE`) of a town that does not come
-            with gear, because a dataset records no paths of the machine that made it.
+        town, scenes: paths of the town and of its scene library (`FILE`, or `FILE:SCENE`). They are needed for a town
+            that does not come with gear, because a dataset records no paths of the machine that made it.
 
     Raises:
         PatchError: the patch cannot be used.
