@@ -1,1 +1,1 @@
-"""Collecting samples: jobs, patch sources, and workers with one world and one renderer each."""
+"""Collection of datasets: resolves a config to a job, renders the missing samples in workers, and writes them."""

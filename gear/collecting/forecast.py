@@ -1,4 +1,4 @@
-"""The disk space and the time that a collection needs, from its first samples."""
+"""Forecasts the disk space and the time that a collection needs, measured on its first samples."""
 
 from __future__ import annotations
 
@@ -15,21 +15,25 @@ from gear.reporting.pace import duration_text
 from gear.values.progress import Warn
 
 FIRST = 3
-"""Samples that a forecast is made from."""
+"""Number of samples that the forecast is based on."""
 
 LARGE_BYTES, LONG_S = 2 * 10**9, 1800.0
-"""A collection that needs more is announced with its size and time."""
+"""Bytes and seconds above which a collection is announced with its size and time."""
 
 
 class Forecast:
-    """Measures the first samples of a collection, and refuses one that the disk cannot hold."""
+    """Measures the first samples of a collection; stops a collection that does not fit on the disk, and announces
+    a large or long one.
+    """
 
     def __init__(
         self, store: Store, missing: int, on_warning: Warn, clock_s: Callable[[], float] = time.monotonic
     ) -> None:
         """Args:
-        store: of the split. missing: number of samples to be made. on_warning: called once with what a large collection
-        needs. clock_s: clock in seconds, with any zero point.
+        store: writer of the split's files.
+        missing: number of samples to be made.
+        on_warning: called once with the disk space and the time of a large collection.
+        clock_s: clock in seconds, with any zero point.
         """
         self._store, self._missing, self._on_warning, self._clock_s = store, missing, on_warning, clock_s
         self._sizes: list[int] = []
@@ -39,7 +43,7 @@ class Forecast:
         """Records a finished sample; only the first `FIRST` samples are measured.
 
         Raises:
-            GearError: the disk has less room than all samples need.
+            GearError: the disk has less free space than the missing samples need.
         """
         if len(self._sizes) >= min(FIRST, self._missing):
             return

@@ -1,4 +1,4 @@
-"""A collection with all names resolved: plain data with everything that a worker needs."""
+"""A collection job: the config with all names resolved, as plain data that is sent to each worker."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ from gear.world.assets.asset_hash import assets_digest
 from gear.world.scene_spec import SceneSpec
 
 KINDS = ("probes", "scans")
-"""Further files of samples that a config may ask for. One that is not asked for is no part of a plan."""
+"""Kinds of additional files that a config may request for each sample; a plan lists only the requested ones."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Job:
-    """A resolved collection.
+    """A collection config with all names resolved.
 
     Attributes:
         config: the collection config with all defaults filled in.
         split: seed and number of samples of the split.
-        scene: boards, truck and limits, capped by the simulation config.
+        scene: scene description with billboards, truck and numbers of road users, limited by the simulation config.
         weather: all parameters of the weather.
-        patch: patches of this run.
+        patch: patches that the scene shows.
         root: folder of the dataset.
         plan: everything that decides the bytes of the samples.
         renderer: renderer, device and driver.
-        task_notes: notes on task options that may be unintended.
+        task_notes: warnings about task options that may be unintended.
     """
 
     config: CollectionConfig
@@ -63,7 +63,9 @@ class Job:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on what may be unintended, one line each: options of the task, and patches of another scene."""
+        """Warnings about settings that may be unintended, one line each: options of the task, and patches that
+        were made for another scene.
+        """
         here = f"{self.plan.info.town}/{self.plan.info.scene}"
         if not self.patch.made_for or here in self.patch.made_for:
             return self.task_notes
@@ -72,16 +74,18 @@ class Job:
 
     @property
     def frames(self) -> int:
-        """Number of samples of the whole split."""
+        """The number of samples (single pictures) of the whole split: sequences times frames per sequence."""
         return self.split.samples * self.split.frames
 
 
 def resolve(config: CollectionConfig) -> Job:
-    """Looks up every name in a config and probes the renderer, before anything is rendered.
+    """Looks up every name in a config and starts the renderer as a test, before any sample is rendered.
 
     Raises:
-        UnknownNameError, PatchError: as `look_up`.
-        ConfigError: as `look_up`, or the lens folds its pictures over.
+        UnknownNameError: a task, town, scene, split or weather is unknown; the message suggests a close name.
+        ConfigError: a name in a file is unknown, a file or the task's options cannot be read, or the lens distortion
+            does not fit the task's cameras.
+        PatchError: the patch cannot be used.
         BackendError: the renderer cannot start on this machine.
     """
     named = look_up(config)
@@ -135,7 +139,7 @@ def resolve(config: CollectionConfig) -> Job:
 
 
 def recipe_of(config: CollectionConfig) -> Json:
-    """A collection's config without what belongs to one machine: its paths."""
+    """A collection's config as JSON without the paths of this machine, for the plan and the manifest of the dataset."""
     recipe: Json = to_plain(config)
     unused = [kind for kind in KINDS if not getattr(config, kind)]
     for name in ("root", "patch", "town", "scenes", "simulation", *unused):
@@ -175,7 +179,7 @@ def _check_effects(config: CollectionConfig, task: PluginEntry) -> None:
 
 
 def dataset_root(config: CollectionConfig, info: SplitInfo, weather: Weather) -> Path:
-    """The dataset's folder: the given one, or `data/<task>/<town>-<scene>-<weather>/<patch>`."""
+    """The dataset's folder: the one in the config, or by default `data/<task>/<town>-<scene>-<weather>/<patch>`."""
     if config.root:
         return Path(config.root)
     name = weather.name
@@ -186,7 +190,9 @@ def dataset_root(config: CollectionConfig, info: SplitInfo, weather: Weather) ->
 
 
 def versions() -> dict[str, str]:
-    """Versions of the packages that decide the bytes of pictures and labels."""
+    """The versions of the packages that decide the bytes of pictures and labels, and the processor architecture
+    (`machine`).
+    """
     return {
         "gear": _version("mujoco-gear"),
         "mujoco": mujoco.__version__,

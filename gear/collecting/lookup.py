@@ -1,4 +1,4 @@
-"""Looks up everything that a collection config names, before anything is rendered and without a renderer."""
+"""Looks up everything that a collection config names (task, town, scene, split, weather, patch) without a renderer."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ from gear.world.surfaces.surface_carriers import check_scene_assets
 from gear.world.weather.presets import PRESETS
 
 ROOMY_FACTOR = 100
-"""Factor on the vehicles of scenes without a board, as in CARLA-GeAR: they use the whole town instead of one corner."""
+"""Factor on the limit of vehicles in scenes without a billboard, as in CARLA-GeAR: they use the whole town."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Named:
-    """The objects that the names of a collection config refer to.
+    """The objects that the names in a collection config refer to.
 
     Attributes:
-        config: the config, with a scene given as a file split into library and name.
+        config: the config; a scene given as a YAML file is split into scene library and name.
         task: plugin of the task.
         options: options of the task.
         library: assets of the town.
-        scene: boards, truck and limits, capped by the simulation config.
+        scene: scene description with billboards, truck and numbers of road users, limited by the simulation config.
         split: seed and number of samples of the split.
         weather: all parameters of the weather.
-        patch: patches of the run.
+        patch: patches that the scene shows.
     """
 
     config: CollectionConfig
@@ -54,11 +54,11 @@ class Named:
 
 
 def look_up(config: CollectionConfig) -> Named:
-    """Looks up every name in a config.
+    """Looks up every name in a collection config.
 
     Raises:
-        UnknownNameError: a task, town, scene, split or weather is unknown; suggests a close name.
-        ConfigError: the same, for a name in a file; or a scene library or the options of the task cannot be read.
+        UnknownNameError: a task, town, scene, split or weather is unknown; the message suggests a close name.
+        ConfigError: such a name in a file is unknown; or a scene library or the options of the task cannot be read.
         PatchError: the patch cannot be used.
     """
     with located_errors(config.places, "scene"):
@@ -116,10 +116,13 @@ def _mixed(scene: SceneSpec, config: CollectionConfig) -> SceneSpec:
 
 
 def with_scene_file(config: CollectionConfig) -> CollectionConfig:
-    """Splits a scene given as a file: `my.yml:corner`, or `my.yml` where the file holds only one scene.
+    """Splits a scene given as a YAML file into scene library and scene name: `my.yml:corner`.
+
+    The name may be omitted (`my.yml`) if the file holds only one scene. A scene that is only a name is not changed.
 
     Raises:
-        UnknownNameError: the file holds several scenes and none was named.
+        UnknownNameError: the file does not exist, or holds several scenes and none was named.
+        ConfigError: the file cannot be read.
     """
     path, _, name = config.scene.rpartition(":") if ":" in config.scene else (config.scene, "", "")
     if not path.endswith((".yml", ".yaml")):
@@ -131,7 +134,9 @@ def with_scene_file(config: CollectionConfig) -> CollectionConfig:
 
 
 def find_scenes(town: AssetLibrary, scenes: str = "") -> SceneFile:
-    """The scene library of a name or path, or the town's own. A faulty scene of it raises when it is asked for.
+    """Reads the scene library of a town, or one given by name or path.
+
+    The scenes are checked one by one when they are requested, so an error in one scene does not affect the others.
 
     Raises:
         UnknownNameError: there is no such library.
@@ -146,11 +151,11 @@ def find_scenes(town: AssetLibrary, scenes: str = "") -> SceneFile:
 
 
 def scene_library(name: str) -> SceneFile:
-    """Reads a scene library by the name of its town, or by path.
+    """Reads a scene library, given by the name of its town or by the path of its YAML file.
 
     Raises:
         UnknownNameError: there is no such library.
-        ConfigError: it cannot be read.
+        ConfigError: the library cannot be read.
     """
     folder, is_path = data_dir("configs") / "scenes", Path(name).suffix in (".yml", ".yaml")
     path = Path(name) if is_path else folder / f"{name}.yml"
@@ -167,7 +172,7 @@ def scene_library(name: str) -> SceneFile:
 
 
 def find_weather(config: WeatherConfig) -> Weather:
-    """The weather preset, with the fields that the config changes.
+    """The weather preset that a config names, with the parameters that the config changes.
 
     Raises:
         UnknownNameError: there is no such preset.

@@ -1,4 +1,4 @@
-"""Makes the missing samples of a split: shares them with other runs, and tries those that fail again."""
+"""Makes the missing samples of a split: shares the work with other runs, and retries samples that failed."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ from gear.values.errors import GearError, SamplesFailedError
 from gear.values.progress import Callbacks
 
 FRESH_TRIES = 2
-"""Number of further attempts for a sample that failed, each in a new process."""
+"""Number of further attempts to make a sample that failed, each in a new process."""
 
 POLL_S = 0.5
 """Seconds between two checks of the samples that other runs are making."""
 
 
 def collect_missing(job: Job, store: Store, part: Shard, executor: Executor, callbacks: Callbacks) -> int:
-    """Makes the missing samples of a shard, or waits for other runs that are making them.
+    """Makes the missing samples of a shard, and waits for samples that other runs are making.
 
     Args:
-        job: the job.
-        store: of its split.
-        part: the shard.
+        job: the collection job.
+        store: writer of the split's files.
+        part: the part of the split that this run collects.
         executor: executor that makes the samples.
-        callbacks: callbacks that receive the progress.
+        callbacks: callbacks that receive progress and warnings.
 
     Returns:
         Number of samples that this run has made.
 
     Raises:
-        SamplesFailedError: some samples could not be made. They are noted in the dataset.
-        GearError: no sample can be made, or the disk refuses.
+        SamplesFailedError: some samples could not be made; the errors are written into the dataset.
+        GearError: no sample can be made, or a file cannot be written.
     """
     making = _Making(job=job, store=store, part=part, executor=executor, callbacks=callbacks)
     try:
@@ -60,11 +60,11 @@ class _Making:
     """One run over the missing samples of a shard.
 
     Attributes:
-        job, store, part, executor, callbacks: as in `collect_missing`.
+        job, store, part, executor, callbacks: arguments of `collect_missing`.
         made: number of samples that this run has made.
         failed: the last outcome of each sample that could not be made, by index.
         tries: how often this run has tried each sample that failed, by index.
-        gave_up: whether the workers have ended after failures, so that samples are left that nobody has tried.
+        gave_up: whether the workers have ended after failures, before all samples were tried.
     """
 
     job: Job
@@ -165,7 +165,7 @@ class _Making:
 
     def raise_failures(self) -> None:
         """Raises:
-        SamplesFailedError: a sample could not be made; says which, why, and what to do.
+        SamplesFailedError: a sample could not be made; the message says which, why, and what to do.
         """
         if not (self.failed or self.gave_up):
             return
@@ -182,15 +182,15 @@ class _Making:
 
 
 def make_samples(job: Job, indices: Iterator[int], report: Report) -> None:
-    """The work of one worker: a world and a renderer, opened once for all of its samples.
+    """Runs in one worker: opens a world and a renderer once, and makes samples with them.
 
     Args:
-        job: the job.
-        indices: of the samples to make, unless another run has made or claimed them.
-        report: called with the outcome of each.
+        job: the collection job.
+        indices: indices of the samples; those that another run has made or claimed are not made.
+        report: called with the outcome of each sample.
 
     Raises:
-        GearError: the world or the renderer cannot be opened, or the disk refuses.
+        GearError: the world or the renderer cannot be opened, or a file cannot be written.
     """
     store = Store(job.root, job.plan)
     with open_session(job) as session, Claims(store.root, store.split) as claims:

@@ -1,4 +1,4 @@
-"""Finds the patches that `--patch` refers to: one picture per surface."""
+"""Finds the patches that `--patch` refers to: one picture for each patch surface (billboard or truck) of the scene."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from gear.values.regular_file import read_regular
 from gear.values.rng import derive_rng
 
 RANDOM_SIZE_PX = (300, 150)
-"""Width and height of a random patch: 2.5 cm pixels on a board of 7.4 m, as in the paper."""
+"""Width and height of a random patch: pixels of 2.5 cm on a billboard 7.4 m wide, as in the CARLA-GeAR paper."""
 
 SIDE_PX = (2, 8192)
 MAX_BYTES = 256 << 20
@@ -33,15 +33,15 @@ NUMBERED = re.compile(r".*_(\d+)\.(?i:png)")
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PatchSet:
-    """The patches of one run.
+    """The patches that the scene of a collection shows.
 
     Attributes:
-        label: `none`, `random`, or a name with a hash; the name of the patches' folder in a dataset.
-        images: sRGB pictures, (H, W, 3) uint8, in the order of the surfaces; empty for none.
-        digest: sha256 of the pictures.
+        label: `none`, `random`, or a name with a hash; also the name of the patches' folder in the dataset.
+        images: (H, W, 3) uint8 sRGB pictures in the order of the surfaces; empty without patches.
+        digest: sha256 of the pictures; empty without patches.
         files: files to copy into the dataset, content by name.
         source: the value of `--patch`.
-        made_for: `town/scene` of the scenes that the patches were optimised in, where an `attack.json` records them.
+        made_for: `town/scene` of the scenes that the patches were optimised in, if an `attack.json` states them.
     """
 
     label: str
@@ -52,7 +52,7 @@ class PatchSet:
     made_for: tuple[str, ...] = ()
 
     def by_surface(self, names: tuple[str, ...]) -> dict[str, UInt8Image]:
-        """The picture of each surface by its name; empty without patches."""
+        """The picture of each surface, by name of the surface; empty without patches."""
         return dict(zip(names, self.images, strict=True)) if self.images else {}
 
 
@@ -62,12 +62,12 @@ def resolve_patch(patch: str, *, surfaces: int, seed: int) -> PatchSet:
     Args:
         patch: `none`, `random`, a picture, a folder with `patch_0.png`, `patch_1.png`, … (or `<anything>_0.png`), or
             the name of a pre-computed patch of an installed weights package.
-        surfaces: number of surfaces in the scene.
+        surfaces: number of patch surfaces in the scene.
         seed: seed of random patches.
 
     Raises:
-        PatchError: a picture is missing, cannot be read, has an impossible size, or the numbering has a gap; or the
-            scene has no surface, or more surfaces than there are pictures.
+        PatchError: a picture is missing, cannot be read or has an impossible size; the numbering of the pictures has a
+            gap; or the scene has no surface, or more surfaces than there are pictures.
     """
     try:
         found = _resolved(patch, surfaces, seed)
@@ -104,17 +104,17 @@ def _resolved(patch: str, surfaces: int, seed: int) -> PatchSet:
 
 
 def random_patch(seed: int, index: int) -> UInt8Image:
-    """A patch whose pixels and channels are drawn uniformly from 0..255."""
+    """A (H, W, 3) uint8 patch of `RANDOM_SIZE_PX`; every pixel and channel is drawn uniformly from 0..255."""
     width, height = RANDOM_SIZE_PX
     rng = derive_rng(seed, "patch", "random", index)
     return rng.integers(0, 256, (height, width, 3), dtype=np.uint8)
 
 
 def read_patch(path: Path) -> UInt8Image:
-    """A patch picture as (H, W, 3) uint8 sRGB. Grey becomes RGB, 16 bits become 8, transparency is refused.
+    """Reads a patch picture as (H, W, 3) uint8 sRGB; grey is converted to RGB, and 16 bits are rounded to 8.
 
     Raises:
-        PatchError: it is not a picture that can be printed.
+        PatchError: the file is not a picture, is transparent, or has an impossible size.
     """
     try:
         data = read_regular(path, most_bytes=MAX_BYTES + 1)
@@ -154,7 +154,7 @@ def _eight_bits(picture: npt.NDArray[np.uint16]) -> UInt8Image:
 
 
 def digest_of(images: Iterable[UInt8Image]) -> str:
-    """Hexadecimal sha256 of patches: sizes and pixels, in the order of the surfaces."""
+    """The sha256, as 64 hexadecimal digits, over sizes and pixels of patches in the order of their surfaces."""
     digest = hashlib.sha256()
     for image in images:
         digest.update(repr(image.shape).encode() + image.tobytes())

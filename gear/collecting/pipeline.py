@@ -1,4 +1,4 @@
-"""The loop of one worker: the next scene is rendered while the last one is measured, encoded and written."""
+"""The loop of one worker: a sample is rendered while another thread encodes and writes the previous one."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, GearError, PlacementError
 
 IN_FLIGHT = 2
-"""Frames that may wait for the writer; more would cost memory and save no time."""
+"""Number of rendered samples that may wait for encoding and writing; more would cost memory and save no time."""
 
 NOT_OF_A_SAMPLE = (DatasetError, OSError, MemoryError)
-"""Errors of the disk and of the machine's limits, which are not about one sample."""
+"""Errors of the disk and of the machine's limits, which end the run because they do not concern a single sample."""
 
 
 def collect_samples(session: Session, store: Store, indices: Iterable[int], report: Report) -> None:
-    """Makes and writes samples, and reports an outcome of each one that is taken from `indices`.
+    """Makes and writes samples, and reports the outcome of each.
 
-    After `MOST_FAILURES` failures in a row no further sample is taken: something other than the samples is broken.
+    After `MOST_FAILURES` failures in a row no further sample is made, because the cause is probably not the samples.
 
     Args:
         session: world and renderer.
-        store: writes the files.
-        indices: of the samples.
-        report: called when the last file of a sample is in place, or when the sample has failed.
+        store: writer of the files.
+        indices: indices of the samples.
+        report: called when the last file of a sample is written, or when the sample has failed.
 
     Raises:
-        DatasetError, OSError, MemoryError: the disk refuses, or a limit of the machine is reached; finished samples
-            stay. Of two such errors at once, that of the earlier sample.
+        DatasetError, OSError, MemoryError: a file cannot be written, or a limit of the machine is reached; finished
+            samples are kept. Of two such errors, the one of the earlier sample is raised.
     """
     waiting: deque[Future[Outcome]] = deque()
     in_row = 0

@@ -1,7 +1,7 @@
-"""Renders probes while collecting: the placed scene once more with black and with white surfaces.
+"""Renders the probes of a sample: the same scene once more with black and with white patch surfaces.
 
-A white surface in full low sun is brighter than full scale, so that its pixels are clipped and underestimate every
-patch. Such a surface is also rendered in grey, and white is extrapolated from that.
+A white surface in full low sun is brighter than the largest value of a picture. Its pixels are clipped, and would make
+every patch too dark. Such a surface is also rendered in grey, and the unclipped white is extrapolated from it.
 """
 
 from __future__ import annotations
@@ -21,23 +21,21 @@ from gear.values.scene import SceneRecord
 from gear.world.world import PlacedStage, World
 
 Raws = tuple[RawView, ...]
-"""One raw view per camera."""
+"""Raw renders of one scene, one view per camera."""
 
 UNSURE = 8
-"""Largest difference, in quantisation steps of a frame, between extrapolated and rendered white that rounding alone can
-cause.
-"""
+"""Largest difference between extrapolated and rendered white that rounding alone can cause, in levels of linear uint16."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ProbeShot:
-    """The renders of one scene for its probes.
+    """The renders of one scene from which its probes are computed.
 
     Attributes:
-        black: views with all surfaces black.
-        white: views by surface, with that surface white and the others black.
-        grey: views by surface with that surface grey, for surfaces whose white is clipped.
-        grey_weight: linear albedo of that grey as a share of white.
+        black: one view per camera, with all surfaces black.
+        white: one view per camera, by surface: this surface white and all others black.
+        grey: one view per camera with this surface grey, for surfaces whose white is clipped.
+        grey_weight: linear albedo of the grey as a share of the albedo of white.
     """
 
     black: Raws
@@ -47,14 +45,15 @@ class ProbeShot:
 
 
 def shoot_probes(world: World, renderer: Renderer, placed: PlacedStage, record: SceneRecord, shapes: Raws) -> ProbeShot:
-    """Renders the scene placed last, once with all surfaces black and once per surface with it white.
+    """Renders the scene that was placed last, once with all surfaces black and once per surface with only this
+    surface white.
 
     Args:
         world: world of the scene.
         renderer: renderer of that world.
         placed: the placed scene.
         record: scene record with cameras and surfaces.
-        shapes: views of the sample itself, which have the same depth and ids.
+        shapes: views of the sample itself; their depth and object ids are used again.
     """
     names = [surface.name for surface in record.surfaces]
     weights = face_light(renderer.info.name, np.arange(256, dtype=np.uint8))
@@ -88,14 +87,14 @@ def compute_probes(
     geoms: GeomTable,
     reflections: Sequence[Reflection | None],
 ) -> list[Probe]:
-    """Computes the probes of all surfaces and cameras.
+    """Computes the probes of one sample, for all surfaces and cameras.
 
     Args:
         pipeline: camera pipeline of the sample; its noise is left out.
-        shot: the renders.
+        shot: renders with black, white and grey surfaces.
         record: the scene record.
         geoms: classes of the geoms.
-        reflections: reflections of wet ground in the sample, one per camera.
+        reflections: reflections of wet ground in the sample, one per camera; None for dry ground.
     """
     quiet = replace(pipeline, effects=pipeline.effects.linear())
     probes = []

@@ -1,4 +1,4 @@
-"""Runs one collection job from its missing samples to the closed split."""
+"""Runs one collection job: makes the missing samples and writes the split's manifest."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class CollectReport:
     Attributes:
         root: folder of the dataset.
         split: name of the split.
-        samples: number of samples in the split, or in the shard of it that was collected.
-        made: number of samples made by this run.
-        shard: the shard that was collected, as `I/N`; None for the whole split.
+        samples: number of samples in the split, or in the collected shard.
+        made: number of samples that this run made.
+        shard: the collected part of the split as `I/N`; None for the whole split.
     """
 
     root: Path
@@ -51,8 +51,9 @@ class CollectReport:
 def executor_of(
     job: Job, workers: int, *, engine: str = DEFAULT, address: str | None = None, in_subprocess: bool = False
 ) -> Executor:
-    """The executor of an engine; a single worker of the default engine is this process, unless a process of its own is
-    requested.
+    """The executor that makes the samples of a job with a given engine.
+
+    A single worker of the default engine is this process itself, unless `in_subprocess` is set.
 
     Raises:
         UnknownNameError: there is no such engine.
@@ -70,18 +71,19 @@ def run_job(
     shard: Shard | None = None,
     callbacks: Callbacks | None = None,
 ) -> CollectReport:
-    """Collects the missing samples of a resolved job and closes the split; a shard of it is collected and not closed.
+    """Makes the missing samples of a job and, if the whole split is collected, writes its index files and
+    manifest.
 
     Args:
-        job: the job.
+        job: the collection job.
         executor: executor that makes the samples; this process by default.
         force: whether a split made with another configuration is replaced.
-        shard: the part of the split to collect; None for all of it.
-        callbacks: callbacks that receive the progress.
+        shard: the part of the split to collect; None for all of it. The manifest is not written for a part.
+        callbacks: callbacks that receive progress and warnings.
 
     Raises:
-        SamplesFailedError: some samples could not be made, all others are there.
-        GearError: no sample can be made, or the disk refuses.
+        SamplesFailedError: some samples could not be made; all other samples are kept.
+        GearError: no sample can be made, or a file cannot be written.
     """
     store = Store(job.root, job.plan)
     plugin = find("task", job.config.task)

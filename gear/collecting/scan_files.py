@@ -1,4 +1,4 @@
-"""Laser scans, as files beside a sample: little-endian float32 x, y, z, intensity of each point, as KITTI has them."""
+"""Laser scans as files of a sample, in KITTI's format: little-endian float32 x, y, z and intensity of each point."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ KIND = "scans"
 
 
 def scan_files(points: npt.NDArray[np.float32], split: str, index: int) -> AuxiliaryFiles:
-    """The file of one scan, by its name in the sidecar.
+    """Encodes one laser scan as a file, by its name in the sidecar (the JSON file of the sample).
 
     Args:
-        points: (N, 4) float32, as of `gear.groundtruth.laser_scan.scan_points`.
+        points: (N, 4) float32: x forward, y left, z up in metres, and intensity in 0..1.
         split: name of the split.
-        index: of the sample.
+        index: index of the sample.
     """
     path = auxiliary_path(split, KIND, index, "velodyne.bin")
     return {SCAN: (Auxiliary(path=path, facts={"points": len(points)}), format_points(points))}

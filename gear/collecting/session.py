@@ -1,4 +1,4 @@
-"""A worker's session: a world compiled once, and a renderer, for one sample after another."""
+"""A worker's session: a compiled world and a renderer, with which it makes one sample after another."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class Shot:
 
     Attributes:
         record: the scene record.
-        raw: one view per camera, in the order of the record.
-        below: reflections of wet ground, one per camera; None for dry ground.
-        geoms, objects: tables of geoms and objects, as in `Frame`.
-        probes: renders with black and white surfaces, where probes are collected.
-        scan: depth views of a laser scan, where scans are collected; else empty.
+        raw: one raw view per camera, in the order of the record.
+        below: mirrored view for the reflections of wet ground, one per camera; None for dry ground.
+        geoms, objects: tables of the geoms and of the objects in the scene, for the ground truth.
+        probes: renders with black and white patch surfaces; None unless probes are collected.
+        scan: depth views of a laser scan; empty unless scans are collected.
     """
 
     record: SceneRecord
@@ -55,7 +55,9 @@ class Shot:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Session:
-    """Everything that makes the samples of one job."""
+    """Everything that one worker needs to make samples of a job: task, world, scene planner, renderer and camera
+    pipeline.
+    """
 
     job: Job
     plugin: PluginEntry
@@ -66,11 +68,11 @@ class Session:
     pipeline: CameraPipeline
 
     def record(self, index: int) -> SceneRecord:
-        """The scene record of one sample: a pure function of the job and the index."""
+        """The scene record of one sample (actors, surfaces and cameras); it depends only on the job and the index."""
         return self.pipeline.with_effects(self.planner.plan(index))
 
     def shoot(self, record: SceneRecord) -> Shot:
-        """Places the scene with the run's patches and renders it."""
+        """Places the actors of a scene in the world, with the job's patches, and renders all cameras."""
         names = tuple(surface.name for surface in record.surfaces)
         placed = self.world.place(record, self.job.patch.by_surface(names))
         raw = self.renderer.render(placed.stage, record.cameras)
@@ -91,8 +93,9 @@ class Session:
         )
 
     def to_frame(self, shot: Shot) -> Frame:
-        """Turns renders into pictures. It needs neither world nor renderer, so that it can run in parallel
-        with them.
+        """Turns raw renders into pictures by the camera pipeline.
+
+        It uses neither world nor renderer, so it can run while the next scene is rendered.
         """
         return self._frame(shot, self._reflections(shot))
 
@@ -107,7 +110,9 @@ class Session:
         return Frame(views=views, geoms=shot.geoms, objects=shot.objects)
 
     def finish(self, shot: Shot) -> tuple[Sample, Encoded, AuxiliaryFiles]:
-        """Turns a shot into pictures, ground truth and files. It can run while the next sample is rendered."""
+        """Computes pictures, ground truth and files of one sample from its renders; it can run while the next
+        scene is rendered.
+        """
         reflections = self._reflections(shot)
         frame = self._frame(shot, reflections)
         with blamed(self.plugin, f"sample {shot.record.index}"):
@@ -129,7 +134,7 @@ class Session:
 
 @contextlib.contextmanager
 def open_session(job: Job) -> Iterator[Session]:
-    """Opens a worker's world and renderer, and closes the renderer at the end."""
+    """A context that opens the world and the renderer of a job, and closes the renderer at the end."""
     map_large_buffers()
     plugin = find("task", job.config.task)
     task: Task[Any, Any] = build(plugin, job.config.options)

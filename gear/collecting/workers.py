@@ -1,4 +1,4 @@
-"""The number of workers that fits this machine: `--workers auto`."""
+"""The number of parallel workers that fits this machine, for `--workers auto`."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from typing import Literal
 from gear.values.machine import cores, free_memory_bytes
 
 WORKER_BYTES = 1_500_000_000
-"""Memory that a worker is given. The worlds of gear's own towns need about 1.2 GB at 2048 x 1024."""
+"""Bytes of memory that one worker is assumed to need; gear's own towns need about 1.2 GB at 2048 x 1024 pixels."""
 
 Workers = int | Literal["auto"]
 
 
 def fitting_workers(workers: Workers) -> int:
-    """The number of workers: as given, or one for each core that has enough memory; at least 1.
+    """The number of parallel workers; at least 1.
 
     Args:
-        workers: a number, or `auto`.
+        workers: the number itself, or `auto` for one worker per core, limited by the free memory.
     """
     if workers != "auto":
         return workers

@@ -1,1 +1,1 @@
-"""Configs: YAML read as text into typed, frozen dataclasses; every error says `file:line:column`."""
+"""Configs: YAML that is read into typed, frozen dataclasses; every error names `file:line:column`."""

@@ -1,4 +1,4 @@
-"""The collection config (what to collect, where, with which patch) and the simulation config (seeds and counts)."""
+"""The two configs of a collection: what to collect (task, town, scene, patch), and seeds and sizes of the splits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gear.values.serial import PLACES
 from gear.values.vehicle_mix import check_mix
 
 SPLIT_NAME = re.compile(r"(?!(gear|patches|scratch)$)[a-z][a-z0-9]*(_[a-z0-9]+)*")
-"""Names of splits. Folders that gear writes in a dataset (`gear`, `patches`, `scratch`) are excluded."""
+"""Pattern of valid split names; `gear`, `patches` and `scratch` are folders of gear in a dataset and no valid names."""
 
 
 _WEATHER_FIELDS = [DerivedField(name=name, kind=float | None, field=field(default=None)) for name in WEATHER_PARAMETERS]
@@ -24,7 +24,9 @@ _WEATHER_FIELDS = [DerivedField(name=name, kind=float | None, field=field(defaul
 
 @with_fields(_WEATHER_FIELDS, attribute_lines(Weather, without=["name"]))
 class WeatherConfig:
-    """A preset and the parameters that differ from it; None is the preset's value. Derived from `Weather`.
+    """A weather preset and the parameters that differ from it; a parameter that is None has the preset's value.
+
+    The parameters are those of `gear.values.scene.Weather`.
 
     Attributes:
         places: file, line and column of each given value, by key.
@@ -54,9 +56,9 @@ class SplitConfig:
     """Seed and size of one split.
 
     Attributes:
-        seed: all random draws of the split derive from it.
-        samples: number of sequences; with `frames` 1 each is a single picture.
-        frames: frames per driving sequence.
+        seed: seed of all random draws of the split.
+        samples: number of driving sequences; if `frames` is 1, each sequence is a single picture.
+        frames: number of frames per driving sequence.
         interval_s: seconds between two frames of a sequence, 0.001 to 10.
     """
 
@@ -81,9 +83,9 @@ class SimulationConfig:
     """Seeds and sizes of all splits, and upper limits on road users.
 
     Attributes:
-        splits: by name; `test_night` takes the entry of `test` unless it has its own.
-        max_vehicles, max_pedestrians: upper limits on NPCs (a hundred times as many vehicles in scenes without a board,
-            as in the original); a scene's own limits hold below them.
+        splits: seed and size of each split, by name; `test_night` uses the entry of `test` unless it has its own.
+        max_vehicles, max_pedestrians: upper limits on the numbers of other vehicles and of pedestrians; a scene may set
+            lower ones. Scenes without a billboard may have a hundred times as many vehicles, as in CARLA-GeAR.
     """
 
     splits: dict[str, SplitConfig]
@@ -106,25 +108,26 @@ MOST_CROWDED = 10.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CollectionConfig:
-    """One dataset split to collect.
+    """The config of one dataset split to collect.
 
     Attributes:
         task: name of a task plugin.
         town: name of a town, or path of its MJCF.
         scenes: name of a scene library, or path of its YAML; empty for the town's own.
-        scene: name of a scene of that library; or a library's file and a name in it, `my.yml:corner`.
-        split: `train`, `val`, `test`, `debug`, `finetuning`, `video`, or one of those with `_anything` behind it.
+        scene: name of a scene in the library; or path of a library's YAML and the name of a scene in it,
+            `my.yml:corner`.
+        split: `train`, `val`, `test`, `debug`, `finetuning` or `video`, optionally with a suffix such as `_night`.
         root: folder of the dataset; empty for `data/<task>/<town>-<scene>-<weather>/<patch>`.
         patch: `none`, `random`, a picture, a patch folder, or the name of an installed patch.
-        weather: a preset, or a preset and what differs.
-        renderer: `raster` (physically based), `filament` (the same look, slower) or `classic`.
+        weather: a preset, or a preset and the parameters that differ from it.
+        renderer: `raster` (physically based), `filament` (the same appearance, slower) or `classic`.
         quality: `film` (2x2 supersampled) or `fast`.
         camera: optional effects: `shot_noise`, `read_noise` (percent), `vignette`, `shutter_s`, `lens` (`k1`, `k2`).
-        seed, samples: replace those of the simulation config.
+        seed, samples: replace the values of the simulation config.
         crowd: factor on the scene's numbers of other vehicles and people, and on their upper limits; 0 to 10.
         mix: factors on the frequency of kinds of vehicles, such as `{bus: 3}`.
-        patch_seed: seed of random patches, separate from the split's, so that all splits show the same patch.
-        probes: whether to store renders with each surface black and white, which the exact compositor needs.
+        patch_seed: seed of random patches, separate from the split's seed, so all splits show the same patch.
+        probes: whether to store renders with each patch surface black and white, which the exact compositor needs.
         scans: whether to store a laser scan (Velodyne HDL-64E) of each sample, for `gear export --layout kitti`.
         simulation: name or path of the simulation config.
         options: the task's own options (`gear plugins show TASK`).

@@ -1,4 +1,4 @@
-"""Configs back to YAML with all defaults, as `gear show-config` prints them and every dataset keeps them."""
+"""Converts configs to YAML and JSON with all defaults, for `gear show-config` and for the manifests of datasets."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from gear.config.nodes import Items, Mapping, Node, Scalar
 from gear.values.serial import Json, is_places_field
 
 MAX_NODES = 100_000
-"""Most values that a config may have once its YAML aliases are written out: aliases of aliases grow exponentially."""
+"""Largest number of values in a config after its YAML aliases are expanded; nested aliases can grow exponentially."""
 
 
 def to_yaml(config: Any) -> str:
-    """YAML text from which the same config is read."""
+    """Converts a config to YAML text, from which the same config can be read."""
     return str(yaml.safe_dump(to_plain(config), sort_keys=False, allow_unicode=True, default_flow_style=None))
 
 
 def node_to_json(node: Node) -> Json:
-    """A YAML tree as JSON in which all scalars stay texts.
+    """Converts a parsed YAML tree to JSON in which numbers and booleans stay text.
 
     Raises:
         ConfigError: the tree is too large once its aliases are expanded.
@@ -50,7 +50,7 @@ def _written_out(node: Node) -> Json:
 
 
 def to_plain(value: Any) -> Json:
-    """A config as JSON values: paths become texts, and options without a type stay texts."""
+    """Converts a config to JSON values; paths become texts, and values without a declared type stay texts."""
     if isinstance(value, (Scalar, Items, Mapping)):
         return node_to_json(value)
     if isinstance(value, Path):

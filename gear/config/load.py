@@ -1,4 +1,4 @@
-"""Loads the configs of a run from a file, flags and `--set`."""
+"""Loads the configs of a collection from a file, command-line flags and `--set`."""
 
 from __future__ import annotations
 
@@ -16,10 +16,14 @@ from gear.values.resources import data_dir
 
 
 def find_config(kind: str, name: str) -> Path:
-    """The path of a config given by name (`default` of `simulation`) or by path.
+    """Finds a config file by path, or by name among the configs of one kind that come with gear.
+
+    Args:
+        kind: folder of the configs, such as `simulation` or `collections`.
+        name: name such as `default`, or path of a file.
 
     Raises:
-        UnknownNameError: it is neither a file nor a known name.
+        UnknownNameError: there is neither a file nor a config of that name.
         ConfigError: the folder cannot be read.
     """
     path, folder = Path(name), data_dir("configs") / kind
@@ -40,15 +44,15 @@ def find_config(kind: str, name: str) -> Path:
 def load_collection(
     source: str | None, flags: Mapping[str, str | None], settings: Iterable[str] = ()
 ) -> CollectionConfig:
-    """Reads a collection config.
+    """Reads a collection config from a file, flags and settings.
 
     Args:
-        source: name or path of a YAML file (gear's or CARLA-GeAR's), or None.
-        flags: texts by key, None for flags that were not given; they override the file.
-        settings: `KEY=VALUE` texts; they override both.
+        source: name or path of a YAML file (gear's or CARLA-GeAR's); None without a file.
+        flags: values of command-line flags by key, None for flags that were not given; they override the file.
+        settings: `KEY=VALUE` texts; they override the file and the flags.
 
     Raises:
-        ConfigError: something in it cannot be read; names the place.
+        ConfigError: a value cannot be read; the error names its file, line and column.
     """
     node: Node = MappingNode({}, Place("command line"))
     original: MappingNode | None = None
@@ -74,20 +78,23 @@ def load_collection(
 
 
 def load_simulation(name: str) -> SimulationConfig:
-    """Reads a simulation config by name or path; CARLA-GeAR's Python file is parsed without running it.
+    """Reads a simulation config by name or path; a Python file of CARLA-GeAR is parsed without running it.
 
     Raises:
-        ConfigError: it cannot be read.
+        UnknownNameError: there is no such config.
+        ConfigError: the file cannot be read.
     """
     path = find_config("simulation", name)
     return read_node(SimulationConfig, simulation_from_python(path) if path.suffix == ".py" else parse_file(path))
 
 
 def split_of(simulation: SimulationConfig, split: str) -> SplitConfig:
-    """The entry of a split, or of the word before the first `_` of its name.
+    """The entry of a split in the simulation config, such as `test` for both `test` and `test_night`.
+
+    A split without an entry of its own uses the entry of the word before the first `_` of its name.
 
     Raises:
-        UnknownNameError: there is neither.
+        UnknownNameError: there is no such entry.
     """
     for name in (split, split.split("_")[0]):
         if name in simulation.splits:

@@ -1,4 +1,7 @@
-"""YAML as a tree of texts with their places. The dataclass that reads the tree decides the types, not YAML."""
+"""YAML as a tree of texts with their positions in the file.
+
+The types of values are decided by the dataclass that reads the tree, and not by YAML.
+"""
 
 from __future__ import annotations
 
@@ -13,26 +16,33 @@ from gear.values.regular_file import read_regular
 MAX_BYTES = 4 << 20
 
 MARKS = "'\"[{&*!|>"
-"""First characters of YAML values that are not bare words."""
+"""Characters with which a YAML value begins that is not a bare word."""
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """The place of a node: path, line and column from 1; line 0 means that it is in no file."""
+    """The position of a value in a config: path of the file, and line and column from 1; line 0 for a value that
+    is in no file.
+    """
 
     path: str
     line: int = 0
     column: int = 0
 
     def error(self, key: str, problem: str) -> ConfigError:
-        """A `ConfigError` at this place; for a flag the key is left out, because the flag names it."""
+        """A `ConfigError` at this position.
+
+        For a value of a command-line flag the key is left out of the message, because the flag already names it.
+        """
         key = "" if self.path == f"--{key}" else key
         return ConfigError(self.path, self.line, self.column, key, problem)
 
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """A scalar as text; `is_null` for an empty value, `null` or `~` without quotes."""
+    """A scalar of a YAML file as text with its position; `is_null` is True for an empty value, and for unquoted
+    `null` or `~`.
+    """
 
     text: str
     is_null: bool
@@ -41,7 +51,7 @@ class Scalar:
 
 @dataclass(frozen=True, slots=True)
 class Items:
-    """A list of nodes with its place."""
+    """A YAML list of nodes with its position in the file."""
 
     items: tuple[Node, ...]
     place: Place
@@ -49,7 +59,9 @@ class Items:
 
 @dataclass(frozen=True, slots=True)
 class Mapping:
-    """A mapping from keys to nodes with their places, in order; repeated keys are refused when reading."""
+    """A YAML mapping: each key has its own position and a node, in the order of the file; repeated keys are
+    refused on reading.
+    """
 
     entries: dict[str, tuple[Place, Node]]
     place: Place
@@ -59,7 +71,7 @@ Node = Scalar | Items | Mapping
 
 
 def parse_file(path: Path) -> Node:
-    """Reads a YAML file.
+    """Reads a YAML file as a tree of texts.
 
     Raises:
         ConfigError: the file is missing, too large, not UTF-8 or not YAML, or repeats a key.
@@ -68,7 +80,7 @@ def parse_file(path: Path) -> Node:
 
 
 def text_of(path: Path) -> str:
-    """The text of a config file.
+    """Reads a config file as text.
 
     Raises:
         ConfigError: the file is missing, too large or not UTF-8.
@@ -87,14 +99,14 @@ def text_of(path: Path) -> str:
 
 
 def parse_text(text: str, name: str) -> Node:
-    """Reads YAML text.
+    """Parses YAML text to a tree of texts.
 
     Args:
-        text: the YAML.
-        name: stands for the file in errors.
+        text: the YAML text.
+        name: name that error messages show instead of a file.
 
     Raises:
-        ConfigError: it is not YAML, repeats a key, or is nested too deeply.
+        ConfigError: the text is not YAML, repeats a key, or is nested too deeply.
     """
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
@@ -114,8 +126,9 @@ def parse_text(text: str, name: str) -> Node:
 
 
 def parse_value(text: str, name: str) -> Node:
-    """Parses one value of the command line: `12`, `fog`, `[1, 2]`, `{a: 1}`. There are no comments, and places have no
-    line and column.
+    """Parses one value of the command line, such as `12`, `fog`, `[1, 2]` or `{a: 1}`.
+
+    A `#` after a bare word does not begin a comment. Positions have no line and column.
     """
     if "#" in text and text.strip()[0] not in MARKS:
         return Scalar(text.strip(), False, Place(name))
@@ -123,7 +136,7 @@ def parse_value(text: str, name: str) -> Node:
 
 
 def in_one_place(node: Node, place: Place) -> Node:
-    """The same tree with one place for all nodes, for text that the user has not written in a file."""
+    """Copies a tree and gives all nodes one position, for text that the user has not written in a file."""
     done: dict[int, Node] = {}
 
     def moved(node: Node) -> Node:

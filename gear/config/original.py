@@ -1,7 +1,6 @@
-"""CARLA-GeAR's own configs: its collection config, accepted unchanged, and its simulation config, parsed without
-running it.
+"""Reads CARLA-GeAR's own configs: its YAML collection config, and its Python simulation config without running it.
 
-Keys and their meaning follow the template files of the original tool (`basepath`, `root`, `town_name`, `weather`,
+The keys and their meaning follow the template files of the original tool (`basepath`, `root`, `town_name`, `weather`,
 `task`, `split`, `billboard`, `patch_folder`, `patch_type`, `net`, `debug`).
 """
 
@@ -35,7 +34,7 @@ READING_METHODS = frozenset(("copy", "get", "items", "keys", "values"))
 READING_FUNCTIONS = frozenset(
     ("dict", "len", "list", "max", "min", "print", "repr", "set", "sorted", "str", "sum", "tuple")
 )
-"""Methods of dictionaries, and functions, that do not change their arguments."""
+"""Methods of dictionaries, and functions, that do not change the dictionary or their arguments."""
 
 COMPUTED = "is computed, and gear runs no configs; write it as YAML: `splits: {test: {seed: 363, samples: 50}}`"
 TASKS = {"ss": "semseg", "2dod": "detect2d", "3dod": "stereo3d", "depth": "depth"}
@@ -43,15 +42,16 @@ TOWNS = {"Town10HD": "town10", "Town10HD_Opt": "town10"}
 
 
 def is_original(node: Node) -> bool:
-    """Whether a node is a config of the original tool."""
+    """Whether a parsed YAML file is a collection config of CARLA-GeAR, recognised by its keys."""
     return isinstance(node, Mapping) and bool(ORIGINAL_ONLY & node.entries.keys())
 
 
 def from_original(node: Mapping) -> Mapping:
-    """The equivalent collection config of gear, without the folder, which `original_root` gives.
+    """Converts a collection config of CARLA-GeAR to gear's keys, without the dataset's folder (see
+    `original_root`).
 
     Raises:
-        ConfigError: a key is unknown or its value cannot be understood, or the task is none of the four.
+        ConfigError: a key is unknown, a value cannot be read, or the task is not `ss`, `2dod`, `3dod` or `depth`.
     """
     for name, (place, _) in node.entries.items():
         if name not in ORIGINAL_KEYS:
@@ -80,11 +80,12 @@ def from_original(node: Mapping) -> Mapping:
 
 
 def original_root(node: Mapping, above: Mapping) -> Scalar:
-    """The dataset's folder for a CARLA-GeAR config: `basepath/root/billboard`, as in the original.
+    """The dataset's folder for a collection config of CARLA-GeAR: `basepath/root/billboard`, as in the original
+    tool.
 
     Args:
-        node: the original's config.
-        above: the converted config with flags and settings applied; another scene gets another folder.
+        node: the config of CARLA-GeAR.
+        above: the converted config with flags and settings applied, because another scene gets another folder.
 
     Raises:
         ConfigError: the scene or the task is not a single word.
@@ -106,14 +107,14 @@ def _text(node: Mapping, key: str) -> str | None:
 
 
 def simulation_from_python(path: Path) -> Mapping:
-    """Converts the original's `simulation_configs.py` to gear's simulation config, without running it.
+    """Converts CARLA-GeAR's `simulation_configs.py` to gear's simulation config, without running the file.
 
-    Only plain assignments of literals are understood (`SEED_VALUES`, `ITERATION_VALUES`, `MAX_VEHICLE_NPC`,
-    `MAX_WALKER_NPC`); everything else in the file is ignored, unless it may change one of those four.
+    Only plain assignments of literals to `SEED_VALUES`, `ITERATION_VALUES`, `MAX_VEHICLE_NPC` and `MAX_WALKER_NPC` are
+    read. Everything else in the file is ignored, unless it may change one of these four names.
 
     Raises:
-        ConfigError: the file is not Python; one of those four is computed, or may be changed elsewhere (the message
-            says what to write instead); or a seed has no number of samples.
+        ConfigError: the file is not Python; one of the four names is computed or may be changed elsewhere; or a seed
+            has no number of samples.
     """
     try:
         tree = ast.parse(text_of(path))

@@ -1,4 +1,4 @@
-"""`--set key.path=value` on top of a file, read by the same reader."""
+"""Puts the values of `--set key.path=value` into a parsed config."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from gear.values.errors import ConfigError
 
 
 def with_overrides(node: Node, settings: Iterable[str], kind: Any = None, *, flag: str = "--set") -> Node:
-    """The tree with every `a.b.c=value` inserted; later settings override earlier ones.
+    """Inserts the values of `--set` options into a YAML tree; later settings override earlier ones.
 
     Args:
         node: the tree.
-        settings: `KEY=VALUE` texts.
-        kind: dataclass of the tree, whose shorthands are kept where a setting refers to a key below them; None for any.
-        flag: flag that the settings were given with, for errors.
+        settings: `KEY=VALUE` texts; the key may be a path with dots, such as `weather.cloudiness`.
+        kind: dataclass of the tree. Its shorthands (`weather: ClearNoon`) are expanded to mappings, so keys below them
+            can be set. None if the tree has no such class.
+        flag: the command-line flag of the settings, for error messages.
 
     Raises:
         ConfigError: a setting has no `=`, or its path leads through a value without keys.
@@ -35,13 +36,13 @@ def with_overrides(node: Node, settings: Iterable[str], kind: Any = None, *, fla
 
 
 def with_value(node: Node, path: tuple[str, ...], value: Node, above: str = "") -> Node:
-    """The tree with one value replaced or added.
+    """A copy of a YAML tree with one value replaced or added.
 
     Args:
         node: the tree.
         path: keys from the root to the value.
         value: the new value.
-        above: key of the tree itself, for errors.
+        above: key of the tree itself, for error messages.
 
     Raises:
         ConfigError: the path leads through a list or a scalar.
@@ -60,7 +61,9 @@ def with_value(node: Node, path: tuple[str, ...], value: Node, above: str = "") 
 
 
 def merged(base: Node, above: Node) -> Node:
-    """Merges two trees: keys of `above` override, mappings are merged recursively, everything else is replaced."""
+    """Merges two YAML trees: mappings are merged recursively, and any other value of `above` replaces the one of
+    `base`.
+    """
     if not (isinstance(base, Mapping) and isinstance(above, Mapping)):
         return above
     entries = dict(base.entries)

@@ -1,4 +1,4 @@
-"""Reads nodes into frozen dataclasses, by the declared type of each field."""
+"""Reads YAML trees into frozen dataclasses; the declared type of each field decides how its text is read."""
 
 from __future__ import annotations
 
@@ -21,33 +21,40 @@ TRUE_WORDS = ("true", "yes", "on")
 FALSE_WORDS = ("false", "no", "off")
 
 WHOLE = {"whole": True}
-"""Metadata of a field whose default counts as a whole: if some keys are given, the others have the class's defaults."""
+"""Metadata of a field whose default is used only if none of its keys is given; else the defaults of its class hold."""
 
 
 def read_node(kind: type[T], node: Node, key: str = "") -> T:
-    """Reads `node` as a `kind`.
+    """Reads a YAML tree as a value of the type `kind`, usually a dataclass.
 
-    A dataclass may name in `SHORTHAND` the field that a bare word fills: `weather: ClearNoon`. A field of type `Node`
-    is kept unread, for code that knows its type later. Where a field is a dataclass and only some of its keys are
-    given, the others come from the field's own default; with `WHOLE` in its metadata, from the defaults of the class.
+    - A dataclass may name in `SHORTHAND` the field that a bare word fills: `weather: ClearNoon`.
+    - A field of type `Node` is kept as a tree, for code that knows its type later.
+    - If only some keys of a field that is itself a dataclass are given, the other keys have the values of the field's
+      default; with `WHOLE` in the field's metadata, they have the defaults of the dataclass.
+
+    Args:
+        kind: type of the result.
+        node: the tree.
+        key: key of the tree in the whole config, for error messages.
 
     Raises:
-        ConfigError: a key is unknown, missing or repeated, a value has another type, or the class refuses it.
+        ConfigError: a key is unknown, missing or repeated, a value has another type, or the dataclass refuses a value.
     """
     return cast(T, _read(kind, node, key))
 
 
 @contextlib.contextmanager
 def located_errors(places: dict[str, Place], key: str, above: str = "") -> Iterator[None]:
-    """A context for looking up a name of a config: errors get the file, line and column of the name.
+    """A context for looking up a name that a config contains; errors get the file, line and column of the name.
 
     Args:
-        places: places of the given values, by key.
-        key: key whose value is looked up.
-        above: key above `key`, if any.
+        places: position of each given value, by key.
+        key: key of the name.
+        above: key of the mapping that contains `key`, if there is one.
 
     Raises:
-        ConfigError: instead of `UnknownNameError`, `DuplicateNameError` and `PatchError`, where a file has the key.
+        ConfigError: an `UnknownNameError`, `DuplicateNameError` or `PatchError` was raised, and a file contains the
+            key.
     """
     try:
         yield
@@ -59,7 +66,10 @@ def located_errors(places: dict[str, Place], key: str, above: str = "") -> Itera
 
 
 def expand_shorthand(kind: Any, node: Node) -> Node:
-    """The node of a dataclass with its shorthands expanded to mappings, so that more keys can be set."""
+    """Expands shorthands in the YAML tree of a dataclass, so that further keys can be set.
+
+    For example, `weather: ClearNoon` becomes `weather: {preset: ClearNoon}`.
+    """
     if not isinstance(node, Mapping):
         return node
     hints = type_hints(kind)
@@ -98,7 +108,7 @@ def _read(kind: Any, node: Node, key: str, default: Any = None) -> Any:
 
 
 def join(key: str, name: str) -> str:
-    """The key path `key.name`, or `name` at the top."""
+    """The key path `key.name`; only `name` if `key` is empty."""
     return f"{key}.{name}" if key else name
 
 

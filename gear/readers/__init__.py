@@ -1,6 +1,6 @@
-"""Readers: datasets of any task as torch datasets and batches.
+"""Readers that give datasets of any task to torch: as torch datasets, and as batches.
 
-They need torch; `gear.plugins.datasets` opens a dataset without it.
+This package needs torch; `gear.plugins.datasets` opens a dataset without torch.
 """
 
 from gear.readers.batches import Batch, as_pictures, batches, collate, stacked

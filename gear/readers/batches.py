@@ -15,7 +15,7 @@ from gear.readers.order import order
 from gear.readers.torch_dataset import Item, TorchDataset
 
 AHEAD = 2
-"""Batches that each worker process reads ahead."""
+"""Number of batches that each worker process reads in advance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -43,16 +43,17 @@ def batches(
     only_full: bool = False,
     workers: int = 0,
 ) -> Iterator[Batch]:
-    """Iterates over a split once, in batches.
+    """Reads all samples of a split once, in batches.
 
     Args:
         dataset: dataset whose pictures all have one size.
-        size: samples per batch.
+        size: number of samples per batch.
         seed: seed of the order; None keeps the order of the split.
-        epoch: number of the pass; the order and the augmentation depend on it.
-        start: batches to skip at the beginning without reading them, to resume a stopped pass.
+        epoch: number of the epoch, on which the order and the augmentation depend.
+        start: number of batches to skip at the beginning without reading them, to resume an interrupted epoch.
         only_full: whether a last batch with fewer samples is dropped.
-        workers: processes that read batches in advance; 0 reads in this process. The result does not depend on them.
+        workers: number of processes that read batches in advance; 0 reads in this process. The batches are the same for
+            any number.
 
     Raises:
         ValueError: `size` is below 1, `start` is negative, or the pictures of a batch differ in size.
@@ -81,7 +82,7 @@ def batches(
 
 
 def collate(items: Sequence[Item]) -> Batch:
-    """Makes a batch of items; the `collate_fn` for torch's own `DataLoader`.
+    """Makes a batch of items, with float32 pictures in 0..1; the `collate_fn` for torch's own `DataLoader`.
 
     Raises:
         ValueError: the pictures differ in size.
@@ -95,7 +96,9 @@ def as_pictures(views: Mapping[str, Tensor]) -> dict[str, Tensor]:
 
 
 def stacked(items: Sequence[Item]) -> Batch:
-    """Makes a batch whose pictures are still uint8, a quarter of the bytes to send between processes or to a GPU.
+    """Makes a batch whose pictures stay uint8 in 0..255.
+
+    They need a quarter of the bytes of float32 when they are sent between processes or to a GPU.
 
     Raises:
         ValueError: the pictures differ in size.

@@ -1,4 +1,4 @@
-"""Finds the finished splits that the paths of a command refer to."""
+"""Opens the finished splits that the paths of a command refer to, for training."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def open_all(
     """Opens every split that the paths refer to.
 
     Args:
-        paths: each is the root of a dataset, a folder of such roots, or a root with a split as `DIR:SPLIT`.
+        paths: roots of datasets, folders of such roots, or roots with a split as `DIR:SPLIT`.
         task: name of the task that all splits must have.
-        names: splits to take from a root that holds several.
+        names: splits to open from a root that holds several.
         allow_test_data: whether `test` splits are accepted as training data.
 
     Raises:

@@ -11,9 +11,9 @@ import numpy as np
 
 
 class Kept(Sequence[Any]):
-    """Samples that stay in memory once they are decoded, until a limit is reached.
+    """Samples that stay in memory after their first access, until a limit of bytes is reached.
 
-    Samples that are decoded first are kept, and none is dropped for another one, so that a pass in any order finds the
+    A sample in memory is never replaced by another one. Every pass over the data, in any order, therefore finds the
     same number of samples in memory. Several threads may share the cache.
     """
 
@@ -47,7 +47,7 @@ class Kept(Sequence[Any]):
 
 
 def bytes_of(sample: Any) -> int:
-    """Memory of all arrays of a sample, in bytes."""
+    """The memory of all NumPy arrays of a sample, in bytes."""
     total = 0
     for field in dataclasses.fields(sample):
         value = getattr(sample, field.name)

@@ -1,4 +1,4 @@
-"""Reads samples in threads while earlier ones are processed."""
+"""Reads samples in threads while earlier samples are processed."""
 
 from __future__ import annotations
 
@@ -13,20 +13,19 @@ Given = TypeVar("Given", covariant=True)
 
 
 class ByNumber(Protocol[Given]):
-    """Anything that returns an item for an index: a sequence, or a `TorchDataset`."""
+    """Anything that returns an item for an index: a sequence of samples, or a `TorchDataset`."""
 
     def __getitem__(self, index: int, /) -> Given: ...
 
 
 def read_ahead(samples: ByNumber[T], blocks: Sequence[Sequence[int]], *, workers: int) -> Generator[list[T]]:
-    """Yields the samples of one block after the other, in order.
+    """Yields the samples of one block after another, in order, while threads read the next samples.
 
-    While a block is processed, threads read the next block, or as many samples as there are threads if that is more.
-    The number of samples that wait is bounded, so that memory does not grow with the split. Close the iterator to end
-    its threads.
+    The threads read one block in advance, or as many samples as there are threads if that is more. Memory therefore
+    does not grow with the split. Closing the iterator ends the threads.
 
     Args:
-        samples: an opened split, or a `TorchDataset` for its items.
+        samples: an opened split, or a `TorchDataset` to get its items.
         blocks: indices of the samples of each block.
         workers: number of threads; the result does not depend on it.
 

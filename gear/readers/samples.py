@@ -13,11 +13,11 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True)
 class Samples(Sequence[Any]):
-    """A sequence of samples from several splits, each read when it is asked for.
+    """A sequence of samples from several splits; a sample is read from disk when it is indexed.
 
     Attributes:
         datasets: the splits.
-        places: (index of the split, index of the sample in it) of each sample.
+        places: pair (index of the split, index of the sample in the split) for each sample of the sequence.
         scale: factor by which pictures and ground truth are resized.
     """
 
@@ -39,7 +39,9 @@ class Samples(Sequence[Any]):
         return shrunk(self.datasets[dataset][place], self.scale)
 
     def facts(self) -> list[Json]:
-        """What the sequence consists of, as JSON without paths of this machine: one entry per split."""
+        """Describes the sequence for the records of a training: one JSON entry per split, with scene, weather,
+        patch and number of samples.
+        """
         numbers = [dataset for dataset, _ in self.places]
         return [
             {
@@ -57,5 +59,5 @@ class Samples(Sequence[Any]):
 
 
 def all_of(datasets: tuple[Dataset[Any], ...]) -> Samples:
-    """All samples of several splits, in the order of the splits."""
+    """Joins all samples of several splits to one sequence, in the order of the splits."""
     return Samples(datasets, tuple((i, k) for i, dataset in enumerate(datasets) for k in range(len(dataset))))

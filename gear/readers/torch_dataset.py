@@ -18,17 +18,17 @@ from gear.values.frames import UInt8Image
 from gear.values.rng import derive_rng
 
 Change = Callable[[Any, int, np.random.Generator], Any]
-"""Called with (sample, index, generator); returns a changed sample, such as a crop of pictures and ground truth."""
+"""A function of (sample, index, random generator) that returns a changed sample, such as a crop with ground truth."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Item:
-    """One sample with its index.
+    """One sample with its index in the split.
 
     Attributes:
         index: index of the sample in the split.
-        sample: the task's own object with its ground truth.
-        cameras: names of the cameras whose pictures are views.
+        sample: the task's own object with pictures and ground truth.
+        cameras: names of the cameras whose pictures are in `views`.
     """
 
     index: int
@@ -37,22 +37,23 @@ class Item:
 
     @cached_property
     def views(self) -> dict[str, Tensor]:
-        """(3, H, W) uint8 sRGB pictures by camera name, made when they are first asked for."""
+        """The (3, H, W) uint8 sRGB pictures by camera name, converted on first access."""
         return {name: picture_tensor(self.sample.images[name]) for name in self.cameras}
 
 
 class TorchDataset(torch.utils.data.Dataset[Item]):
-    """Samples of any task as items, for torch's own `DataLoader`, `gear.readers.batches` or `gear.readers.read_ahead`.
+    """Samples of any task as items, for torch's own `DataLoader`, `gear.readers.batches` or
+    `gear.readers.read_ahead`.
 
-    Items are not tensors, so torch's own loader needs to know how to make batches of them: `batch_size=None` leaves
-    them as they are, `collate_fn=gear.readers.collate` makes a `Batch`.
+    An item is not a tensor, so torch's own loader needs one of two arguments: `batch_size=None` yields single items,
+    and `collate_fn=gear.readers.collate` makes a `Batch` of them.
 
-    Item i depends only on (samples, seed, epoch, i), so that any number of workers reads the same. A `TorchDataset` can
-    be sent to worker processes.
+    Item i depends only on (samples, seed, epoch, i), so the items are the same for any number of workers. A
+    `TorchDataset` can be sent to worker processes.
 
     Attributes:
         samples: the opened split, or another sequence of samples.
-        epoch: number of the pass over the data, on which the random draws of `change` depend; `batches` sets it.
+        epoch: number of the epoch, on which the random draws of `change` depend; `batches` sets it.
     """
 
     def __init__(
@@ -93,7 +94,7 @@ class TorchDataset(torch.utils.data.Dataset[Item]):
         return self.item(index, self.epoch)
 
     def item(self, index: int, epoch: int) -> Item:
-        """The item at an index for a given pass, whatever pass is running."""
+        """The item at an index for a given epoch; the attribute `epoch` is ignored."""
         number = range(len(self))[index]
         sample = self.samples[number]
         if self._change is not None:
