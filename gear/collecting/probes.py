@@ -24,7 +24,7 @@ Raws = tuple[RawView, ...]
 """Raw renders of one scene, one view per camera."""
 
 UNSURE = 8
-"""Largest difference between extrapolated and rendered white that rounding alone can cause, in levels of linear uint16."""
+"""Largest difference between extrapolated and rendered white that rounding can cause, in levels of linear uint16."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -1,1 +1,1 @@
-"""Datasets on disk: atomic writes, sidecars, manifests, resuming, twins and readers."""
+"""Datasets on disk: file layout, sidecars (JSON files of samples), manifests, atomic writes, resuming and reading."""

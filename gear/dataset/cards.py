@@ -1,7 +1,8 @@
-"""The two files in a dataset's root that describe it: `README.md`, a dataset card, and `croissant.json`.
+"""The two files that describe a dataset in its root: `README.md` (the dataset card) and `croissant.json`.
 
-They follow from the manifests of the finished splits, so that every run that finishes a split writes the same bytes.
-Both carry the hash of their own content. A file without one is the user's own and is neither changed nor deleted.
+The files depend only on the manifests of the finished splits, so every run that finishes a split writes the same bytes.
+Both files contain a hash of their own content. A file without such a hash belongs to the user and is neither changed
+nor deleted.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ CARD, CROISSANT = "README.md", "croissant.json"
 CARDS = (CARD, CROISSANT)
 
 FIRST = ("leftimg8bit", "images", "image_2")
-"""Names of files that show what the camera sees; a card names them first."""
+"""Names of the folders with camera pictures in the formats of the tasks; a card lists them first."""
 
 STRUCTURE = (
     "Files lie as the task's benchmark has them. `gear/<split>/samples/` holds the complete scene and ground truth of "
@@ -40,18 +41,18 @@ NOTE = re.compile(
     rb"\n<!-- Written by gear; without this line gear leaves the file alone. sha256: ([0-9a-f]{64}) -->\n\Z"
 )
 MARK, END = b"<!-- Written by gear", re.compile(rb"sha256: [0-9a-f]{64} -->")
-"""Where one of them is damaged, the other one still says that gear wrote the card."""
+"""Beginning and end of a card's last line. Either of them alone, if the other is damaged, shows that gear wrote it."""
 
 
 def write_cards(root: Path, *, is_repair: bool = False) -> None:
-    """Writes both files of a dataset, or removes them where no split is finished.
+    """Writes the dataset card and `croissant.json`, or removes them if no split is finished.
 
     Args:
-        root: of the dataset.
-        is_repair: whether damaged files are written anew; otherwise files that were changed stay.
+        root: root of the dataset.
+        is_repair: whether damaged files are replaced; otherwise files that were changed are kept.
 
     Raises:
-        DatasetError: the disk refuses, or a file is a link.
+        DatasetError: a file cannot be written, or is a link.
     """
     folder = owned(root, GEAR)
     if not folder.is_dir():
@@ -71,7 +72,7 @@ def write_cards(root: Path, *, is_repair: bool = False) -> None:
 
 
 def cards(root: Path) -> dict[str, bytes]:
-    """Both files by path; empty where no split is finished."""
+    """The bytes of the dataset card and of `croissant.json` by path; empty if no split is finished."""
     finished = list(_finished(root))
     if not finished:
         return {}
@@ -98,7 +99,10 @@ def cards(root: Path) -> dict[str, bytes]:
 
 
 def damaged_cards(root: Path) -> dict[str, Literal["missing", "damaged"]]:
-    """What is wrong with the files, `missing` or `damaged`, by path. The user's own files are right."""
+    """The dataset card and `croissant.json` if one is `missing` or `damaged`, by path.
+
+    Files of the user with these names are not reported.
+    """
     found: dict[str, Literal["missing", "damaged"]] = {}
     is_finished = any(True for _ in _finished(root))
     for relative in CARDS:
@@ -112,14 +116,21 @@ def damaged_cards(root: Path) -> dict[str, Literal["missing", "damaged"]]:
 
 
 def own_cards(root: Path) -> set[str]:
-    """Paths of the card files in a dataset that gear wrote, as opposed to files of the user with these names."""
+    """The paths of the description files (`README.md`, `croissant.json`) that gear wrote; the user's own files are
+    left out.
+    """
     paths = {relative: inside(root, relative) for relative in CARDS}
     return {relative for relative, path in paths.items() if path.is_file() and is_own(relative, read_bytes(path))}
 
 
 def is_own(relative: str, data: bytes) -> bool:
-    """Whether gear wrote a card file, even if it was damaged since; False for a file of the user. An empty file counts
-    as damaged.
+    """Whether gear wrote a description file, even if the file was damaged later; False for a file of the user.
+
+    An empty file counts as a damaged file of gear.
+
+    Args:
+        relative: path of the file, `README.md` or `croissant.json`.
+        data: bytes of the file.
     """
     if not data:
         return True

@@ -1,8 +1,8 @@
-"""Claims on samples, by which several runs that make one split share its work.
+"""Claims: locked files by which several runs share the samples of one split.
 
 Before a run makes a sample, it creates the sample's claim, a file in `gear/<split>/claims`, and locks it. When the run
-is killed, the system releases the lock, and another run takes the claim over. On a file system without locks a claim is
-taken over when its process is gone from this machine, or when the claim is old.
+is killed, the system releases the lock, and another run takes the claim over. On a file system without locks, a claim
+is taken over if its process no longer runs on this machine, or if the claim is old.
 """
 
 from __future__ import annotations
@@ -20,26 +20,25 @@ from gear.dataset.layout import claim_path, sidecar_path, split_folder
 from gear.dataset.scratch import is_alive, lock_of, unique_name
 
 OLD_S = 900.0
-"""Age in seconds from which a claim counts as abandoned, if neither a lock nor a process number shows whether its run
-lives; no sample takes as long.
+"""Age in seconds above which a claim counts as abandoned, if neither a lock nor a process number shows whether its run
+is alive. No sample takes so long.
 """
 
 TRIES = 100
-"""Number of attempts, since another run may remove a claim, or the folder of the claims, between two steps."""
+"""Number of attempts to take a claim: another run may remove the claim, or its folder, between two steps."""
 
 OPENING = os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 class Claims:
-    """The claims that one worker holds on samples of a split.
-
-    A context manager that releases all of them at its end.
+    """The claims that one worker holds on samples of a split; as a context manager it releases all of them at the
+    end.
     """
 
     def __init__(self, root: Path, split: str) -> None:
         """Args:
-        root: of the dataset.
-        split: its name.
+        root: root of the dataset.
+        split: name of the split.
         """
         self._root, self._split = root, split
         self._held: dict[int, int] = {}
@@ -99,7 +98,7 @@ class Claims:
         return os.path.samestat(there, os.fstat(descriptor))
 
     def release(self, index: int) -> None:
-        """Releases a claim; does nothing if it is not held."""
+        """Releases the claim on a sample; does nothing if this worker does not hold it."""
         descriptor = self._held.pop(index, None)
         if descriptor is not None:
             try:
@@ -108,10 +107,10 @@ class Claims:
                 os.close(descriptor)
 
     def unclaimed(self, indices: Iterable[int], report: Report) -> Iterator[int]:
-        """Claims one sample after another, and yields those that no other run has made or claimed.
+        """Claims samples one after another, and yields those that no other run has made or claimed.
 
         Args:
-            indices: of samples.
+            indices: indices of samples.
             report: called with an outcome for each sample that another run has made or claimed.
         """
         for index in indices:
@@ -123,7 +122,7 @@ class Claims:
             report(Outcome(index=index, kind="elsewhere"))
 
     def is_taken(self, index: int) -> bool:
-        """Whether a run holds the claim on a sample."""
+        """Whether any worker holds the claim on a sample."""
         if not self.take(index):
             return True
         self.release(index)
@@ -131,7 +130,7 @@ class Claims:
 
 
 def clear_claims(root: Path, split: str) -> None:
-    """Removes the claims that killed runs have left, and their folder when it is empty.
+    """Removes claims that killed runs have left, and the folder of claims if it is empty.
 
     Raises:
         DatasetError: there is a link in the path of a claim.

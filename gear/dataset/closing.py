@@ -1,4 +1,4 @@
-"""The sidecars of a split, read one at a time, while the facts that the manifest needs of each are kept."""
+"""Reads the sidecars (JSON files of the samples) of a split one at a time and collects the manifest's entries."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from gear.values.serial import Json
 
 
 class SidecarStream(Sequence[Sidecar]):
-    """All sidecars of a split in order of index, each read and checked when it is asked for, and not kept.
+    """All sidecars (JSON files of the samples) of a split in order of index; each is read on access and not kept.
 
-    A split of 20,000 samples has gigabytes of sidecars in memory, of which an index file needs a small part.
+    The sidecars of 20,000 samples would take gigabytes of memory. Only the entries of the manifest are kept: indices,
+    files and hashes.
     """
 
     def __init__(self, root: Path, split: str, samples: int, views: Set[str]) -> None:
         """Args:
-        root: of the dataset.
-        split: its name.
+        root: root of the dataset.
+        split: name of the split.
         samples: number of samples.
         views: names of the cameras that each record must have.
         """
@@ -71,7 +72,7 @@ class SidecarStream(Sequence[Sidecar]):
         return sidecar
 
     def facts(self) -> dict[str, Json]:
-        """The manifest's entries `samples` and `sidecars`. Reads those sidecars that nobody has asked for.
+        """The manifest's entries `samples` and `sidecars`; sidecars that were not read yet are read.
 
         Raises:
             DatasetError: a sidecar is missing, damaged, or lacks a camera.

@@ -1,4 +1,4 @@
-"""Errors of the disk as one line for the user."""
+"""Turns disk errors, such as a full disk, into one line with advice for the user."""
 
 from __future__ import annotations
 
@@ -19,18 +19,21 @@ HINTS = {
     errno.EISDIR: "a folder is where a file should be; choose another --out",
     errno.EEXIST: "a file is where a folder should be; choose another --out",
 }
-"""Advice by error number."""
+"""Advice for the user by error number of the system."""
 
 SYSTEM_LIMITS = {errno.EMFILE, errno.ENFILE, errno.ENOMEM}
-"""Limits of the machine, not of the disk: the command line explains them."""
+"""Error numbers about limits of the machine (memory, open files), which the command line explains instead."""
 
 
 @contextlib.contextmanager
 def explained(path: Path) -> Iterator[None]:
-    """Turns a full disk, a read-only folder and similar errors of writing into one line.
+    """A context that turns an `OSError`, such as a full disk or a read-only folder, into one line with advice.
+
+    Args:
+        path: path for the message.
 
     Raises:
-        DatasetError: an `OSError` came up inside.
+        DatasetError: an `OSError` was raised, other than one about the machine's limits (memory, open files).
     """
     try:
         yield

@@ -1,4 +1,6 @@
-"""Notes on samples that could not be made, in `gear/<split>/failed`: the error, its traceback, the number of tries."""
+"""Notes on samples that could not be made: JSON files in `gear/<split>/failed` with error, traceback and number of
+attempts.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,8 @@ def note_failure(root: Path, split: str, outcome: Outcome, tries: int) -> None:
     Args:
         root: root of the dataset.
         split: name of the split.
-        outcome: outcome of the sample.
-        tries: number of attempts of a run to make the sample.
+        outcome: outcome of the sample, with its index, error and traceback.
+        tries: number of attempts that the run made.
 
     Raises:
         DatasetError: the note cannot be written.
@@ -35,7 +37,7 @@ def note_failure(root: Path, split: str, outcome: Outcome, tries: int) -> None:
 
 
 def noted_failures(root: Path, split: str) -> set[int]:
-    """Indices of the samples that an earlier run could not make.
+    """The indices of the samples that have a note, because an earlier run could not make them.
 
     Raises:
         DatasetError: the folder of the notes is a link.
@@ -45,12 +47,12 @@ def noted_failures(root: Path, split: str) -> set[int]:
 
 
 def clear_failures(root: Path, split: str, indices: Iterable[int] | None = None) -> None:
-    """Removes the notes on samples that exist, and the folder of notes if it is empty.
+    """Removes notes on failed samples, and the folder of notes if it is empty.
 
     Args:
         root: root of the dataset.
         split: name of the split.
-        indices: indices of the samples; all that have notes by default.
+        indices: indices of the samples whose notes are removed; None removes all notes.
 
     Raises:
         DatasetError: a note is a link, or cannot be deleted.

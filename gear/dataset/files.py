@@ -1,4 +1,4 @@
-"""Writes files atomically, and never outside the folder to which they belong."""
+"""Writes files atomically, and only inside the folder of a dataset or at the path that the user names."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ __all__ = [
 ]  # fmt: skip
 
 TRIES = 100
-"""Number of attempts to write, since another process may remove an empty folder or a half-written file between two
-steps of writing.
+"""Number of attempts to write a file: another process may remove an empty folder or a temporary file between two steps
+of writing.
 """
 
 
 def sha256(data: bytes) -> str:
-    """The SHA-256 of some bytes, as 64 hexadecimal digits."""
+    """The SHA-256 of bytes, as 64 hexadecimal digits."""
     return hashlib.sha256(data).hexdigest()
 
 
@@ -57,7 +57,7 @@ def write_whole(root: Path, relative: str, data: bytes) -> None:
 
 
 def write_alone(path: Path, data: bytes) -> None:
-    """Writes a file that belongs to no dataset, atomically.
+    """Writes a file outside of datasets atomically.
 
     Raises:
         DatasetError: a file cannot be written, or the path is a folder.
@@ -68,10 +68,10 @@ def write_alone(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def streamed_alone(path: Path) -> Iterator[BinaryIO]:
-    """A context to write a file that belongs to no dataset piece by piece; the complete file appears when the context
-    ends.
+    """A context that yields a binary stream, to write a file outside of datasets piece by piece.
 
-    Until then it has a hidden name in the same folder.
+    The file gets its name only when the context ends without an error; until that moment it has a hidden name in the
+    same folder.
 
     Raises:
         DatasetError: a file cannot be written, or the path is a folder.
@@ -92,7 +92,7 @@ def streamed_alone(path: Path) -> Iterator[BinaryIO]:
 
 
 def refuse_folder(path: Path) -> None:
-    """Refuses a folder where a file is to be written.
+    """Checks that the path of a file to be written is not a folder.
 
     Raises:
         DatasetError: the path is a folder.
@@ -103,7 +103,9 @@ def refuse_folder(path: Path) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Syncs a folder, so that renames in it survive a power failure, if the system supports it."""
+    """Syncs a folder to disk, so that renames of its files survive a power failure; does nothing on systems that
+    cannot.
+    """
     with contextlib.suppress(OSError):
         descriptor = os.open(path, os.O_RDONLY)
         try:
@@ -113,7 +115,7 @@ def sync_folder(path: Path) -> None:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The bytes of a regular file.
+    """Reads a regular file.
 
     Raises:
         DatasetError: the file is missing, not a regular file, or cannot be read.

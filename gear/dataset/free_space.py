@@ -1,4 +1,4 @@
-"""Checks that a disk has room for the files of a job."""
+"""Checks that a disk has enough free space for the files of a job."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB")
 
 
 def free_bytes(folder: Path) -> int:
-    """Bytes that are free on the disk of a folder, which need not exist yet."""
+    """The number of free bytes on the disk of a folder; the folder need not exist yet."""
     existing = next(path for path in (folder, *folder.resolve().parents) if path.exists())
     return shutil.disk_usage(existing).free
 
 
 def check_free_space(folder: Path, needed: float, *, what: str, advice: str) -> None:
-    """Refuses a job that does not fit its disk.
+    """Checks that the files of a job fit on its disk.
 
     Args:
-        folder: where the job writes.
-        needed: bytes that it will write, about.
-        what: the subject of the message, with its verb: "200 samples need".
+        folder: folder into which the job writes.
+        needed: approximate number of bytes that the job will write.
+        what: subject and verb of the message, such as "200 samples need".
         advice: what the user can do, besides choosing another disk.
 
     Raises:
@@ -34,7 +34,7 @@ def check_free_space(folder: Path, needed: float, *, what: str, advice: str) -> 
 
 
 def size_text(size: float) -> str:
-    """A size as text, in powers of 1000: `3.2 GB`."""
+    """Formats a number of bytes as text in powers of 1000, such as `3.2 GB`."""
     power = 0
     while size >= 999.5 and power < len(UNITS) - 1:
         size, power = size / 1000, power + 1

@@ -1,12 +1,13 @@
 """The only module that deletes, renames or opens files for writing in folders of the user.
 
-A folder may come from another person and contain links that lead elsewhere. Two guards protect files outside of it:
+A folder may come from another person and contain links that lead elsewhere. Two checks protect files outside of it:
 
 1. `refuse_links` searches an output folder for links before a command changes anything in it.
-2. Every change walks from the folder's root to the file through folder descriptors, and none of these steps follows a
-   link (`O_NOFOLLOW`): a link that is made after the search is refused, too.
 
-The root itself, and the folders above it, are the user's choice and may be links. Needs a POSIX system.
+2. Every change opens the folders from the root to the file one after another, without following links (`O_NOFOLLOW`). A
+link that is made after the search is therefore refused as well.
+
+The root itself, and the folders above it, are the user's choice and may be links. The module needs a POSIX system.
 """
 
 from __future__ import annotations
@@ -26,10 +27,10 @@ REMEDY = "gear writes and deletes nothing through links; put the folder or file 
 
 
 def parts_of(root: Path, relative: str) -> tuple[str, ...]:
-    """The components of a relative path, checked as text alone.
+    """The components of a relative path; the path is checked as text, without reading the disk.
 
     Raises:
-        DatasetError: the path is empty or absolute, goes up, or holds characters that other systems take for
+        DatasetError: the path is empty or absolute, contains `..`, or holds characters that other systems use as
             separators.
     """
     pure = PurePosixPath(relative)
@@ -39,7 +40,7 @@ def parts_of(root: Path, relative: str) -> tuple[str, ...]:
 
 
 def inside(root: Path, relative: str) -> Path:
-    """The path `root/relative` for reading. Links are followed if they stay below the root.
+    """The path `root/relative` for reading; links are followed if they stay below the root.
 
     Raises:
         DatasetError: the path leaves the root, as text or through a link.
@@ -55,7 +56,7 @@ def inside(root: Path, relative: str) -> Path:
 
 
 def owned(root: Path, relative: str) -> Path:
-    """The path `root/relative` for writing and deleting. No component below the root may be a link.
+    """The path `root/relative` for writing and deleting; no component below the root may be a link.
 
     Raises:
         DatasetError: a component is a link, or the path leaves the root as text.
@@ -69,12 +70,12 @@ def owned(root: Path, relative: str) -> Path:
 
 
 def refuse_links(root: Path) -> None:
-    """Searches a folder for links, before a command writes or deletes anything in it.
+    """Checks that a folder contains no links, before a command writes or deletes anything in it.
 
-    Hidden files and folders (`.git`, `.venv`) are not searched: gear writes none.
+    Hidden files and folders (`.git`, `.venv`) are not searched, because gear writes none.
 
     Raises:
-        DatasetError: there is a link, or a file where the folder should be.
+        DatasetError: there is a link, or the root is a file.
     """
     with explained(root):
         if not root.exists():
@@ -93,11 +94,12 @@ def refuse_links(root: Path) -> None:
 
 @contextlib.contextmanager
 def opened_parent(root: Path, relative: str, *, make: bool = False) -> Iterator[tuple[int, str]]:
-    """The folder of `root/relative` as an open descriptor, and the name of the file in it.
+    """A context that yields the parent folder of `root/relative` as an open descriptor, and the name of the file
+    in it.
 
     Args:
-        root: folder that is opened even through a link.
-        relative: path that is walked component by component, without following links.
+        root: folder that is opened even if it is a link.
+        relative: path whose folders are opened one by one, without following links.
         make: whether missing folders below the root are created.
 
     Raises:
@@ -131,7 +133,7 @@ def remove_file(root: Path, relative: str) -> None:
     """Deletes a file below the root; a missing file is not an error.
 
     Raises:
-        DatasetError: a component of the path is a link, or a file cannot be written.
+        DatasetError: a component of the path is a link, or the file cannot be deleted.
     """
     with (
         explained(root / relative),
@@ -142,10 +144,10 @@ def remove_file(root: Path, relative: str) -> None:
 
 
 def remove_files(root: Path, relatives: Iterable[str]) -> None:
-    """Deletes files below the root, all of whose paths are checked before the first of them is deleted.
+    """Deletes files below the root; all paths are checked before the first file is deleted.
 
     Raises:
-        DatasetError: a component of a path is a link, or a file cannot be written.
+        DatasetError: a component of a path is a link, or a file cannot be deleted.
     """
     checked = list(relatives)
     for relative in checked:
@@ -155,10 +157,10 @@ def remove_files(root: Path, relatives: Iterable[str]) -> None:
 
 
 def remove_tree(root: Path, relative: str) -> None:
-    """Deletes a folder below the root with its content; links in it are deleted and not followed.
+    """Deletes a folder below the root with its content; links in the folder are deleted and not followed.
 
     Raises:
-        DatasetError: a component of the path is a link, or a file cannot be written.
+        DatasetError: a component of the path is a link, or a file cannot be deleted.
     """
     with (
         explained(root / relative),
@@ -169,7 +171,7 @@ def remove_tree(root: Path, relative: str) -> None:
 
 
 def remove_empty_folders(root: Path, relative: str) -> None:
-    """Deletes all empty folders at and below `root/relative`, from the inside out.
+    """Deletes the folder `root/relative` and all folders in it, as far as they are empty; innermost folders first.
 
     Raises:
         DatasetError: a component of the path is a link.

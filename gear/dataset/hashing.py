@@ -1,4 +1,4 @@
-"""Hashes many files, several at a time."""
+"""Computes the SHA-256 of files, several files in parallel."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from gear.values.regular_file import check_regular
 
 PIECE_BYTES = 1 << 20
 MOST_THREADS = 8
-"""Largest number of threads; with more the disk is the limit. `hashlib` releases Python's lock, so that threads hash in
-parallel.
+"""Largest number of threads; with more threads the disk is the limit. `hashlib` releases Python's global lock, so the
+threads run in parallel.
 """
 
 S = TypeVar("S")
@@ -39,6 +39,6 @@ def file_hash(path: Path) -> str:
 
 
 def in_threads(call: Callable[[S], T], items: Sequence[S]) -> Iterator[T]:
-    """The results of a call on each item, in order, computed in threads."""
+    """Calls a function for each item in parallel threads, and yields the results in the order of the items."""
     with ThreadPoolExecutor(min(MOST_THREADS, os.cpu_count() or 1)) as pool:
         yield from pool.map(call, items)

@@ -1,4 +1,4 @@
-"""Datasets and samples as HTML, for notebooks."""
+"""HTML previews of datasets and of pairs of samples, for notebooks."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ import cv2
 from gear.values.frames import UInt8Image
 
 WIDTH_PX = 320
-"""Width of a picture in a notebook."""
+"""Width in pixels of a preview picture."""
 
 QUALITY = 85
 """JPEG quality of the embedded pictures."""
 
 
 def preview_table(title: str, rows: Iterable[tuple[str, Mapping[str, UInt8Image]]]) -> str:
-    """A table of small pictures as one HTML fragment that needs no files.
+    """Formats small pictures of samples as one HTML table that contains the pictures themselves.
 
     Args:
         title: line above the table.
-        rows: caption and pictures by name, (H, W, 3) uint8 RGB, per sample.
+        rows: for each sample a caption, and (H, W, 3) uint8 RGB pictures by name.
     """
     lines = [f"<div><b>{escape(title)}</b><table>"]
     for caption, pictures in rows:

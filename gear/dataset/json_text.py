@@ -1,4 +1,4 @@
-"""JSON text as gear writes and reads it: only finite numbers and no lone surrogates."""
+"""Writes and reads JSON text; numbers that are not finite and invalid Unicode (lone surrogates) are refused."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gear.values.serial import Json
 
 
 def dump_json(value: Json) -> bytes:
-    """JSON text with one key per line, keys in the given order, and a final newline."""
+    """Encodes a value as UTF-8 JSON text with one key per line, keys in the given order, and a final newline."""
     return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
@@ -21,7 +21,7 @@ def load_json(path: Path) -> Json:
     """Reads a JSON file.
 
     Raises:
-        DatasetError: the file is missing or refused by `parse_json`.
+        DatasetError: the file is missing, is not JSON, or holds values that gear never writes (see `parse_json`).
     """
     data = read_bytes(path)
     try:
@@ -31,7 +31,7 @@ def load_json(path: Path) -> Json:
 
 
 def parse_json(data: bytes | str) -> Json:
-    """The value of a JSON text.
+    """Parses JSON text.
 
     Raises:
         ValueError, RecursionError: the text is not JSON, or holds values that `dump_json` never writes: numbers that

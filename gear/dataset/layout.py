@@ -1,4 +1,4 @@
-"""Paths of gear's own files in a dataset: all lie below `gear/`, in one folder per split."""
+"""The paths of gear's own files in a dataset: all are in the folder `gear`, with one folder per split."""
 
 from __future__ import annotations
 
@@ -6,47 +6,56 @@ GEAR = "gear"
 
 
 def split_folder(split: str) -> str:
-    """The folder of one split's sidecars, plan and manifest."""
+    """The folder of a split's sidecars (JSON files of the samples), plan and manifest, relative to the dataset's
+    root.
+    """
     return f"{GEAR}/{split}"
 
 
 def sidecar_path(split: str, index: int) -> str:
-    """Path of the sidecar of one sample; it is written last, so that a sample with a sidecar is complete."""
+    """The path of a sample's sidecar, a JSON file with the scene, the surfaces and the hashes of the sample's
+    files.
+
+    The sidecar is written last, so a sample that has a sidecar is complete.
+    """
     return f"{split_folder(split)}/samples/{index:06d}.json"
 
 
 def auxiliary_path(split: str, kind: str, index: int, name: str) -> str:
-    """The path of an auxiliary file of a sample; `kind` is the name of its folder, such as `probes`."""
+    """The path of an additional file of a sample; `kind` is its folder, such as `probes` or `scans`."""
     return f"{split_folder(split)}/{kind}/{index:06d}_{name}"
 
 
 def plan_path(split: str) -> str:
-    """Path of the plan of a split, which holds everything that decides its bytes; written first."""
+    """The path of a split's plan, a JSON file with everything that decides the bytes of the split; it is written
+    first.
+    """
     return f"{split_folder(split)}/plan.json"
 
 
 def begun_path(split: str, what: str) -> str:
-    """Path of a note with the files of a sample, or of the indexes, that are being written; deleted when they are
-    complete.
+    """The path of a JSON list of files that are being written; it is deleted when all of them are complete.
+
+    The argument `what` is the index of a sample with 6 digits, or `indexes` for the index files of the split.
     """
     return f"{split_folder(split)}/begun/{what}.json"
 
 
 def claim_path(split: str, index: int) -> str:
-    """The claim on a sample by the run that is making it; removed when the sample is there."""
+    """The path of the claim on a sample, a locked file that exists while a run makes the sample."""
     return f"{split_folder(split)}/claims/{index:06d}.claim"
 
 
 def failed_path(split: str, index: int) -> str:
-    """A note on a sample that could not be made; removed when the sample is there."""
+    """The path of the note on a sample that could not be made; the note is deleted when the sample is made."""
     return f"{split_folder(split)}/failed/{index:06d}.json"
 
 
 def manifest_path(split: str) -> str:
-    """Path of the manifest, which lists all files of a finished split; written last."""
+    """The path of a split's manifest, a JSON file that lists all files of the finished split; it is written last."""
     return f"{split_folder(split)}/manifest.json"
 
 
 def patch_path(label: str, name: str) -> str:
-    """Path of the copy of a patch that a split shows."""
+    """The path of a patch picture in the dataset, which is a copy of the patch that a split shows."""
     return f"{GEAR}/patches/{label}/{name}"

@@ -1,6 +1,6 @@
-"""Locks on folders, by which parallel runs detect each other. The system releases the locks of a killed run.
+"""Locks on folders, by which parallel runs detect each other; the system releases the locks of a killed run.
 
-On a file system without such locks every run proceeds as if there were no others.
+On a file system without locks, every run proceeds as if there were no other runs.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ __all__ = ["alone_at_work", "at_work", "is_at_work", "turn"]
 
 @contextlib.contextmanager
 def turn(root: Path) -> Iterator[None]:
-    """Locks a dataset against other runs that start or remove splits; waits for them. Creates a missing root.
+    """A context that locks a dataset against other runs that start or remove splits; it waits until such runs end.
+
+    A missing root is created.
 
     Raises:
         DatasetError: the root cannot be created.
@@ -40,17 +42,20 @@ def turn(root: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def at_work(folder: Path) -> Iterator[None]:
-    """Holds a shared lock on a split's folder while a run writes samples; several runs of one plan may hold it."""
+    """A context that holds a shared lock on a split's folder while a run writes samples.
+
+    Several runs with the same plan may hold the lock.
+    """
     with _locked(folder, alone=False, wait=True):
         yield
 
 
 @contextlib.contextmanager
 def alone_at_work(root: Path) -> Iterator[None]:
-    """Locks a folder of results for one run. Creates a missing folder.
+    """A context that locks a folder of results for this run only; a missing folder is created.
 
     Raises:
-        DatasetError: another run is writing there, or the folder cannot be created.
+        DatasetError: another run writes into the folder, or the folder cannot be created.
     """
     with explained(root):
         root.mkdir(parents=True, exist_ok=True)
@@ -64,7 +69,7 @@ def alone_at_work(root: Path) -> Iterator[None]:
 
 
 def is_at_work(folder: Path) -> bool:
-    """Whether any run, this one included, holds the lock of `at_work` on a folder."""
+    """Whether any run, including this one, is writing samples of a split, and therefore locks its folder."""
     try:
         with _locked(folder, alone=True, wait=False):
             return False

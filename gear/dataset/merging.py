@@ -1,7 +1,8 @@
-"""Joins folders that each hold some samples of the same split, such as shards of several machines, into one folder.
+"""Merges folders that hold different samples of the same split, such as shards of several machines, into one
+dataset.
 
-Each sample's sidecar and files are read once, checked against their hashes, and written once. Only the folder of each
-sample is kept in memory.
+Each sample's sidecar and files are read once, checked against their hashes, and written once. Memory holds only the
+source folder of each sample.
 """
 
 from __future__ import annotations
@@ -25,17 +26,17 @@ from gear.values.progress import Progress
 from gear.values.serial import Json
 
 SAMPLES_AT_A_TIME = 256
-"""Number of samples that are given to the copying threads at a time."""
+"""Number of samples that are submitted to the copying threads at a time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The folders that hold samples of one split.
+    """The source folders that together hold all samples of one split.
 
     Attributes:
-        plan: of the split, the same in each folder.
+        plan: plan of the split, the same in each folder.
         roots: the folders.
-        homes: by index of a sample, the positions in `roots` of the folders that have it.
+        homes: for each sample, the positions in `roots` of the folders that hold it.
     """
 
     plan: Plan
@@ -44,20 +45,20 @@ class Parts:
 
     @property
     def split(self) -> str:
-        """Name of the split."""
+        """The name of the split."""
         return self.plan.info.split
 
 
 def find_parts(roots: Sequence[Path], split: str) -> Parts:
-    """Finds the samples of a split in several folders, of which each must have the same plan of it.
+    """Finds the folder of each sample of a split; the plans of the split must be equal in all folders.
 
     Args:
         roots: datasets, not all of which need to have the split.
-        split: its name.
+        split: name of the split.
 
     Raises:
-        DatasetError: two folders were made with different configurations, a run is at work in one, or a sample is in
-            none.
+        DatasetError: two folders were made with different configurations, a run is writing into a folder, or a sample
+            is in no folder.
     """
     having = tuple(root for root in roots if inside(root, f"{split_folder(split)}/plan.json").exists())
     plans = [plan_of(root, split) for root in having]
@@ -95,11 +96,11 @@ def _refuse_other_plan(first_root: Path, first: Plan, root: Path, plan: Plan) ->
 
 
 def prepare_merge(root: Path, plans: Sequence[Plan]) -> None:
-    """Empties the folder that is to be filled, unless a stopped merge of the same splits has left it.
+    """Empties the target folder and writes the plans; files of an interrupted merge of the same splits are kept.
 
     Args:
-        root: the folder, which holds no link.
-        plans: of the splits that are merged.
+        root: the target folder, which contains no link.
+        plans: plans of the splits that are merged.
 
     Raises:
         DatasetError: a file cannot be written.
@@ -122,15 +123,15 @@ def prepare_merge(root: Path, plans: Sequence[Plan]) -> None:
 
 
 def copy_patches(parts: Parts, out: Path, check: Callable[[Mapping[str, Path]], None]) -> None:
-    """Copies the pictures of the patch that a split shows.
+    """Copies the pictures of the patch that a split shows into the target folder.
 
     Args:
-        parts: the folders; where several have the pictures, those must be the same.
-        out: the folder that is filled.
-        check: called with the paths of the pictures by name; raises where they are not those of the plan.
+        parts: the source folders; if several hold the pictures, they must be equal.
+        out: the target folder.
+        check: called with the paths of the pictures by name; raises an error if they are not those of the plan.
 
     Raises:
-        DatasetError: two folders have different pictures, or none has any.
+        DatasetError: two folders have different pictures.
     """
     label = parts.plan.patch["label"]
     chosen: dict[str, bytes] = {}
@@ -150,11 +151,13 @@ def copy_patches(parts: Parts, out: Path, check: Callable[[Mapping[str, Path]], 
 
 
 def copy_samples(parts: Parts, out: Path, on_progress: Progress) -> None:
-    """Copies all samples of a split: for each one its files, and its sidecar last. Samples that are there are kept.
+    """Copies all samples of a split into the target folder: first the files of a sample, then its sidecar.
+
+    Samples that an interrupted merge has copied are kept.
 
     Args:
-        parts: the folders that have the samples.
-        out: the folder that is filled.
+        parts: the source folders.
+        out: the target folder.
         on_progress: called after every sample.
 
     Raises:

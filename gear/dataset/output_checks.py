@@ -1,4 +1,4 @@
-"""Checks what the methods of a task return, before it is written or shown."""
+"""Checks the return values of a task's or an evaluator's methods before they are used."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from gear.values.frames import UInt8Image
 
 
 def check_encoded(given: Any, method: str) -> Encoded:
-    """Checks the return value of a task's `method` and returns it.
+    """Checks that a method of a task returned files as bytes and metadata as JSON, and returns its value.
 
     Raises:
-        TypeError: the value is not an `Encoded`, a file in it is not bytes, or its facts hold values that JSON cannot
-            represent.
-        ValueError: its facts hold numbers that JSON cannot represent.
+        TypeError: the value is not an `Encoded`, a file in it is not bytes, or its metadata hold values that JSON
+            cannot represent.
+        ValueError: the metadata hold numbers that JSON cannot represent.
     """
     if not isinstance(given, Encoded):
         raise TypeError(f"{method} must give an Encoded, got {type(given).__name__}")

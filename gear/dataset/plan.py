@@ -1,4 +1,4 @@
-"""The plan of a split: everything that decides its bytes. Samples of two plans are never mixed in one split."""
+"""The plan of a split: everything that decides its bytes. One split never contains samples of two plans."""
 
 from __future__ import annotations
 
@@ -22,15 +22,16 @@ class Plan:
     """Everything that decides the bytes of a split, as JSON.
 
     Attributes:
-        task: name and package of the task plugin, its version and options.
+        task: name, package and version of the task plugin.
+        options: options of the task.
         content: town, scene, weather, renderer and everything else that decides the pictures, without paths and patch.
         patch: label and sha256 of the patch's pictures.
         info: names and seed for the format's index files.
         samples: number of frames of the split.
-        auxiliary: kinds of auxiliary files of each sample (`probes`, `scans`). Pictures and labels do not depend on
-            them.
+        auxiliary: kinds of additional files of each sample (`probes`, `scans`), which do not change pictures and
+            labels.
         recipe: the collection's config without paths, from which damaged files can be made again; None in datasets of
-            earlier versions. `content` already decides all bytes.
+            earlier versions.
     """
 
     task: dict[str, str]
@@ -44,23 +45,25 @@ class Plan:
 
     @property
     def twin_key(self) -> str:
-        """Hash that is equal for two splits that differ only in the patch and in the number of samples."""
+        """A hash that is equal for two splits (twins) that differ only in the patch and in the number of samples."""
         return _digest({"task": self.task, "options": self.options, "content": self.content})
 
     @property
     def content_key(self) -> str:
-        """Hash that is equal for two splits whose common samples have equal bytes."""
+        """A hash that is equal for two splits that differ only in the number of samples; samples of equal index
+        have equal bytes.
+        """
         content = {"twin": self.twin_key, "patch": self.patch}
         return _digest(content | ({"auxiliary": list(self.auxiliary)} if self.auxiliary else {}))
 
     @property
     def frames_per_sequence(self) -> int:
-        """Number of samples of each driving sequence; 1 where every sample is a single picture."""
+        """The number of samples of each driving sequence; 1 if every sample is a single picture."""
         frames = self.content.get("frames", 1) if isinstance(self.content, dict) else 1
         return frames if isinstance(frames, int) and frames > 0 else 1
 
     def as_json(self) -> Json:
-        """The content of the plan's file. Auxiliary files and the recipe have entries only if the plan has them."""
+        """The content of the plan's file; `auxiliary` and `recipe` are left out if they are empty."""
         content = to_json(self)
         for name in ("auxiliary", "recipe"):
             if not getattr(self, name):
@@ -69,10 +72,13 @@ class Plan:
 
 
 def manifest_facts(plan: Plan) -> dict[str, Json]:
-    """The facts of the manifest that are not hashes; none depends on paths of the machine, the clock or the workers.
+    """The metadata of a split for its manifest: task, options, seed, patch, renderer, versions, scene, weather,
+    config.
+
+    They do not depend on paths of the machine, the time or the workers.
 
     Raises:
-        DatasetError: the plan lacks one of them; it was edited.
+        DatasetError: the plan lacks an entry, because it was edited.
     """
     try:
         return {
@@ -98,7 +104,7 @@ def _digest(value: Json) -> str:
 
 
 def refuse_copy(root: Path, split: str) -> None:
-    """Refuses a split whose folder was copied or renamed, since it names the files of the original split.
+    """Refuses a split whose folder was copied or renamed, because it names the files of the original split.
 
     Raises:
         DatasetError: the plan is that of another split.
@@ -122,7 +128,7 @@ def read_plan(root: Path, split: str) -> Plan | None:
     """Reads the plan of a split; None if there is no such split.
 
     Raises:
-        ReplaceableError: the plan is of another version of gear.
+        ReplaceableError: the plan was written by another version of gear.
         DamagedError: the bytes of the plan are not those that gear wrote.
         DatasetError: the plan cannot be read, or is that of another split.
     """
@@ -165,15 +171,15 @@ def _damaged(root: Path, split: str, problem: str) -> DamagedError:
 
 
 def refuse_other_tasks(root: Path, plan: Plan, *, besides: str = "") -> None:
-    """Refuses to mix tasks: all splits of a root are of one task.
+    """Checks that all splits of a dataset have the same task as a new split.
 
     Args:
         root: root of the dataset.
-        plan: plan of the split to be collected.
+        plan: plan of the new split.
         besides: name of a split that is not checked.
 
     Raises:
-        DatasetError: the root holds another task's dataset, or a plan there cannot be read.
+        DatasetError: the root holds another task's dataset, or a plan in it cannot be read.
     """
     for path in sorted((root / GEAR).glob("*/plan.json")):
         other = None if path.parent.name == besides else read_plan(root, path.parent.name)
@@ -184,12 +190,14 @@ def refuse_other_tasks(root: Path, plan: Plan, *, besides: str = "") -> None:
 
 
 def begin(root: Path, plan: Plan) -> None:
-    """Writes the plan of a new split, or checks that an existing split has the same plan with at most as many samples.
+    """Writes the plan of a new split, or checks that an existing split can be continued with it.
+
+    An existing split can be continued if its plan is equal and has at most as many samples.
 
     Raises:
         OutdatedError: the existing split differs only in its patch.
         ReplaceableError: the existing split has another configuration, or more samples.
-        DatasetError: the root holds another task's dataset, or a plan there cannot be read.
+        DatasetError: the root holds another task's dataset, or a plan in it cannot be read.
     """
     split = plan.info.split
     refuse_other_tasks(root, plan)
@@ -211,21 +219,21 @@ def begin(root: Path, plan: Plan) -> None:
 
 
 def write_plan(root: Path, plan: Plan) -> None:
-    """Writes the plan of a split.
+    """Writes the plan of a split, with a hash of its own content.
 
     Raises:
-        DatasetError: a file cannot be written.
+        DatasetError: the file cannot be written.
     """
     write_whole(root, plan_path(plan.info.split), sealed_json(plan.as_json()))
 
 
 def differences(old: Json, new: Json, key: str = "", *, places: tuple[str, str] = ("there", "now")) -> list[str]:
-    """The differences of two JSON values: one text per key, with both values.
+    """Lists the differences of two JSON values: one text per key, with both values.
 
     Args:
-        old, new: the values; `samples`, `info` and `recipe` of two plans are left out.
-        key: of both values in what they are part of, with dots.
-        places: words that say of each of the two values where it is.
+        old, new: the values; at the top level the keys `samples`, `info` and `recipe` are left out.
+        key: key path of the two values in the objects that contain them; empty for the top level.
+        places: words that name the origin of the old and of the new value in the texts.
     """
     if isinstance(old, dict) and isinstance(new, dict):
         found: list[str] = []

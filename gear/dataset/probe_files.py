@@ -1,14 +1,13 @@
-"""Probes: the pixels that a surface lights in one view, rendered with the surface white and black, as files of a
-sample.
+"""Probes: the pixels of one view that change with a patch surface, rendered with the surface white and black.
 
-Light is linear. With B the view with all surfaces black and W_i the view with only surface i white, a view with patches
-is
+Light is linear. Let B be the view with all surfaces black, and W_i the view with only surface i white. A view with
+patches is
 
     I = B + sum over i of w_i (W_i - B)
 
-where w_i is the linear colour of surface i's texture at a pixel, 0..1 (`gear.camera.response.face_light`). W_i - B
+where w_i is the linear colour of surface i's texture at a pixel, in 0..1 (`gear.camera.response.face_light`). W_i - B
 contains shading, shadows, air, occluders and soft edges. Noise and the response of the camera are applied later and are
-not in probes.
+not part of probes.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from gear.values.frames import UInt16Image
 from gear.values.serial import from_json
 
 AuxiliaryFiles = Mapping[str, tuple[Auxiliary, bytes]]
-"""Auxiliary files of a sample with their bytes, by name."""
+"""Additional files of a sample (such as probes) with their metadata and bytes, by name in the sample's sidecar."""
 
 KIND = "probes"
 _SHADES = ("black", "white")
@@ -43,14 +42,14 @@ _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 6, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Probe:
-    """The pixels that one surface lights in one view.
+    """The pixels of one view that change with one patch surface.
 
     Attributes:
         surface: name of the surface.
         view: name of the camera.
-        left_px, top_px: column and row of the crop's first pixel.
-        black: (h, w, 3) uint16, linear light 0..`LINEAR_FULL_SCALE`, with all surfaces black.
-        white: (h, w, 3) uint16, the same with this surface white; not clipped at full scale.
+        left_px, top_px: column and row of the crop's first pixel in the view.
+        black: (h, w, 3) uint16 crop in linear light, 0..`LINEAR_FULL_SCALE`, with all surfaces black.
+        white: (h, w, 3) uint16 crop with this surface white, not clipped at `LINEAR_FULL_SCALE`.
         response: the camera's response with which the pictures of the sample were made.
     """
 
@@ -64,12 +63,16 @@ class Probe:
 
     @property
     def name(self) -> str:
-        """Name in the sidecar, without `black` or `white`."""
+        """The name of the probe in the sidecar (the JSON file of the sample), without the suffix `black` or `white`."""
         return f"probe/{self.view}/{self.surface}"
 
 
 def crop_probe(surface: str, view: str, black: UInt16Image, white: UInt16Image, response: Response) -> Probe | None:
-    """The smallest crop of two (H, W, 3) frames that holds all pixels in which they differ; None if they are equal."""
+    """Crops two (H, W, 3) uint16 views, with a surface black and white, to the pixels in which they differ.
+
+    Returns:
+        The smallest crop with all differing pixels; None if the views are equal.
+    """
     reach = (black != white).any(axis=2)
     rows, columns = np.flatnonzero(reach.any(axis=1)), np.flatnonzero(reach.any(axis=0))
     if not rows.size:
@@ -87,7 +90,9 @@ def crop_probe(surface: str, view: str, black: UInt16Image, white: UInt16Image, 
 
 
 def probe_files(probes: Sequence[Probe], split: str, index: int) -> AuxiliaryFiles:
-    """Encodes each probe as two 16-bit RGB PNG files."""
+    """Encodes each probe as two 16-bit RGB PNG files; returns them by name in the sidecar (the JSON file of the
+    sample).
+    """
     files = {}
     for probe in probes:
         response = {name: getattr(probe.response, name) for name in _RESPONSE}
@@ -99,7 +104,7 @@ def probe_files(probes: Sequence[Probe], split: str, index: int) -> AuxiliaryFil
 
 
 def demand_probes(dataset: Dataset[Any]) -> None:
-    """Checks that a split was collected with probes.
+    """Checks that a split was collected with probes, the renders with black and white patch surfaces.
 
     Raises:
         DatasetError: the split has no probes.
@@ -113,10 +118,12 @@ def demand_probes(dataset: Dataset[Any]) -> None:
 
 
 def probes_of(dataset: Dataset[Any], index: int, view: str) -> tuple[Probe, ...]:
-    """Reads the probes of one sample in one view, in order of surfaces; a surface that lights no pixel has none.
+    """Reads the probes of one sample in one view, in the order of the surfaces.
+
+    A surface that changes no pixel of the view has no probe.
 
     Raises:
-        DatasetError: the split was collected without probes, or a file is missing or broken.
+        DatasetError: the split was collected without probes, or a file is missing or damaged.
         IndexError: there is no such sample.
     """
     demand_probes(dataset)

@@ -1,4 +1,4 @@
-"""Reads datasets: samples with typed fields, and pairs of twins."""
+"""Reads datasets: samples with typed fields, and pairs of samples that differ only in the patch."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gear.values.serial import Json, from_json
 T = TypeVar("T")
 
 SHOWN = 4
-"""Number of samples of a dataset that a notebook shows."""
+"""Number of samples in the notebook preview of a dataset."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -30,8 +30,9 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
     Attributes:
         root: folder of the dataset.
         plan: everything that decided the bytes of the split.
-        task: the task that wrote it.
-        manifest: versions, renderer, configuration and hashes of all files (of sidecars since a later version).
+        task: the task that wrote the split and decodes its samples.
+        manifest: JSON with versions, renderer, configuration and hashes of all files (earlier versions: without those
+            of sidecars).
     """
 
     root: Path
@@ -73,10 +74,12 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         return (self[i] for i in range(len(self)))
 
     def sidecar(self, index: int) -> Sidecar:
-        """The sidecar of one sample: its scene record, surfaces, facts and file hashes, without pictures.
+        """The metadata of one sample without its pictures: scene record, surfaces, the task's metadata and file
+        hashes.
 
         Raises:
             IndexError: there is no such sample.
+            DatasetError: the JSON file of the sample cannot be read.
         """
         if not -len(self) <= index < len(self):
             raise IndexError(f"sample {index} of {len(self)}")
@@ -94,7 +97,10 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
                 check_hash(self.root, relative, digest)
 
     def named(self, what: str) -> str:
-        """The name of the `renderer` or the `weather` in the manifest.
+        """The name of the renderer or of the weather in the manifest.
+
+        Args:
+            what: `renderer` or `weather`.
 
         Raises:
             DatasetError: the manifest has no such name.
@@ -107,7 +113,11 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         return name
 
     def content(self, kind: type[T], *keys: str) -> T:
-        """A value in the `content` of the plan, by its path of keys.
+        """One value in the `content` of the plan, which decides the pictures.
+
+        Args:
+            kind: type of the value.
+            keys: keys that lead to the value, from the outermost one on.
 
         Raises:
             DatasetError: there is no such value of that type, because the plan was edited.
@@ -123,7 +133,10 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
             raise DatasetError(path, f"is not of this version of gear ({problem}); collect the split again") from error
 
     def verify(self) -> list[str]:
-        """Relative paths of files that are missing or do not match the manifest; `gear.verify` checks more."""
+        """The relative paths of files that are missing or do not match the hashes in the manifest.
+
+        `gear.verify` checks more, such as the plan, the manifest itself and unexpected files.
+        """
         wanted: dict[str, str] = {**self.manifest["indexes"], **self.manifest.get("sidecars", {})}
         for sample in self.manifest["samples"]:
             wanted.update(sample["files"])
@@ -140,7 +153,7 @@ def check_hash(root: Path, relative: str, digest: str) -> bytes:
     Args:
         root: root of the dataset.
         relative: path of the file relative to the root.
-        digest: SHA-256 of the file as it was written.
+        digest: SHA-256 of the file when it was written.
 
     Raises:
         DamagedError: the file is missing, or has other bytes.
@@ -156,11 +169,11 @@ def check_hash(root: Path, relative: str, digest: str) -> bytes:
 
 
 def read_manifest(root: Path, plan: Plan) -> Json:
-    """The manifest of a finished split.
+    """Reads the manifest of a finished split.
 
     Raises:
-        DatasetError: the split is not finished (it has no manifest, or more samples than that lists), or the manifest
-            is damaged or lists no files.
+        DatasetError: the split is not finished (it has no manifest, or more samples than the manifest lists), or the
+            manifest is damaged or lists no files.
     """
     split = plan.info.split
     path = inside(root, manifest_path(split))
@@ -197,14 +210,19 @@ def _holds_more(root: Path, split: str, count: int) -> bool:
 
 
 def scenes_of(dataset: Dataset[Any]) -> tuple[str, int]:
-    """What decides which scenes a dataset shows, independent of their rendering: `town/scene` and the seed."""
+    """A key that is equal for datasets with the same scenes, independent of their rendering: (`town/scene`, seed)."""
     info = dataset.plan.info
     return f"{info.town}/{info.scene}", info.seed
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Twins(Sequence[tuple[SampleT, SampleT]], Generic[SampleT]):
-    """Two splits that differ only in their patch, as a sequence of pairs of samples."""
+    """Two splits that differ only in their patch (twins), as a sequence of pairs of samples.
+
+    Attributes:
+        first: the split that provides the first sample of each pair.
+        second: the split that provides the second sample of each pair.
+    """
 
     first: Dataset[SampleT]
     second: Dataset[SampleT]
@@ -236,7 +254,7 @@ class Twins(Sequence[tuple[SampleT, SampleT]], Generic[SampleT]):
 
 
 def pair_twins(first: Dataset[Sample], second: Dataset[Sample]) -> Twins[Sample]:
-    """Pairs two splits by index.
+    """Pairs the samples of two splits that differ only in their patch, by index.
 
     Raises:
         DatasetError: the splits differ in more than their patch.

@@ -1,9 +1,9 @@
-"""Temporary files: their folder, the locks of their writers, and the removal of those that killed runs left.
+"""Temporary files: their folder, the locks of their writers, and the removal of files that killed runs left.
 
-A file is written in `gear/scratch` under a unique name, and then renamed. Meanwhile its writer holds a lock on it. The
-system releases the lock when a process is killed, also in another container and, on most network file systems, on
-another machine. If a file is removed while it is written, its writer fails to rename it and writes it again, so that no
-data are lost.
+A file is written in `gear/scratch` under a unique name and renamed when it is complete. While a process writes the
+file, it holds a lock on it. The system releases the lock when the process is killed, also in another container and, on
+most network file systems, on another machine. If a file is removed while it is written, the writer cannot rename it and
+writes it again, so no data are lost.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ if sys.platform != "win32":
     import fcntl
 
 SCRATCH = "gear/scratch"
-"""Folder of temporary files, outside the folders that loaders of a format list."""
+"""Folder of temporary files; other programs that read the dataset's format do not search it."""
 
 SUFFIX = ".part"
-"""Suffix of files whose writers hold a lock; earlier versions of gear held none."""
+"""Suffix of temporary files whose writers hold a lock; earlier versions of gear used neither suffix nor lock."""
 
 OLD_S = 3600.0
-"""Seconds since the last write after which a file counts as abandoned, if neither a lock nor a process number shows
-whether its writer lives.
+"""Seconds since the last write after which a temporary file counts as abandoned, if neither a lock nor a process number
+shows whether its writer is alive.
 """
 
 NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -39,7 +39,9 @@ NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
 @contextlib.contextmanager
 def half_written(folder: int, data: bytes) -> Iterator[str]:
-    """Writes and syncs a new file in an open folder, and yields its name; removes it unless it is renamed.
+    """A context that writes and syncs a temporary file in an open folder, and yields its name.
+
+    The caller renames the file inside the context. If an error is raised, the file is removed.
 
     Raises:
         OSError: a file cannot be written.
@@ -60,12 +62,12 @@ def half_written(folder: int, data: bytes) -> Iterator[str]:
 
 
 def clear_scratch(root: Path) -> None:
-    """Removes the temporary files of killed runs, and the folder `gear` if it is empty.
+    """Removes the temporary files of killed runs, and the folders `gear/scratch` and `gear` if they are empty.
 
     Files that other runs or threads are writing are kept.
 
     Raises:
-        DatasetError: the folder of half-written files, or `gear`, is a link.
+        DatasetError: the folder of temporary files, or `gear`, is a link.
     """
     with contextlib.suppress(OSError), opened_parent(root, f"{SCRATCH}/x") as (folder, _):
         for name in os.listdir(folder):  # noqa: PTH208 (a folder descriptor)
@@ -100,8 +102,11 @@ def _is_abandoned(folder: int, name: str) -> bool:
 
 
 def lock_of(descriptor: int) -> bool | None:
-    """Tries to lock an open file: False if another process or thread holds the lock, None if the file system has no
-    locks.
+    """Tries to lock an open file, without waiting.
+
+    Returns:
+        True if the file is locked now; False if another process or thread holds the lock; None if the file system has
+        no locks.
     """
     if sys.platform == "win32":
         return None
@@ -115,8 +120,10 @@ def lock_of(descriptor: int) -> bool | None:
 
 
 def is_alive(name: str) -> bool | None:
-    """Whether the process that a file is named after is running and not the current one; None if this machine cannot
-    know.
+    """Whether the process whose number is part of a temporary file's name is still running.
+
+    Returns:
+        False for the current process as well; None if the name has no process number or is of another machine.
     """
     host, _, number = name.rpartition("-")[0].rpartition("-")
     if not number.isdecimal():
@@ -135,7 +142,9 @@ def is_alive(name: str) -> bool | None:
 
 
 def unique_name() -> str:
-    """A name that nobody else uses, from which `is_alive` knows the machine and the process."""
+    """A unique name for a temporary file that contains the machine and the process number, from which `is_alive`
+    reads them.
+    """
     return f"{_host()}-{os.getpid()}-{secrets.token_hex(8)}"
 
 

@@ -1,7 +1,7 @@
-"""JSON files that carry the SHA-256 of their own content, so that a single changed byte is noticed.
+"""JSON files with a seal: the SHA-256 of their own content, by which a single changed byte is detected.
 
-The last entry of a sealed file is `"sha256"`: the digest of the file as it would be without that entry. Files without a
-seal are accepted: earlier versions of gear wrote none, and other programs that rewrite a file drop its layout.
+The last entry of a sealed file is `"sha256"`: the hash of the file without that entry. Files without a seal are
+accepted, because earlier versions of gear wrote none, and other programs that rewrite a file change its layout.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ DIGITS = 64
 LENGTH = len(HEAD) + DIGITS + len(TAIL)
 
 MOST_CHANGED = 4
-"""Largest number of changed characters with which a seal is still recognised, as a damaged one."""
+"""Largest number of changed characters in the entry `sha256` of a file with which it still counts as a damaged seal."""
 
 REPAIR = "`gear verify DIR --repair` makes it again"
 
@@ -30,19 +30,19 @@ class DamagedError(DatasetError):
 
 
 def sealed_json(content: dict[str, Json]) -> bytes:
-    """The bytes of a JSON object with its seal."""
+    """Encodes a JSON object with a seal, the SHA-256 of its own content as last entry."""
     body = dump_json(content)
     return body[: -len(END)] + HEAD + hashlib.sha256(body).hexdigest().encode() + TAIL
 
 
 def load_sealed(path: Path) -> Json:
-    """Reads a sidecar, a plan or a manifest, and checks its seal if it has one.
+    """Reads a JSON file of gear (sidecar, plan or manifest), and checks the SHA-256 in it if it has one.
 
     Returns:
-        The content without the seal.
+        The content without the entry `sha256`.
 
     Raises:
-        DamagedError: it does not match its seal, or is no JSON.
+        DamagedError: the content does not match its SHA-256, or is not JSON.
         DatasetError: the file cannot be read.
     """
     data = read_bytes(path)
@@ -59,7 +59,9 @@ def load_sealed(path: Path) -> Json:
 
 
 def is_whole(data: bytes) -> bool:
-    """Whether a file matches its seal; true of files that have none."""
+    """Whether the bytes of a JSON file match the SHA-256 in its last entry; also True for files without such an
+    entry.
+    """
     if is_sealed(data):
         body = data[:-LENGTH] + END
         return data[-LENGTH:] == HEAD + hashlib.sha256(body).hexdigest().encode() + TAIL
@@ -67,7 +69,7 @@ def is_whole(data: bytes) -> bool:
 
 
 def is_sealed(data: bytes) -> bool:
-    """Whether a file ends with a seal, perhaps a damaged one."""
+    """Whether the bytes of a JSON file end with an entry `sha256`, possibly a damaged one."""
     seal = data[-LENGTH:]
     frame, wanted = seal[: len(HEAD)] + seal[-len(TAIL) :], HEAD + TAIL
     if len(seal) < LENGTH:

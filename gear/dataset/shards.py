@@ -12,12 +12,12 @@ _WRITTEN = re.compile(r"([0-9]{1,9})/([0-9]{1,9})")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shard:
-    """One part of a split: every `count`-th sequence of it.
+    """One part of a split: every `count`-th driving sequence.
 
-    Sequences are dealt out in turn, so that a sequence stays in its shard when the split is extended.
+    Sequences are assigned to the shards in turn, so a sequence stays in its shard when the split is extended.
 
     Attributes:
-        number: of this shard, from 1 to `count`.
+        number: number of this shard, from 1 to `count`.
         count: number of shards.
     """
 
@@ -26,7 +26,7 @@ class Shard:
 
     @classmethod
     def parse(cls, text: str) -> Shard:
-        """A shard from `I/N`.
+        """Parses a shard from a text such as `2/8`, the second of eight shards.
 
         Raises:
             GearError: the text is not `I/N` with 1 ≤ I ≤ N.
@@ -42,7 +42,7 @@ class Shard:
         return f"{self.number}/{self.count}"
 
     def holds(self, sequence: int) -> bool:
-        """Whether a sequence, counted from 0, is part of this shard."""
+        """Whether the shard contains a driving sequence, given by its number from 0."""
         return sequence % self.count == self.number - 1
 
 

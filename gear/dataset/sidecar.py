@@ -1,4 +1,4 @@
-"""Sidecars as JSON text."""
+"""Encodes and reads sidecars, the JSON files with scene, surfaces and file hashes of each sample."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from gear.values.serial import from_json, to_json
 
 
 def sidecar_bytes(sidecar: Sidecar) -> bytes:
-    """The bytes of a sidecar. Auxiliary files have an entry only if the sample has any."""
+    """Encodes a sidecar as JSON with a hash of its own content; `auxiliary` is left out if the sample has no
+    additional files.
+    """
     content = {
         "record": to_json(sidecar.record),
         "surfaces": to_json(sidecar.surfaces),
@@ -27,7 +29,7 @@ def sidecar_bytes(sidecar: Sidecar) -> bytes:
 
 
 def read_sidecar(path: Path) -> Sidecar:
-    """Reads a sidecar back.
+    """Reads a sidecar, the JSON file of one sample, and checks its values.
 
     Raises:
         DatasetError: the sidecar is missing, damaged, of another version of gear, or holds impossible values.
@@ -54,7 +56,7 @@ def read_sidecar(path: Path) -> Sidecar:
 
 
 def no_sidecar(path: Path, error: Exception) -> DatasetError:
-    """The error for a sidecar that cannot be read."""
+    """Makes the error for a sidecar (the JSON file of a sample) that cannot be read."""
     said = f"{error} is missing" if isinstance(error, KeyError) else str(error)
     remedy = "delete it and run the same collection again"
     return DatasetError(path, f"is not a sidecar of this version of gear ({said}); {remedy}")

@@ -1,7 +1,7 @@
-"""Checks of a sidecar's values beyond their types.
+"""Checks the values of a sidecar (the JSON file of a sample) beyond their types.
 
 Files on disk may be damaged, edited or written by other programs. Impossible values, such as a picture without width or
-an outline of two corners, are refused here with the name of the file, so that later code does not fail on them.
+a quaternion whose length is not 1, are refused here, so that later code does not fail on them.
 """
 
 from __future__ import annotations
@@ -17,19 +17,23 @@ from gear.values.serial import Json
 
 MOST_SIDE_PX = 8192
 LARGEST = 1e12
-"""Largest accepted number, far above all metres, pixels, degrees and seconds in scenes; its cube is still finite."""
+"""Largest accepted number, far above all metres, pixels, degrees and seconds in scenes."""
 
 SEED = "seed"
-"""Key of the only number without an upper limit."""
+"""Key of the seed, the only number in a sidecar without an upper limit."""
 
 QUATERNION_TOLERANCE = 1e-3
 
 
 def check_numbers(content: Json, name: str) -> None:
-    """Checks the size of every number in a sidecar's record or surfaces.
+    """Checks that no number in a sidecar's record or surfaces is larger than `LARGEST`.
+
+    Args:
+        content: the JSON value that is checked.
+        name: name of the value in the error, such as `record`.
 
     Raises:
-        FieldError: a number is larger than `LARGEST`; names its place.
+        FieldError: a number is too large; the error names its key path.
     """
     where = _absurd(content)
     if where is not None:
@@ -37,10 +41,12 @@ def check_numbers(content: Json, name: str) -> None:
 
 
 def check_sidecar(sidecar: Sidecar) -> None:
-    """Checks the record and the surfaces of a sidecar. Its facts are checked by the task that wrote them.
+    """Checks the scene record and the surfaces of a sidecar for impossible values.
+
+    The task's own metadata (`facts`) are not checked here, but by the task when it reads them.
 
     Raises:
-        FieldError: a value is impossible; names its place.
+        FieldError: a value is impossible; the error names its key path.
     """
     record = sidecar.record
     _check_record(record)

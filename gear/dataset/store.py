@@ -1,4 +1,4 @@
-"""Writes a split: finds the missing samples, writes the files of a sample, and closes the split."""
+"""Writes a split: finds the missing samples, writes the files of samples, and finishes the split with its manifest."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ from gear.values.serial import Json
 
 
 def check_output(root: Path, instead: str) -> None:
-    """Checks the folder that a command is to write results into, before anything in it changes.
+    """Checks that a folder for results is not a dataset and contains no link, before a command writes into it.
 
     Args:
         root: the folder; it may be missing.
-        instead: what to do when it is a dataset, for the message.
+        instead: advice for the message if the folder is a dataset.
 
     Raises:
         DatasetError: the folder is a dataset, or there is a link in it.
@@ -54,22 +54,30 @@ def check_output(root: Path, instead: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """A split that is being collected."""
+    """A split that is being collected: its files on disk and its plan.
+
+    Attributes:
+        root: folder of the dataset.
+        plan: everything that decides the bytes of the split.
+    """
 
     root: Path
     plan: Plan
 
     @property
     def split(self) -> str:
-        """Name of the split."""
+        """The name of the split."""
         return self.plan.info.split
 
     def open(self, patch_files: Mapping[str, bytes]) -> None:
         """Starts the split or continues it. A split without any sample is started anew.
 
+        Args:
+            patch_files: pictures of the patch to copy into the dataset, bytes by name.
+
         Raises:
-            DatasetError: it cannot be written, was made with another configuration, has a sidecar that is no longer
-                the one that was collected, or holds a link.
+            DatasetError: a file cannot be written, the split was made with another configuration, a sidecar was changed
+                since the split was finished, or the dataset contains a link.
         """
         refuse_links(self.root)
         clear_scratch(self.root)
@@ -125,15 +133,18 @@ class Store:
 
     @contextlib.contextmanager
     def begun(self, patch_files: Mapping[str, bytes], *, force: bool = False) -> Iterator[None]:
-        """`open`, for as long as a run writes samples. When a new split fails before its first sample, it is removed
-        again, so that it does not block the next run with another configuration; the notes on failed samples are kept.
+        """A context in which a run writes samples of the split; it opens the split and locks its folder.
+
+        If a new split fails before its first sample, the split is removed, so it does not block the next run with
+        another configuration. The notes on failed samples are kept.
 
         Args:
-            patch_files: as of `open`.
-            force: whether an existing split is removed first, unless another split refuses the new one.
+            patch_files: pictures of the patch to copy into the dataset, bytes by name.
+            force: whether an existing split is removed first.
 
         Raises:
-            DatasetError: as `open`, or another run is writing the split that would have to be removed.
+            DatasetError: a file cannot be written, the split was made with another configuration or was changed, or
+                another run is writing the split that would have to be removed.
         """
         refuse_links(self.root)
         was_there = {folder for folder in self._folders() if folder.exists()}
@@ -172,24 +183,27 @@ class Store:
                         folder.rmdir()
 
     def indices(self, shard: Shard = WHOLE) -> list[int]:
-        """Indices of the samples of a shard, in order; all frames of a sequence are in the same shard."""
+        """The indices of a shard's samples, in order; all frames of a driving sequence are in the same shard."""
         frames = self.plan.frames_per_sequence
         return [index for index in range(self.plan.samples) if shard.holds(index // frames)]
 
     def missing(self, shard: Shard = WHOLE) -> list[int]:
-        """Indices of a shard's samples that have no sidecar; a sample that has one is complete."""
+        """The indices of a shard's samples that have no sidecar (JSON file of a sample); a sample with a sidecar
+        is complete.
+        """
         folder = inside(self.root, split_folder(self.split)) / "samples"
         there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
         return [index for index in self.indices(shard) if f"{index:06d}.json" not in there]
 
     def refuse_damaged(self, shard: Shard = WHOLE) -> None:
-        """Checks all files of a shard's samples that are there against the hashes in their sidecars.
+        """Checks all files of a shard's existing samples against the hashes in their sidecars (JSON files of the
+        samples).
 
-        A sample that lacks a file loses its sidecar, so that it is made again. A changed file is never overwritten
-        without being asked: somebody may have edited it.
+        If a file of a sample is missing, the sidecar is deleted, so the sample is made again. A changed file is not
+        overwritten, because the user may have edited it.
 
         Raises:
-            DamagedError: a file is not the one that was written.
+            DamagedError: a file has other bytes than those that were written.
         """
         missing = set(self.missing(shard))
         indices = [index for index in self.indices(shard) if index not in missing]
@@ -215,12 +229,12 @@ class Store:
     def write(
         self, sample: Sample, encoded: Encoded, auxiliary: Mapping[str, tuple[Auxiliary, bytes]] | None = None
     ) -> None:
-        """Writes the files of one sample, then its sidecar.
+        """Writes the files of one sample, and last its sidecar (JSON file), which marks the sample as complete.
 
         Args:
-            sample: the sample.
-            encoded: its files and facts, from its task.
-            auxiliary: further files of the sample, such as probes, with their bytes, by name.
+            sample: the sample with its scene record and surfaces.
+            encoded: the files and metadata that the task made from the sample.
+            auxiliary: additional files of the sample, such as probes, with their bytes, by name.
 
         Raises:
             DatasetError: a file cannot be written.
@@ -250,13 +264,13 @@ class Store:
         return {"patches": {_relative(self.root, path): sha256(read_bytes(path)) for path in paths}} if paths else {}
 
     def close(self, task: Task[Any, Any], facts: Mapping[str, Json]) -> None:
-        """Writes the index files of the format, then the manifest, then the dataset's card.
+        """Writes the index files of the format, the manifest and the dataset card, in this order.
 
-        Does nothing when a run with more samples has started meanwhile: that run closes the split.
+        Nothing is written if another run has meanwhile started to extend the split; that run writes these files.
 
         Args:
             task: the task, which makes the index files.
-            facts: entries of the manifest on versions, renderer and configuration.
+            facts: metadata for the manifest, such as versions, renderer and configuration.
 
         Raises:
             DatasetError: a file cannot be written, or a sample is missing.
@@ -352,16 +366,17 @@ def _remove_idle(root: Path, split: str) -> None:
 
 
 def remove_split(root: Path, split: str) -> None:
-    """Deletes what gear wrote for a split, and nothing else: the files that its sidecars, its manifest and the notes of
-    what was being written name, and the copy of its patches, unless another split shows them. The dataset's card is
-    written anew.
+    """Deletes the files that gear wrote for a split, and no other files; the dataset card is written anew.
 
-    All paths are checked before the first file is deleted. A sample's sidecar is deleted before its files, so that no
-    sample without its files is taken for whole when the deletion is interrupted. The files of a sample whose sidecar is
-    missing or damaged are those that the manifest names.
+    Deleted are the files that the sidecars, the manifest and the lists of unfinished files name. The copy of the patch
+    is deleted if no other split shows it.
+
+    All paths are checked before the first file is deleted. A sample's sidecar is deleted before its files, so a sample
+    without its files never counts as complete if the deletion is interrupted. For a sample whose sidecar is missing or
+    damaged, the manifest names the files.
 
     Raises:
-        DatasetError: a file cannot be deleted, its path leaves the root or leads through a link; or the split is a copy
+        DatasetError: a file cannot be deleted; its path leaves the root or leads through a link; or the split is a copy
             of another one, whose files it names.
     """
     folder = owned(root, split_folder(split))
@@ -432,7 +447,7 @@ def _patch_label(root: Path, split: str) -> str:
 
 
 def splits_of(root: Path) -> Sequence[str]:
-    """Names of the splits of a dataset, finished or not.
+    """The names of a dataset's splits, finished or not, sorted.
 
     Raises:
         DatasetError: the folder is not a dataset.
@@ -445,7 +460,7 @@ def splits_of(root: Path) -> Sequence[str]:
 
 
 def plan_of(root: Path, split: str) -> Plan:
-    """The plan of one split, for reading it.
+    """Reads the plan of a split that must exist.
 
     Raises:
         DatasetError: there is no such split, or its plan cannot be read.

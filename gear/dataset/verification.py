@@ -1,7 +1,8 @@
 """Checks that every file of a dataset exists and has the bytes that gear wrote.
 
-Every byte is covered: pictures, labels and probes by the hashes in their sample's sidecar; sidecars, indexes and
-patches by those in the manifest; sidecars, manifest and plan by their own seals (`gear.dataset.sealed_json`).
+Every byte is covered by a hash. The sidecar of a sample holds the hashes of its pictures, labels and probes. The
+manifest holds the hashes of sidecars, index files and patches. Sidecars, manifest and plan also contain a hash of their
+own content (`gear.dataset.sealed_json`).
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class Finding:
     """One file that is damaged, missing or unexpected.
 
     Attributes:
-        path: relative to the dataset's root.
+        path: path relative to the dataset's root.
         problem: `damaged` if the bytes are not those that were written; `missing`; or `unexpected` for a file that does
             not belong to the dataset, in a folder that readers of the format list.
         detail: further explanation as text.
@@ -41,7 +42,7 @@ class Finding:
     detail: str = ""
 
     def line(self) -> str:
-        """The finding as one line of text."""
+        """The problem, the path and the explanation as one line of text."""
         return f"{self.problem:<10} {self.path}" + f" ({self.detail})" * bool(self.detail)
 
 
@@ -53,10 +54,10 @@ class SplitCheck:
         split: name of the split.
         plan: plan of the split; None if it is missing or damaged.
         manifest: manifest of the split; None if it is missing or damaged.
-        samples: number of samples that it should hold.
-        broken_samples: indices of samples of which a file or the sidecar is missing or damaged.
+        samples: number of samples that the split should hold.
+        broken_samples: indices of samples with a missing or damaged file or sidecar.
         known: paths of all files that belong to the split.
-        findings: files that are damaged, missing or unexpected.
+        findings: files of the split that are damaged or missing.
     """
 
     split: str
@@ -68,12 +69,13 @@ class SplitCheck:
     findings: list[Finding] = field(default_factory=list)
 
     def found(self, path: str, problem: Problem, detail: str = "") -> None:
-        """Adds a finding."""
+        """Adds a file that is damaged, missing or unexpected to the result."""
         self.findings.append(Finding(path=path, problem=problem, detail=detail))
 
 
 def splits_in(root: Path) -> list[str]:
-    """Names of the splits of a dataset, also of those whose plan is missing.
+    """The names of a dataset's splits, sorted; a split whose plan is missing is included if it has samples or a
+    manifest.
 
     Raises:
         DatasetError: the folder has no split.
@@ -90,11 +92,11 @@ def check_split(root: Path, split: str, on_progress: Progress | None = None) -> 
 
     Args:
         root: root of the dataset.
-        split: its name.
-        on_progress: called with (samples checked, samples) after every sample.
+        split: name of the split.
+        on_progress: called with (number of checked samples, total number of samples) after every sample.
 
     Raises:
-        DatasetError: a file cannot be read, lies outside the root, or the split is a copy of another one.
+        DatasetError: a file cannot be read, or lies outside the root.
     """
     check = SplitCheck(split=split)
     _check_plan(root, check)
@@ -111,10 +113,15 @@ def check_split(root: Path, split: str, on_progress: Progress | None = None) -> 
 
 
 def unexpected_files(root: Path, checks: Iterable[SplitCheck]) -> list[Finding]:
-    """Files that belong to no split, in folders with files of splits; hidden files are skipped.
+    """Finds files that belong to no split, in folders that contain files of splits; hidden files are skipped.
 
     Files in the root itself, and folders into which gear wrote nothing, belong to the user. If a manifest is missing or
-    damaged, the index files of its split are unknown, and only leftovers are reported.
+    damaged, the index files of its split are unknown. In this case only temporary files of interrupted runs are
+    reported.
+
+    Args:
+        root: root of the dataset.
+        checks: results of `check_split` for all splits.
     """
     checks = list(checks)
     known = {path for check in checks for path in check.known}

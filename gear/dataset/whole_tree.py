@@ -1,4 +1,4 @@
-"""Writes a new folder atomically: it is filled under a hidden name in the same parent folder, and then renamed."""
+"""Writes a new folder atomically: it is filled under a hidden name in the same parent folder and renamed at the end."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from gear.values.errors import DatasetError
 
 
 def check_target(target: Path, command: str) -> None:
-    """Checks that a folder is empty or new and can be replaced by a new one.
+    """Checks that a new folder can be created at a path; an empty folder may exist there.
 
     Args:
         target: absolute path of the folder.
-        command: the verb in the message, such as `export`.
+        command: verb for the message, such as `export`.
 
     Raises:
         DatasetError: the folder is not empty, is a mount point, or is the current folder.
@@ -31,10 +31,14 @@ def check_target(target: Path, command: str) -> None:
 
 
 def unfinished_place(target: Path, command: str) -> Path:
-    """Path of the hidden folder, next to `target`, that is filled first; checked for links.
+    """The path of the hidden folder next to `target` that is filled first.
+
+    Args:
+        target: absolute path of the new folder.
+        command: name of the command, which is part of the hidden folder's name.
 
     Raises:
-        DatasetError: it is a link, or holds one.
+        DatasetError: the hidden folder is a link, or contains one.
     """
     unfinished = owned(target.parent, f".{target.name}.gear-{command}")
     refuse_links(unfinished)
@@ -43,17 +47,20 @@ def unfinished_place(target: Path, command: str) -> Path:
 
 @contextlib.contextmanager
 def whole_tree(target: Path, command: str, *, is_kept: bool = False) -> Iterator[Path]:
-    """Yields the hidden folder to fill, and renames it to `target` when the block ends without an error.
+    """A context that yields a hidden folder to fill, and renames it to `target` when the context ends without an
+    error.
 
-    After an error the hidden folder is deleted. After the process was killed it stays, for the same command to use.
+    After an error the hidden folder is deleted. If the process is killed, the hidden folder remains, and the same
+    command can continue with it.
 
     Args:
-        target: as of `check_target`.
-        command: as of `check_target`.
-        is_kept: whether the hidden folder also stays after Ctrl-C.
+        target: absolute path of the new folder; it must be empty or missing.
+        command: name of the command, such as `export`, for messages and for the hidden folder's name.
+        is_kept: whether the hidden folder also remains after Ctrl-C.
 
     Raises:
-        DatasetError: as `check_target` and `unfinished_place`, another run is filling it, or a file cannot be written.
+        DatasetError: the target is not empty or cannot be replaced, the hidden folder contains a link or is used by
+            another run, or a file cannot be written.
     """
     check_target(target, command)
     unfinished = unfinished_place(target, command)

@@ -1,1 +1,1 @@
-"""Executors, which run the items of a job. Each engine is one module that implements `Executor`."""
+"""Executors, which make the samples of a job. Each engine is one module with a class that implements `Executor`."""

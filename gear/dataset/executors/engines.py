@@ -1,4 +1,4 @@
-"""The installed engines: every other module of this folder is one, and is called by its name."""
+"""Lists and opens the engines, which make the samples of a job; each engine is a module of this folder."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from gear.dataset import executors
 from gear.values.errors import UnknownNameError
 
 NO_ENGINES = ("engines", "in_process", "parts")
-"""Modules of the room that are no engine."""
+"""Modules of this folder that are not engines."""
 
 DEFAULT = "processes"
 
 
 def engine_names() -> list[str]:
-    """Names of the engines, sorted."""
+    """The names of all engines (`processes`, `ray`, `slurm`), sorted."""
     return sorted(one.name for one in pkgutil.iter_modules(executors.__path__) if one.name not in NO_ENGINES)
 
 
 def open_engine(name: str, *, workers: int, backend: str, address: str | None = None) -> Executor:
-    """An engine by its name.
+    """Opens an engine by its name.
 
     Args:
-        name: of its module, which has a function `executor` with the other arguments.
-        workers: how many items it may make at a time.
-        backend: name of what may make a worker die or hang, for error messages.
-        address: of a cluster, for engines that use one.
+        name: name of the engine.
+        workers: number of workers that make items in parallel.
+        backend: name of the renderer, for messages about workers that died or hang.
+        address: address of a cluster, for engines that use one; None without a cluster.
 
     Raises:
         UnknownNameError: there is no such engine.

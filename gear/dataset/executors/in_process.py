@@ -1,4 +1,4 @@
-"""The engine that is the calling process itself."""
+"""The executor for a single worker: the calling process makes all items."""
 
 from __future__ import annotations
 
@@ -8,9 +8,15 @@ from gear.contracts.executors import Report, Work
 
 
 class InThisProcess:
-    """One worker, which is the calling process."""
+    """An executor without worker processes: the calling process makes all items."""
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """Makes all items in this process; see `Executor.run`."""
+        """Makes all items in this process.
+
+        Args:
+            work: function that makes items.
+            indices: indices of the items.
+            report: called with the outcome of each item.
+        """
         if indices:
             work(iter(indices), report)

@@ -1,4 +1,6 @@
-"""What engines of several machines have in common: the items go out in parts, and the outcomes of a part come back."""
+"""Functions that the engines for several machines share: splitting items into parts, making a part, reporting its
+outcomes.
+"""
 
 from __future__ import annotations
 
@@ -8,23 +10,23 @@ from gear.contracts.executors import Outcome, Report, Work
 from gear.values.errors import GearError
 
 LARGEST = 64
-"""Items of a part at most: a part opens its world and renderer once, and its progress is reported when it ends."""
+"""Largest number of items in a part. Each part opens one world and renderer, and reports its progress when it ends."""
 
 PARTS_PER_WORKER = 4
-"""Parts for each worker at least, so that the last worker does not work alone for long."""
+"""Smallest number of parts per worker, if there are enough items, so that all workers end at about the same time."""
 
 
 def split_in_parts(indices: Sequence[int], workers: int) -> list[list[int]]:
-    """Splits items into parts of neighbours, so that frames of one sequence are mostly in the same part."""
+    """Splits items into parts of consecutive indices, so most frames of a sequence are in the same part."""
     size = max(1, min(LARGEST, len(indices) // (workers * PARTS_PER_WORKER)))
     return [list(indices[start : start + size]) for start in range(0, len(indices), size)]
 
 
 def run_part(work: Work, indices: Sequence[int]) -> list[Outcome] | str:
-    """Makes one part; runs on the worker's machine.
+    """Makes the items of one part; runs on the worker's machine.
 
     Returns:
-        The outcomes, or the text of an error that is not about a single item.
+        One outcome per item, or the text of an error that does not concern a single item.
     """
     outcomes: list[Outcome] = []
     try:
@@ -35,13 +37,17 @@ def run_part(work: Work, indices: Sequence[int]) -> list[Outcome] | str:
 
 
 def report_part(result: list[Outcome] | str, report: Report) -> bool:
-    """Reports the outcomes of a part.
+    """Reports the outcomes of one part.
+
+    Args:
+        result: outcomes of the items, or the text of an error that does not concern a single item.
+        report: called with each outcome.
 
     Returns:
-        Whether any item of the part was made, here or elsewhere.
+        Whether at least one item was made, by this run or another one.
 
     Raises:
-        GearError: the part ended with an error that is not about a single item.
+        GearError: the part ended with an error that does not concern a single item.
     """
     if isinstance(result, str):
         raise GearError(result)
@@ -51,6 +57,6 @@ def report_part(result: list[Outcome] | str, report: Report) -> bool:
 
 
 def report_lost(indices: Sequence[int], problem: str, report: Report) -> None:
-    """Reports the items of a part as failed, whose worker was lost."""
+    """Reports all items of a part as failed because its worker was lost."""
     for index in indices:
         report(Outcome(index=index, kind="failed", error=problem))

@@ -1,7 +1,7 @@
-"""The engine `processes`: spawned processes on this machine, each of which asks for one item after another.
+"""The engine `processes`: several processes on this machine, each of which requests one item after another.
 
-Every worker has a pipe of its own. A queue or counter that all workers share would be left locked when one of them is
-killed at the wrong moment, and the others would wait for ever.
+Each worker has its own pipe. A queue or counter shared by all workers could stay locked if one worker is killed, and
+the other workers would wait for ever.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from gear.values.errors import BackendError, GearError
 from gear.values.machine import cores
 
 SILENCE_S = 600.0
-"""Seconds without a finished item after which a worker is considered hung: graphics drivers do hang, and the slowest
-machines need less than a minute per item."""
+"""Seconds without a message after which a worker counts as hung. Graphics drivers can hang, and even slow machines need
+less than a minute per item."""
 
 INTERRUPTED = 130
-"""Exit code of a worker that was interrupted before it had finished its item."""
+"""Exit code of a worker process that was interrupted by Ctrl-C."""
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "LP_NUM_THREADS")
-"""Environment variables by which torch, NumPy and Mesa's software rasteriser choose their number of threads. Without
-them every worker starts one for each core, and the workers wait for each other."""
+"""Environment variables that set the number of threads of torch, NumPy and Mesa's software rasteriser. Without them,
+every worker would start one thread per core, and the workers would slow each other down."""
 
 AGAIN = "run the same command again: finished samples are kept"
 
@@ -63,20 +63,24 @@ class Processes:
     """Several worker processes on this machine.
 
     Attributes:
-        workers: their number.
-        backend: name of what may make a worker die or hang, such as a renderer; errors name it.
+        workers: number of worker processes.
+        backend: name of the renderer, for messages about workers that died or hang.
     """
 
     workers: int
     backend: str
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """Makes all items; see `Executor.run`. A worker that dies or hangs is replaced, and its items are reported as
-        failed.
+        """Makes all items. A worker that dies or hangs is replaced, and its items are reported as failed.
+
+        Args:
+            work: function that makes items in a worker process.
+            indices: indices of the items.
+            report: called in this process with the outcome of each item.
 
         Raises:
-            GearError: the first one that a worker reports.
-            BackendError: a worker died or hung before its first item, or was interrupted.
+            GearError: the first error of a worker that does not concern a single item.
+            BackendError: a worker died or hung before it took an item, or was interrupted.
         """
         count = min(self.workers, len(indices))
         pool = _Pool(backend=self.backend, work=work, pending=deque(indices), report=report, count=count)
@@ -89,7 +93,7 @@ class Processes:
 
 
 def executor(*, workers: int, backend: str, address: str | None = None) -> Executor:
-    """The engine, as `open_engine` asks for it.
+    """Opens the engine `processes`; `address` must be None, because this engine uses no cluster.
 
     Raises:
         GearError: an address is given.

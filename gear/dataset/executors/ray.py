@@ -1,4 +1,7 @@
-"""The engine `ray`: tasks on a Ray cluster whose machines share the disk of the dataset. Needs `mujoco-gear[ray]`."""
+"""The engine `ray`: makes samples on a Ray cluster whose machines share the disk of the dataset.
+
+It needs the extra `mujoco-gear[ray]`.
+"""
 
 from __future__ import annotations
 
@@ -13,30 +16,36 @@ from gear.dataset.executors.parts import report_lost, report_part, run_part, spl
 from gear.values.errors import GearError
 
 RETRIES = 5
-"""How often Ray starts a part again whose worker or machine was lost."""
+"""Number of times that Ray restarts a part after its worker or machine was lost."""
 
 
 ANSWER_S = 10.0
-"""Seconds in which a cluster must answer."""
+"""Seconds within which the cluster must accept a connection."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OnRay:
-    """Tasks on a Ray cluster.
+    """An executor that makes parts of the items as tasks on a Ray cluster.
 
     Attributes:
-        workers: number of parts that are made at a time; each takes one core of the cluster.
-        address: of the cluster; None for one that is started on this machine.
+        workers: number of parts that are made in parallel; each takes one core of the cluster.
+        address: address of the cluster; None starts a local cluster on this machine.
     """
 
     workers: int
     address: str | None = None
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """As `Executor.run`. Parts of lost machines start again elsewhere.
+        """Makes all items. The parts of lost machines start again on other machines.
+
+        Args:
+            work: function that makes items on the cluster.
+            indices: indices of the items.
+            report: called in this process with the outcome of each item.
 
         Raises:
-            GearError: the first one of a part, or there is no cluster at the address.
+            GearError: a part ended with an error that does not concern a single item, or there is no cluster at the
+                address.
         """
         if not indices:
             return
@@ -104,7 +113,7 @@ class OnRay:
 
 
 def executor(*, workers: int, backend: str, address: str | None = None) -> Executor:
-    """The engine, as `open_engine` asks for it.
+    """Opens the engine `ray`; `backend` is not used.
 
     Raises:
         GearError: Ray is not installed.

@@ -1,6 +1,7 @@
-"""The engine `slurm`: jobs of a SLURM cluster, by submitit, whose machines share the disk of the dataset.
+"""The engine `slurm`: makes samples as jobs of a SLURM cluster whose machines share the disk of the dataset.
 
-A preempted job is simply run again: finished samples are kept. Needs `mujoco-gear[slurm]`.
+The package submitit submits the jobs. A preempted job runs again and keeps its finished samples. The engine needs the
+extra `mujoco-gear[slurm]`.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from gear.dataset.executors.parts import report_lost, report_part, run_part, spl
 from gear.values.errors import GearError
 
 LOGS = "gear-slurm"
-"""Folder of the jobs' logs, in the current one."""
+"""Folder of the jobs' logs, in the current folder."""
 
 LOCAL = ("local", "debug")
-"""Addresses that are submitit's own: processes of this machine, and this process."""
+"""Special addresses of submitit: jobs run in processes of this machine (`local`), or in this process (`debug`)."""
 
 POLL_S = 1.0
 TIMEOUT_MIN = 24 * 60
@@ -28,10 +29,10 @@ TIMEOUT_MIN = 24 * 60
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OnSlurm:
-    """Jobs of a SLURM cluster.
+    """An executor that makes parts of the items as jobs of a SLURM cluster.
 
     Attributes:
-        workers: number of jobs that run at a time.
+        workers: number of jobs that run in parallel.
         address: name of the partition; `local` and `debug` run the jobs on this machine; None for SLURM's default.
     """
 
@@ -39,10 +40,16 @@ class OnSlurm:
     address: str | None = None
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """As `Executor.run`.
+        """Makes all items; submits one job per part and waits for the end of all jobs.
+
+        Args:
+            work: function that makes items on the cluster.
+            indices: indices of the items.
+            report: called in this process with the outcome of each item.
 
         Raises:
-            GearError: the first one of a job, or SLURM is not installed here.
+            GearError: a job ended with an error that does not concern a single item, or SLURM is not installed on this
+                machine.
         """
         if not indices:
             return
@@ -89,7 +96,7 @@ class OnSlurm:
 
 
 def executor(*, workers: int, backend: str, address: str | None = None) -> Executor:
-    """The engine, as `open_engine` asks for it.
+    """Opens the engine `slurm`; `backend` is not used.
 
     Raises:
         GearError: submitit is not installed.
