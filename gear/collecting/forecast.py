@@ -22,8 +22,8 @@ LARGE_BYTES, LONG_S = 2 * 10**9, 1800.0
 
 
 class Forecast:
-    """Measures the first samples of a collection; stops a collection that does not fit on the disk, and announces
-    a large or long one.
+    """Measures the first samples of a collection; stops it if the disk is too small, and announces the size and
+    time of a large one.
     """
 
     def __init__(

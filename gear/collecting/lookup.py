@@ -134,9 +134,13 @@ def with_scene_file(config: CollectionConfig) -> CollectionConfig:
 
 
 def find_scenes(town: AssetLibrary, scenes: str = "") -> SceneFile:
-    """Reads the scene library of a town, or one given by name or path.
+    """Reads the scene library of a town, or the library with a given name or path.
 
     The scenes are checked one by one when they are requested, so an error in one scene does not affect the others.
+
+    Args:
+        town: assets of the town.
+        scenes: name or path of the library; empty for the town's own.
 
     Raises:
         UnknownNameError: there is no such library.

@@ -37,7 +37,7 @@ class CollectReport:
     shard: str | None = None
 
     def summary(self) -> str:
-        """The result in one line."""
+        """The dataset's folder and the number of samples, as one line of text."""
         kept = self.samples - self.made
         resumed = f" ({kept} were there already)" if kept else ""
         if self.shard is None:

@@ -31,8 +31,9 @@ OPENING = os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 class Claims:
-    """The claims that one worker holds on samples of a split; as a context manager it releases all of them at the
-    end.
+    """The claims of one worker: locked files, each of which reserves one sample of a split for the worker's run.
+
+    As a context manager it releases all claims at the end.
     """
 
     def __init__(self, root: Path, split: str) -> None:
@@ -54,7 +55,7 @@ class Claims:
         """Claims a sample; returns False if another run has claimed it.
 
         Raises:
-            DatasetError: the disk refuses, or there is a link in the claim's path.
+            DatasetError: the claim's file cannot be written, or there is a link in its path.
         """
         relative = claim_path(self._split, index)
         with explained(self._root / relative):

@@ -104,7 +104,9 @@ def _digest(value: Json) -> str:
 
 
 def refuse_copy(root: Path, split: str) -> None:
-    """Refuses a split whose folder was copied or renamed, because it names the files of the original split.
+    """Refuses a split whose folder was copied or renamed.
+
+    The plan and the sidecars of such a split name the files of the original split.
 
     Raises:
         DatasetError: the plan is that of another split.
@@ -125,7 +127,7 @@ def _refuse_copy(root: Path, split: str, there: Json) -> None:
 
 
 def read_plan(root: Path, split: str) -> Plan | None:
-    """Reads the plan of a split; None if there is no such split.
+    """Reads the plan of a split (everything that decides its bytes); None if there is no such split.
 
     Raises:
         ReplaceableError: the plan was written by another version of gear.
@@ -190,7 +192,8 @@ def refuse_other_tasks(root: Path, plan: Plan, *, besides: str = "") -> None:
 
 
 def begin(root: Path, plan: Plan) -> None:
-    """Writes the plan of a new split, or checks that an existing split can be continued with it.
+    """Writes the plan of a new split (everything that decides its bytes), or checks that an existing split can be
+    continued.
 
     An existing split can be continued if its plan is equal and has at most as many samples.
 
@@ -219,7 +222,7 @@ def begin(root: Path, plan: Plan) -> None:
 
 
 def write_plan(root: Path, plan: Plan) -> None:
-    """Writes the plan of a split, with a hash of its own content.
+    """Writes the plan of a split (everything that decides its bytes) as JSON with a hash of its own content.
 
     Raises:
         DatasetError: the file cannot be written.

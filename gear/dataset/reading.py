@@ -113,7 +113,7 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         return name
 
     def content(self, kind: type[T], *keys: str) -> T:
-        """One value in the `content` of the plan, which decides the pictures.
+        """One value in the `content` of the plan, the settings that decide the pictures.
 
         Args:
             kind: type of the value.
@@ -169,7 +169,7 @@ def check_hash(root: Path, relative: str, digest: str) -> bytes:
 
 
 def read_manifest(root: Path, plan: Plan) -> Json:
-    """Reads the manifest of a finished split.
+    """Reads the manifest of a finished split: JSON with metadata and the hashes of all files.
 
     Raises:
         DatasetError: the split is not finished (it has no manifest, or more samples than the manifest lists), or the

@@ -26,7 +26,7 @@ REPAIR = "`gear verify DIR --repair` makes it again"
 
 
 class DamagedError(DatasetError):
-    """A file whose bytes are not those that gear wrote."""
+    """An error about a file whose bytes are not those that gear wrote."""
 
 
 def sealed_json(content: dict[str, Json]) -> bytes:

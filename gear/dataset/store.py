@@ -460,7 +460,7 @@ def splits_of(root: Path) -> Sequence[str]:
 
 
 def plan_of(root: Path, split: str) -> Plan:
-    """Reads the plan of a split that must exist.
+    """Reads the plan of a split (everything that decides its bytes); the split must exist.
 
     Raises:
         DatasetError: there is no such split, or its plan cannot be read.

@@ -45,7 +45,8 @@ RAMP = (0.01, 0.05, 0.2, 0.5, 0.8)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """The appearance of pictures: everything that decides how they look, apart from seeds and scenes.
+    """The appearance of a dataset's pictures: hashes and names of everything that decides it, apart from seeds and
+    scenes.
 
     Attributes:
         assets: sha256 of all assets that the pictures of a town can show, by name of the town.

@@ -41,6 +41,13 @@ class Calibration:
     def fit(self, defense: Chosen, product: Defense, model: Model, cameras: Sequence[str], seed: int) -> Any:
         """Calibrates a defense for one model and returns the defense's state; None without calibration data.
 
+        Args:
+            defense: plugin of the defense with its options.
+            product: the built defense.
+            model: the model without the defense.
+            cameras: names of the cameras whose pictures the model uses.
+            seed: seed of the defense's random draws.
+
         Raises:
             GearError: the data do not fit the defense, or code of another package fails.
         """
@@ -108,11 +115,11 @@ def opened_calibration(
     flag: str = "--set ",
     on_fit_progress: Progress | None = None,
 ) -> Calibration:
-    """Opens the calibration data and checks them.
+    """Opens the calibration data of a defense and checks them.
 
     Args:
         clean, patched: roots of the datasets without and with patches; None for no dataset.
-        models: models that the defense guards.
+        models: models that the defense protects.
         defense: name of the defense.
         flag: the command-line flag that sets options of the models, for error messages.
         on_fit_progress: called with (number of samples that the defense has read, total number of samples).

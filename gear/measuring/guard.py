@@ -35,7 +35,7 @@ class Guard:
         calibration: str | Path | None = None,
         calibration_patched: str | Path | None = None,
     ) -> Guard | None:
-        """Makes a guard from the arguments of a verb such as `evaluate`; None without a defense.
+        """Makes the request for a defense from the arguments of a verb such as `evaluate`; None without a defense.
 
         Raises:
             GearError: options or calibration data are given without a defense.
@@ -80,8 +80,8 @@ def open_guard(
     the task.
 
     Args:
-        guard: the request; None for no defense.
-        models: models that the defense guards, one after the other.
+        guard: the request for a defense; None for no defense.
+        models: models that the defense protects, one after the other.
         task: name of the dataset's task.
         flag: the command-line flag that sets options of the models, for error messages.
         on_fit_progress: called with (number of samples that the defense has read, total number of samples).

@@ -57,7 +57,7 @@ class Answer:
 
 
 class GuardedModel:
-    """A built model with its defense, which is calibrated if it needs calibration.
+    """A built model together with its defense, if there is one.
 
     Attributes:
         plugin: plugin of the model.

@@ -35,7 +35,7 @@ MOST_GROUPS = 500
 CONFIDENCE = 0.95
 
 REAL = (-math.inf, math.inf)
-"""Smallest and largest value of a metric without bounds."""
+"""Range (smallest value, largest value) of a metric without bounds."""
 
 NEGLIGIBLE = 1e-12
 """Largest relative difference between jackknife replicates that is attributed to rounding."""
@@ -114,12 +114,15 @@ def _students_t(degrees: float) -> float:
 def separated_interval(value: float, clusters: int) -> Interval:
     """The 95 % confidence interval of an area under the ROC curve that is exactly 0 or 1.
 
-    All jackknife replicates are equal in this case, so their spread cannot be used. The interval's end a solves |A - a|
-    = z sqrt(V(a)), where A is the area and V is Hanley and McNeil's variance with the number of clusters as both sample
-    sizes (Newcombe, Statistics in Medicine 2006, method 5).
+    All jackknife replicates are equal in this case, so their spread cannot be used. The end a of the interval solves
+
+        |A - a| = z sqrt(V(a))
+
+    where A is the area and V is Hanley and McNeil's variance with the number of clusters as both sample sizes
+    (Newcombe, Statistics in Medicine 2006, method 5).
 
     Args:
-        value: the area, 0 or 1.
+        value: the area A, 0 or 1.
         clusters: number of clusters of samples.
     """
     from scipy import optimize, stats

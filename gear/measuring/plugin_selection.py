@@ -26,7 +26,12 @@ OWN_PINHOLE = ("focal_px", "focal_y_px", "principal_px")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chosen:
-    """A plugin with the options with which it is built."""
+    """A plugin, such as a model, and the options with which it is built.
+
+    Attributes:
+        found: the plugin with its package and version.
+        options: the given options as a tree of texts, without defaults.
+    """
 
     found: PluginEntry
     options: Node

@@ -39,8 +39,8 @@ class Samples(Sequence[Any]):
         return shrunk(self.datasets[dataset][place], self.scale)
 
     def facts(self) -> list[Json]:
-        """Describes the sequence for the records of a training: one JSON entry per split, with scene, weather,
-        patch and number of samples.
+        """The metadata of the sequence for the record of a training: one JSON entry per split, with scene,
+        weather, patch and number of samples.
         """
         numbers = [dataset for dataset, _ in self.places]
         return [

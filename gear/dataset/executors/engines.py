@@ -21,13 +21,13 @@ def engine_names() -> list[str]:
 
 
 def open_engine(name: str, *, workers: int, backend: str, address: str | None = None) -> Executor:
-    """Opens an engine by its name.
+    """Opens an engine, which makes the samples of a job, by its name.
 
     Args:
-        name: name of the engine.
-        workers: number of workers that make items in parallel.
+        name: name of the engine, such as `processes`.
+        workers: number of workers that make samples in parallel.
         backend: name of the renderer, for messages about workers that died or hang.
-        address: address of a cluster, for engines that use one; None without a cluster.
+        address: address of a cluster, for engines that use a cluster; None otherwise.
 
     Raises:
         UnknownNameError: there is no such engine.

@@ -1,4 +1,4 @@
-"""The executor for a single worker: the calling process makes all items."""
+"""The executor for a single worker: the calling process makes all samples."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from gear.contracts.executors import Report, Work
 
 
 class InThisProcess:
-    """An executor without worker processes: the calling process makes all items."""
+    """An executor without worker processes: the calling process makes all items (samples of a split)."""
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """Makes all items in this process.
+        """Makes all items (samples of a split) in this process.
 
         Args:
             work: function that makes items.

@@ -1,5 +1,6 @@
-"""Functions that the engines for several machines share: splitting items into parts, making a part, reporting its
-outcomes.
+"""Functions that the engines for several machines share.
+
+They split the items (samples of a split) into parts, make one part, and report its outcomes.
 """
 
 from __future__ import annotations
@@ -17,13 +18,19 @@ PARTS_PER_WORKER = 4
 
 
 def split_in_parts(indices: Sequence[int], workers: int) -> list[list[int]]:
-    """Splits items into parts of consecutive indices, so most frames of a sequence are in the same part."""
+    """Splits items (samples of a split) into parts of consecutive indices, so most frames of a sequence are in the
+    same part.
+    """
     size = max(1, min(LARGEST, len(indices) // (workers * PARTS_PER_WORKER)))
     return [list(indices[start : start + size]) for start in range(0, len(indices), size)]
 
 
 def run_part(work: Work, indices: Sequence[int]) -> list[Outcome] | str:
-    """Makes the items of one part; runs on the worker's machine.
+    """Makes the items (samples of a split) of one part; runs on the worker's machine.
+
+    Args:
+        work: function that makes items.
+        indices: indices of the items of the part.
 
     Returns:
         One outcome per item, or the text of an error that does not concern a single item.
@@ -37,7 +44,7 @@ def run_part(work: Work, indices: Sequence[int]) -> list[Outcome] | str:
 
 
 def report_part(result: list[Outcome] | str, report: Report) -> bool:
-    """Reports the outcomes of one part.
+    """Reports the outcomes of the items (samples of a split) of one part.
 
     Args:
         result: outcomes of the items, or the text of an error that does not concern a single item.
@@ -57,6 +64,6 @@ def report_part(result: list[Outcome] | str, report: Report) -> bool:
 
 
 def report_lost(indices: Sequence[int], problem: str, report: Report) -> None:
-    """Reports all items of a part as failed because its worker was lost."""
+    """Reports all items (samples of a split) of a part as failed, because the worker that made them was lost."""
     for index in indices:
         report(Outcome(index=index, kind="failed", error=problem))

@@ -1,7 +1,8 @@
-"""The engine `processes`: several processes on this machine, each of which requests one item after another.
+"""The engine `processes`: several processes on this machine, each of which requests one item (sample) after
+another.
 
 Each worker has its own pipe. A queue or counter shared by all workers could stay locked if one worker is killed, and
-the other workers would wait for ever.
+the other workers would wait forever.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class _Worker:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Processes:
-    """Several worker processes on this machine.
+    """An executor with several worker processes on this machine.
 
     Attributes:
         workers: number of worker processes.
@@ -71,7 +72,8 @@ class Processes:
     backend: str
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """Makes all items. A worker that dies or hangs is replaced, and its items are reported as failed.
+        """Makes all items (samples of a split). A worker that dies or hangs is replaced, and its items are
+        reported as failed.
 
         Args:
             work: function that makes items in a worker process.

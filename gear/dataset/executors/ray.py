@@ -25,7 +25,7 @@ ANSWER_S = 10.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OnRay:
-    """An executor that makes parts of the items as tasks on a Ray cluster.
+    """An executor that makes parts of the items (samples of a split) as tasks on a Ray cluster.
 
     Attributes:
         workers: number of parts that are made in parallel; each takes one core of the cluster.
@@ -36,7 +36,7 @@ class OnRay:
     address: str | None = None
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """Makes all items. The parts of lost machines start again on other machines.
+        """Makes all items (samples of a split) in parts; parts of lost machines start again on other machines.
 
         Args:
             work: function that makes items on the cluster.
@@ -75,10 +75,10 @@ class OnRay:
             raise GearError(f"{where if self.address else 'Ray cannot start on this machine'} ({problem})") from error
 
     def _check_address(self) -> None:
-        """Checks that somebody answers at the address: Ray would wait for minutes.
+        """Checks that a server accepts connections at the address, because Ray would wait for minutes.
 
         Raises:
-            GearError: nobody does.
+            GearError: no server accepts a connection.
         """
         host, _, port = (self.address or "").removeprefix("ray://").rpartition(":")
         if not (host and port.isdecimal()):  # `auto` and the like

@@ -29,7 +29,7 @@ TIMEOUT_MIN = 24 * 60
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OnSlurm:
-    """An executor that makes parts of the items as jobs of a SLURM cluster.
+    """An executor that makes parts of the items (samples of a split) as jobs of a SLURM cluster.
 
     Attributes:
         workers: number of jobs that run in parallel.
@@ -40,7 +40,7 @@ class OnSlurm:
     address: str | None = None
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """Makes all items; submits one job per part and waits for the end of all jobs.
+        """Makes all items (samples of a split): submits one job per part and waits for all jobs to end.
 
         Args:
             work: function that makes items on the cluster.

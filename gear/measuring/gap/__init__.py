@@ -1,1 +1,3 @@
-"""Comparison of composed and rendered patches: as pictures, and by their effect on a model."""
+"""Compares patches pasted into clean pictures by a compositor with the same patches rendered: by pixels, and by
+their effect on a model.
+"""

@@ -1,4 +1,8 @@
-"""Measures how much a patch harms a model, on pictures with the patch composed and with the patch rendered."""
+"""Measures how much a patch harms a model.
+
+The model predicts on the clean pictures, on pictures with the patch composed (pasted into the clean picture by a
+compositor), and on pictures with the patch rendered.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The results of a comparison of composed and rendered patches, as JSON and as a table."""
+"""The results of a comparison of composed patches (pasted into clean pictures) and rendered patches, as JSON and
+as a table.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,7 @@ class SampleGap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GapReport:
-    """The comparison of composed and rendered patches on one split.
+    """The comparison of composed patches (pasted into clean pictures) and rendered patches on one split.
 
     Attributes:
         dataset, twin: roots of the clean dataset and of the same dataset rendered with the patch.

@@ -1,4 +1,6 @@
-"""The arguments of a comparison of composed and rendered patches, with their checks."""
+"""The arguments of a comparison of composed patches (pasted into clean pictures) and rendered patches, with their
+checks.
+"""
 
 from __future__ import annotations
 

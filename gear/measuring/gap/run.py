@@ -1,4 +1,4 @@
-"""Compares composed patches with the same patches rendered.
+"""Compares composed patches (pasted into clean pictures by a compositor) with the same patches rendered.
 
 The patches need not be adversarial, because the pictures themselves are compared. With a model, the task's metrics are
 also computed on the clean, the composed and the rendered pictures.
