@@ -16,7 +16,7 @@ from gear.values.regular_file import read_regular
 MAX_BYTES = 4 << 20
 
 MARKS = "'\"[{&*!|>"
-"""Characters with which a YAML value begins that is not a bare word."""
+"""First characters of YAML values that are not bare words, such as quoted texts, lists and mappings."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,7 +41,7 @@ NOTE = re.compile(
     rb"\n<!-- Written by gear; without this line gear leaves the file alone. sha256: ([0-9a-f]{64}) -->\n\Z"
 )
 MARK, END = b"<!-- Written by gear", re.compile(rb"sha256: [0-9a-f]{64} -->")
-"""Beginning and end of a card's last line. Either of them alone, if the other is damaged, shows that gear wrote it."""
+"""Beginning and end of gear's last line in `README.md`; either part alone shows that gear wrote the file."""
 
 
 def write_cards(root: Path, *, is_repair: bool = False) -> None:
@@ -99,9 +99,9 @@ def cards(root: Path) -> dict[str, bytes]:
 
 
 def damaged_cards(root: Path) -> dict[str, Literal["missing", "damaged"]]:
-    """The dataset card and `croissant.json` if one is `missing` or `damaged`, by path.
+    """The state of each description file (`README.md`, `croissant.json`) that is `missing` or `damaged`, by path.
 
-    Files of the user with these names are not reported.
+    Intact files, and files of the user with these names, are left out.
     """
     found: dict[str, Literal["missing", "damaged"]] = {}
     is_finished = any(True for _ in _finished(root))

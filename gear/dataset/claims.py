@@ -123,7 +123,7 @@ class Claims:
             report(Outcome(index=index, kind="elsewhere"))
 
     def is_taken(self, index: int) -> bool:
-        """Whether any worker holds the claim on a sample."""
+        """Whether a run holds the claim on a sample, which means that it is making the sample."""
         if not self.take(index):
             return True
         self.release(index)

@@ -72,7 +72,9 @@ class SidecarStream(Sequence[Sidecar]):
         return sidecar
 
     def facts(self) -> dict[str, Json]:
-        """The manifest's entries `samples` and `sidecars`; sidecars that were not read yet are read.
+        """The entries `samples` and `sidecars` of the split's manifest (JSON that lists all files of the split).
+
+        Sidecars that were not read yet are read.
 
         Raises:
             DatasetError: a sidecar is missing, damaged, or lacks a camera.

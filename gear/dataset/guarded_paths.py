@@ -2,10 +2,9 @@
 
 A folder may come from another person and contain links that lead elsewhere. Two checks protect files outside of it:
 
-1. `refuse_links` searches an output folder for links before a command changes anything in it.
-
-2. Every change opens the folders from the root to the file one after another, without following links (`O_NOFOLLOW`). A
-link that is made after the search is therefore refused as well.
+- `refuse_links` searches an output folder for links before a command changes anything in it.
+- Every change opens the folders from the root to the file one after another, without following links (`O_NOFOLLOW`). A
+  link that is made after the search is therefore refused as well.
 
 The root itself, and the folders above it, are the user's choice and may be links. The module needs a POSIX system.
 """
@@ -43,7 +42,7 @@ def inside(root: Path, relative: str) -> Path:
     """The path `root/relative` for reading; links are followed if they stay below the root.
 
     Raises:
-        DatasetError: the path leaves the root, as text or through a link.
+        DatasetError: the path is absolute, contains `..`, or leads out of the root through a link.
     """
     path = root.joinpath(*parts_of(root, relative))
     try:
@@ -59,7 +58,7 @@ def owned(root: Path, relative: str) -> Path:
     """The path `root/relative` for writing and deleting; no component below the root may be a link.
 
     Raises:
-        DatasetError: a component is a link, or the path leaves the root as text.
+        DatasetError: the path is absolute, contains `..`, or a component is a link.
     """
     path = root
     for part in parts_of(root, relative):
@@ -103,7 +102,7 @@ def opened_parent(root: Path, relative: str, *, make: bool = False) -> Iterator[
         make: whether missing folders below the root are created.
 
     Raises:
-        DatasetError: a component is a link, or the path leaves the root as text.
+        DatasetError: the path is absolute, contains `..`, or a component is a link.
         OSError: a folder is missing, is a file or cannot be opened.
     """
     *folders, name = parts_of(root, relative)

@@ -47,4 +47,4 @@ class Shard:
 
 
 WHOLE = Shard(number=1, count=1)
-"""The shard that is the whole split."""
+"""The only shard of an undivided split; it contains all samples."""

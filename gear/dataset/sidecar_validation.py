@@ -1,7 +1,7 @@
 """Checks the values of a sidecar (the JSON file of a sample) beyond their types.
 
 Files on disk may be damaged, edited or written by other programs. Impossible values, such as a picture without width or
-a quaternion whose length is not 1, are refused here, so that later code does not fail on them.
+a quaternion whose length is not 1, are refused here, so later code does not fail on them.
 """
 
 from __future__ import annotations

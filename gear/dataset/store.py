@@ -368,16 +368,16 @@ def _remove_idle(root: Path, split: str) -> None:
 def remove_split(root: Path, split: str) -> None:
     """Deletes the files that gear wrote for a split, and no other files; the dataset card is written anew.
 
-    Deleted are the files that the sidecars, the manifest and the lists of unfinished files name. The copy of the patch
-    is deleted if no other split shows it.
+    These files are named by the sidecars, the manifest and the lists of unfinished files. The copy of the patch is also
+    deleted, if no other split shows it.
 
     All paths are checked before the first file is deleted. A sample's sidecar is deleted before its files, so a sample
-    without its files never counts as complete if the deletion is interrupted. For a sample whose sidecar is missing or
-    damaged, the manifest names the files.
+    without its files never counts as complete if the deletion is interrupted. If a sidecar is missing or damaged, the
+    files of its sample are taken from the manifest.
 
     Raises:
-        DatasetError: a file cannot be deleted; its path leaves the root or leads through a link; or the split is a copy
-            of another one, whose files it names.
+        DatasetError: a file cannot be deleted, or its path leaves the root or leads through a link; or the split's
+            folder is a copy of another split, whose files it names.
     """
     folder = owned(root, split_folder(split))
     if not folder.is_dir():

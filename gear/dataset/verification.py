@@ -52,8 +52,8 @@ class SplitCheck:
 
     Attributes:
         split: name of the split.
-        plan: plan of the split; None if it is missing or damaged.
-        manifest: manifest of the split; None if it is missing or damaged.
+        plan: plan of the split (everything that decides its bytes); None if it is missing or damaged.
+        manifest: manifest of the split (JSON with the hashes of all files); None if it is missing or damaged.
         samples: number of samples that the split should hold.
         broken_samples: indices of samples with a missing or damaged file or sidecar.
         known: paths of all files that belong to the split.

@@ -81,7 +81,7 @@ class Look:
 def look_of(plans: Iterable[Plan]) -> Look:
     """The appearance of datasets, computed from the plans that they were collected with.
 
-    The light is computed with the installed version of gear, because plans record only the number of their version.
+    The light is computed with the installed version of gear, because a plan records only the version number of gear.
     """
     contents = [plan.content for plan in plans]
     return Look(

@@ -27,14 +27,16 @@ ALARM_METRICS = ("false_alarms_on_patch", "false_alarms_elsewhere")
 STATES: tuple[ObjectState, ...] = ("found", "missed", "misclassified", "moved")
 
 STATE_METRICS = {f"{state}_share": state for state in STATES}
-"""Metrics that are shares of the objects in one state, with that state."""
+"""Metrics that are shares of the objects in one state: state by name of the metric."""
 
 
 class ObjectEvaluator:
     """An evaluator that counts, for each picture, found and missed objects and false alarms."""
 
     def __init__(self, task: WithObjects) -> None:
-        """Args: task: the task of the samples."""
+        """Args:
+        task: task of the samples, which provides the objects and detections of each picture.
+        """
         self._task = task
         self.pictures: list[PictureOutcomes] = []
 

@@ -36,7 +36,7 @@ KEPT: Any = {
     "facts": Any, "sha256": dict[str, str], "model_s": float, "defense_s": float, "score": float | None,
     "mask": dict[str, float | None] | None,
 }  # fmt: skip
-"""Keys and types of a stored note that a later run reads."""
+"""Keys and types of a sample's note, a JSON file, that a later run reads."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

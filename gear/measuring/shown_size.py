@@ -1,4 +1,5 @@
-"""Warns if pictures have another size than in training, in which objects appear larger or smaller.
+"""Warns if pictures have another size than the training pictures, so objects appear larger or smaller to a
+network.
 
 Weights files state the input scale, the factor by which pictures of the task's default size are resized. A network
 applies the same factor to pictures of any size, so objects in smaller pictures become smaller still. Weights files that

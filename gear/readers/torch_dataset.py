@@ -66,7 +66,7 @@ class TorchDataset(torch.utils.data.Dataset[Item]):
         seed: int = 0,
     ) -> None:
         """Args:
-            samples: an opened split, the root of one, or any sequence of samples, such as `Samples` of several splits.
+            samples: an opened split, the root folder of a dataset, or any sequence of samples, such as `Samples`.
             split: name of the split, for a root that holds several.
             views: names of the cameras to read; all cameras of the sample by default.
             change: function applied to every sample, such as an augmentation.

@@ -16,7 +16,7 @@ from gear.values.ground_truth import SurfaceTruth
 Mask = npt.NDArray[np.bool_]
 
 PERFECT_DB = 99.0
-"""PSNR that is reported for equal pictures instead of infinity."""
+"""PSNR in dB that is reported for equal pictures, for which the PSNR is infinite."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
