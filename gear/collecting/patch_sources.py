@@ -66,8 +66,8 @@ def resolve_patch(patch: str, *, surfaces: int, seed: int) -> PatchSet:
         seed: seed of random patches.
 
     Raises:
-        PatchError: a picture is missing, cannot be read or has an impossible size; the numbering of the pictures has a
-            gap; or the scene has no surface, or more surfaces than there are pictures.
+        PatchError: a picture is missing, unreadable or of an impossible size; the numbers of the pictures have a gap;
+            or the scene has no surface or too many.
     """
     try:
         found = _resolved(patch, surfaces, seed)

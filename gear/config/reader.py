@@ -29,8 +29,8 @@ def read_node(kind: type[T], node: Node, key: str = "") -> T:
 
     - A dataclass may name in `SHORTHAND` the field that a bare word fills: `weather: ClearNoon`.
     - A field of type `Node` is kept as a tree, for code that knows its type later.
-    - If only some keys of a field that is itself a dataclass are given, the other keys have the values of the field's
-      default; with `WHOLE` in the field's metadata, they have the defaults of the dataclass.
+    - For a field that is itself a dataclass, missing keys have the values of the field's default. With `WHOLE` in the
+      field's metadata, they have the defaults of the dataclass.
 
     Args:
         kind: type of the result.

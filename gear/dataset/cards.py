@@ -140,7 +140,7 @@ def is_own(relative: str, data: bytes) -> bool:
 
 
 def _is_as_written(relative: str, data: bytes) -> bool:
-    """Whether a file is one that gear wrote, to the byte."""
+    """Whether the bytes of a description file are exactly those that gear wrote."""
     if relative == CROISSANT:
         return is_sealed(data) and is_whole(data)
     note = NOTE.search(data)

@@ -50,10 +50,10 @@ class SidecarStream(Sequence[Sidecar]):
         return (self._read(index) for index in range(len(self)))
 
     def _read(self, index: int) -> Sidecar:
-        """Reads a sidecar, and keeps what the manifest lists of it.
+        """Reads a sidecar, and keeps the data that the manifest lists about it.
 
         Raises:
-            DatasetError: it is missing, damaged, or lacks a camera.
+            DatasetError: the sidecar is missing, damaged, or lacks a camera.
         """
         path = inside(self._root, sidecar_path(self._split, index))
         sidecar = read_sidecar(path)

@@ -81,10 +81,10 @@ def find_parts(roots: Sequence[Path], split: str) -> Parts:
 
 
 def _refuse_other_plan(first_root: Path, first: Plan, root: Path, plan: Plan) -> None:
-    """Refuses a folder whose plan of the split is not the one of the first folder.
+    """Checks that a folder has the same plan of the split as the first folder.
 
     Raises:
-        DatasetError: says what differs.
+        DatasetError: the plans differ; the message names the differences.
     """
     places = (f"in {first_root}", f"in {root}")
     what = differences({"plan": first.as_json()}, {"plan": plan.as_json()}, places=places)

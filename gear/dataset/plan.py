@@ -75,7 +75,7 @@ def manifest_facts(plan: Plan) -> dict[str, Json]:
     """The metadata of a split for its manifest: task, options, seed, patch, renderer, versions, scene, weather,
     config.
 
-    They do not depend on paths of the machine, the time or the workers.
+    The metadata do not depend on paths of the machine, the time or the workers.
 
     Raises:
         DatasetError: the plan lacks an entry, because it was edited.

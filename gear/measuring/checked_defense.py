@@ -68,7 +68,7 @@ class CheckedDefense:
         return result if result.score is None else dataclasses.replace(result, score=float(result.score))
 
     def _problem(self, result: Any, views: Mapping[str, UInt8Image]) -> str:
-        """The problem of a result as text; empty if there is none."""
+        """Describes the first violation of the contract in a defense's result; empty if the result is valid."""
         if not isinstance(result, DefenseResult):
             return f"apply returns a DefenseResult, got {type(result).__name__}"
         sizes = {name: picture.shape[:2] for name, picture in views.items()}

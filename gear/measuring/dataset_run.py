@@ -22,7 +22,7 @@ from gear.readers import TorchDataset, read_ahead
 from gear.values.errors import DatasetError
 
 SampleDone = Callable[[], None]
-"""A callback without arguments, called whenever all files of one more sample are written."""
+"""Type of a callback without arguments that is called after each sample, when all of its files are written."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

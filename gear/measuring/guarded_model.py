@@ -45,8 +45,8 @@ class Answer:
         prediction: prediction in the task's format.
         model_s, defense_s: wall time in seconds; the model's time for a batch is divided by the number of its samples
             and by the number of parallel batches.
-        mask: the defense's patch mask by camera name, (H, W) float32 in 0..1; None if there is none.
-        score: the defense's confidence in 0..1 that the sample is attacked; None if there is none.
+        mask: the defense's patch mask by camera name, (H, W) float32 in 0..1; None without a mask.
+        score: the defense's confidence in 0..1 that the sample is attacked; None without a score.
     """
 
     prediction: Any

@@ -116,10 +116,10 @@ def separated_interval(value: float, clusters: int) -> Interval:
 
     All jackknife replicates are equal in this case, so their spread cannot be used. The end a of the interval solves
 
-        |A - a| = z sqrt(V(a))
+        |A - a| = z sqrt(V(a)).
 
-    where A is the area and V is Hanley and McNeil's variance with the number of clusters as both sample sizes
-    (Newcombe, Statistics in Medicine 2006, method 5).
+    A is the area. V is Hanley and McNeil's variance, with the number of clusters as both sample sizes (Newcombe,
+    Statistics in Medicine 2006, method 5).
 
     Args:
         value: the area A, 0 or 1.

@@ -59,13 +59,13 @@ class ObjectEvaluator:
     def result(self) -> Mapping[str, float]:
         """The metrics over all gathered pictures, by name.
 
-        They are the false alarms per picture on the patch and elsewhere, and the share of the objects in each state
-        (`found`, `missed`, `misclassified`, `moved`). A metric is NaN if there are no pictures or no objects.
+        The metrics are the false alarms per picture on the patch and elsewhere, and the share of the objects in each
+        state (`found`, `missed`, `misclassified`, `moved`). A metric is NaN if there are no pictures or no objects.
         """
         return _values(self.totals()["counts"])
 
     def totals(self) -> Mapping[str, npt.NDArray[Any]]:
-        """The sums over all gathered pictures, as one (7,) float64 array.
+        """The sums over all gathered pictures, as one (7,) float64 array under the key `counts`.
 
         Its entries are the numbers of pictures, false alarms on the patch, false alarms elsewhere, and objects that are
         found, missed, misclassified and moved.
@@ -73,7 +73,12 @@ class ObjectEvaluator:
         return {"counts": np.sum([_counts(one) for one in self.pictures], axis=0) if self.pictures else np.zeros(7)}
 
     def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> Spread:
-        """The metrics by name, (R,) values each, from an (R, 7) array of sums as in `totals`."""
+        """Computes the metrics from R sets of sums over pictures; returns (R,) values by name of the metric.
+
+        Args:
+            totals: (R, 7) array `counts`. Its columns are the numbers of pictures, false alarms on the patch, false
+                alarms elsewhere, and objects that are found, missed, misclassified and moved.
+        """
         rows = [_values(row) for row in totals["counts"]]
         return {name: np.array([row[name] for row in rows]) for name in (*ALARM_METRICS, *STATE_METRICS)}
 
@@ -90,7 +95,11 @@ def _middle_m(camera_from_surface: tuple[float, ...]) -> Vec3:
 
 
 def _counts(picture: PictureOutcomes) -> Array:
-    """(7,) as in `ObjectEvaluator.totals`."""
+    """The (7,) numbers of one picture.
+
+    They are 1 (the picture), false alarms on the patch, false alarms elsewhere, and objects that are found, missed,
+    misclassified and moved.
+    """
     alarms = [one.patch.is_on_patch for one in picture.detections if one.is_false_alarm]
     states = [thing.state for thing in picture.objects]
     every = (1, sum(alarms), len(alarms) - sum(alarms), *(states.count(state) for state in STATE_METRICS.values()))

@@ -98,7 +98,7 @@ def as_pictures(views: Mapping[str, Tensor]) -> dict[str, Tensor]:
 def stacked(items: Sequence[Item]) -> Batch:
     """Makes a batch whose pictures stay uint8 in 0..255.
 
-    They need a quarter of the bytes of float32 when they are sent between processes or to a GPU.
+    Such pictures need a quarter of the bytes of float32 pictures when they are sent between processes or to a GPU.
 
     Raises:
         ValueError: the pictures differ in size.

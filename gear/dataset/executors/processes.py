@@ -110,11 +110,13 @@ class _Pool:
     """The worker processes of one run.
 
     Attributes:
-        backend, work, report: as in `Processes` and `Executor.run`.
+        backend: name of the renderer, for error messages.
+        work: function that makes items in a worker process.
         pending: indices that no worker has taken.
+        report: called in this process with the outcome of each item.
         count: number of workers that run at a time.
-        workers: those that run.
-        deaths: workers that died since the last item was made.
+        workers: workers that are running.
+        deaths: number of workers that died since the last item was made.
     """
 
     backend: str
@@ -185,10 +187,11 @@ class _Pool:
         self._lost(worker, f"a worker died (exit code {code})")
 
     def _lost(self, worker: _Worker, problem: str) -> None:
-        """Reports the items of a worker that died or hung, and starts another one for those that are left.
+        """Reports the items of a worker that died or hung as failed, and starts another worker for the pending
+        items.
 
         Raises:
-            BackendError: it had taken no item.
+            BackendError: the worker had taken no item.
         """
         if not worker.has_taken:
             raise BackendError(self.backend, problem, f"{AGAIN}; fewer --workers need less memory")

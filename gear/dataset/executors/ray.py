@@ -60,10 +60,10 @@ class OnRay:
                 ray.shutdown()
 
     def _connect(self, ray: Any) -> None:
-        """Joins the cluster, or starts one.
+        """Joins the cluster at the address, or starts a local cluster.
 
         Raises:
-            GearError: there is none at the address.
+            GearError: there is no cluster at the address.
         """
         self._check_address()
         local = {"num_cpus": self.workers, "include_dashboard": False} if self.address is None else {}

@@ -21,7 +21,8 @@ PERFECT_DB = 99.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureGap:
-    """The difference between a picture with the patch composed and one with the patch rendered.
+    """The difference between a picture with a composed patch (pasted by a compositor) and one with a rendered
+    patch.
 
     Attributes:
         psnr_db: peak signal-to-noise ratio in dB over the patch's pixels, from sRGB values 0..255; at most

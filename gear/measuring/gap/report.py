@@ -28,7 +28,7 @@ class SampleGap:
         visible_px: number of pixels that show a patch.
         distance_m: distance from the camera to the nearest visible surface.
         incidence_deg: largest angle between the line of sight and the normal of a visible surface.
-        gaps: difference between the composed and the rendered picture, by name of the compositor.
+        gaps: difference between the picture with the composed (pasted) and with the rendered patch, by compositor.
     """
 
     index: int

@@ -53,7 +53,8 @@ class _Comparison:
 
 
 def measure_gap(request: GapRequest, callbacks: Callbacks) -> GapReport:
-    """Compares composed and rendered patches, and writes the report if the request names a folder.
+    """Compares composed patches (pasted into clean pictures) with rendered patches, and writes the report if
+    requested.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.

@@ -39,12 +39,12 @@ def collect_twin(
     town: str | Path | None = None,
     scenes: str | Path | None = None,
 ) -> None:
-    """Renders the scenes of a clean split with a patch, into a dataset of its own; completes an existing one.
+    """Renders the scenes of a clean split with a patch, into a new dataset; an existing dataset is completed.
 
     Args:
         clean: the split without a patch.
         patch: the patch, as a value of `--patch`.
-        root: root of the new dataset.
+        root: root of the dataset with the patch.
         samples: number of samples from the first one on, rounded up to whole sequences; all by default.
         town, scenes: paths of the town and of its scene library (`FILE`, or `FILE:SCENE`). They are needed for a town
             that does not come with gear, because a dataset records no paths of the machine that made it.
