@@ -57,5 +57,5 @@ def manifest_path(split: str) -> str:
 
 
 def patch_path(label: str, name: str) -> str:
-    """The path of a patch picture in the dataset, which is a copy of the patch that a split shows."""
+    """The path of the dataset's own copy of a patch picture, relative to the dataset's root."""
     return f"{GEAR}/patches/{label}/{name}"

@@ -142,9 +142,7 @@ def is_alive(name: str) -> bool | None:
 
 
 def unique_name() -> str:
-    """A unique name for a temporary file that contains the machine and the process number, from which `is_alive`
-    reads them.
-    """
+    """A unique name for a temporary file or a claim: host name, process number and random digits, separated by `-`."""
     return f"{_host()}-{os.getpid()}-{secrets.token_hex(8)}"
 
 

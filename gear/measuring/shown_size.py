@@ -26,7 +26,7 @@ from gear.values.errors import ConfigError
 def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str | None:
     """A warning if the dataset's pictures have another size than those that the model was trained on.
 
-    It is None if the sizes agree, if the training size is unknown, or if the user set the input scale.
+    The result is None if the sizes agree, if the training size is unknown, or if the user set the input scale.
 
     Args:
         model: the model with its options.

@@ -16,7 +16,7 @@ from gear.measuring.gap.picture_gap import PictureGap
 from gear.values.serial import Json, to_json
 
 UNMOVED = 1e-9
-"""Smallest change of a metric from which a share is computed; smaller changes count as no change."""
+"""Changes of a metric up to this size count as no change, so the share rendered / composed is not computed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
