@@ -1,1 +1,3 @@
-"""File formats: pure functions that encode and decode the bytes and text of datasets. Nothing here touches a disk."""
+"""File formats: pure functions that encode and decode the bytes and text of datasets. No function here reads or writes
+files.
+"""

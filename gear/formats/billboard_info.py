@@ -2,8 +2,8 @@
 
 World frame: x forward, y left, z up, in metres and radians. The origin of a billboard lies on its face at half height,
 0.1 m to the left of the middle; its x axis points into the board, y to the viewer's left, z up. The loaders compute the
-place of the patch from this origin. They ignore roll and pitch, so records of tilted cameras or billboards have `level:
-false`.
+position of the patch from this origin. They ignore roll and pitch, so records of tilted cameras or billboards have
+`level: false`.
 """
 
 from __future__ import annotations
@@ -29,14 +29,16 @@ LEVEL_RAD = 1e-4
 def billboard_info(
     records: Iterable[SceneRecord], *, task: str, patch_label: str, reference: str, second: str | None = None
 ) -> Json:
-    """The content of the file for one split.
+    """The JSON content of `camera_billboard_info.json` for one split: camera and billboard poses of all samples.
 
     Args:
-        records: scene records of the samples, in the loader's order; read once, and none is kept.
+        records: scene records of the samples, in the loader's order. The iterable is read once, and one record at a
+            time is in memory.
         task: CARLA-GeAR's name of the task: `ss`, `2dod`, `3dod`, `depth`.
         patch_label: `none`, `random`, or the patch's name and hash.
         reference: name of the camera whose pictures the loader reads.
-        second: name of the second camera; `reference` again if there is none.
+        second: name of the second camera of a stereo pair. Without a second camera, the file repeats the reference
+            camera.
     """
     second = second or reference
     is_patched = patch_label != "none"
@@ -71,7 +73,7 @@ def billboard_info(
 
 
 def xyzrpy(world_from_frame: RigidTransform) -> list[float]:
-    """x, y, z in metres and roll, pitch, yaw in radians, applied as Rz(yaw) Ry(pitch) Rx(roll)."""
+    """A pose as six numbers: x, y, z in metres, and roll, pitch, yaw in radians for Rz(yaw) Ry(pitch) Rx(roll)."""
     r = world_from_frame.rotation
     roll = math.atan2(r[2, 1], r[2, 2])
     pitch = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
@@ -81,7 +83,11 @@ def xyzrpy(world_from_frame: RigidTransform) -> list[float]:
 
 
 def world_from_board(record: SceneRecord, index: int) -> RigidTransform:
-    """Pose of a billboard in the world, in the frame that the module's docstring describes."""
+    """The pose in the world of the billboard of surface `index`, in CARLA-GeAR's billboard frame.
+
+    The origin of that frame lies on the face at half height, 0.1 m to the left of the middle. x points into the board,
+    y to the viewer's left, z up.
+    """
     world_from_surface = record.world_from_surface(record.surfaces[index])
     rotation: Array = world_from_surface.rotation @ FLU_FROM_SURFACE.T
     origin = world_from_surface.apply([-LEFT_OF_MIDDLE_M, 0.0, 0.0])
@@ -89,7 +95,7 @@ def world_from_board(record: SceneRecord, index: int) -> RigidTransform:
 
 
 def world_from_flu_camera(camera: CameraRecord) -> RigidTransform:
-    """Pose of a camera in the world, with x forward, y left, z up."""
+    """The pose of a camera in the world, in a camera frame with x forward, y left and z up."""
     placed = camera.world_from_camera_transform
     rotation: Array = placed.rotation @ CAMERA_FROM_ACTOR_AXES
     return RigidTransform.from_parts("world", "camera", rotation, placed.translation_m)

@@ -24,7 +24,7 @@ pixels.
 
 @dataclass(frozen=True, slots=True)
 class CityscapesLabel:
-    """One row of Cityscapes' label table.
+    """One label of Cityscapes' table of labels.
 
     Attributes:
         id: label id, the value in label pictures.
@@ -32,7 +32,7 @@ class CityscapesLabel:
         train_id: 0..18, or 255 for labels that are not evaluated.
         category: one of Cityscapes' eight categories.
         has_instances: whether instance pictures number the instances of this label.
-        rgb: colour in colour pictures.
+        rgb: colour of the label in colour pictures, 0..255.
     """
 
     id: int
@@ -44,7 +44,7 @@ class CityscapesLabel:
 
     @property
     def is_evaluated(self) -> bool:
-        """Whether the benchmark evaluates the label."""
+        """Whether the Cityscapes benchmark evaluates the label: its train id is not 255."""
         return self.train_id != IGNORED_TRAIN_ID
 
 
@@ -84,33 +84,36 @@ LABELS: tuple[CityscapesLabel, ...] = (
     CityscapesLabel(32, "motorcycle", 17, "vehicle", True, (0, 0, 230)),
     CityscapesLabel(33, "bicycle", 18, "vehicle", True, (119, 11, 32)),
 )
-"""All labels, by label id."""
+"""The 34 labels of Cityscapes, in the order of their ids."""
 
 COLOURS: UInt8Image = np.array([label.rgb for label in LABELS], dtype=np.uint8)
-"""(34, 3) RGB by label id."""
+"""(34, 3) uint8 RGB colour of each Cityscapes label, by label id."""
 
 COLOURS_RGBA: UInt8Image = np.concatenate([COLOURS, np.full((len(COLOURS), 1), 255, dtype=np.uint8)], axis=1)
-"""(34, 4) the same, opaque."""
+"""(34, 4) uint8 RGBA colour of each Cityscapes label, by label id; alpha is 255."""
 
 
 def city_name(town: str) -> str:
-    """The city name of a town: without underscores, at which the official tools split names, and ending in `aachen`.
+    """The city name under which the pictures of a town are stored; it has no underscore and ends in `aachen`.
 
-    CARLA-GeAR's loader recognises a Cityscapes tree by one of three names of real cities. With this ending the same
-    tree works with that loader, with torchvision and with the official tools.
+    The official tools split file names at underscores. CARLA-GeAR's loader recognises a Cityscapes folder by one of
+    three names of real cities. With this ending, the loader, torchvision and the official tools read the same folder.
     """
     letters = re.sub(r"[^a-z0-9]", "", town.lower())
     return f"gear{letters}aachen"
 
 
 def stem(town: str, sequence: int, frame: int) -> str:
-    """`<city>_<sequence>_<frame>`, the beginning of the names of all files of one picture."""
+    """The part `<city>_<sequence>_<frame>` with which the names of all files of one picture begin."""
     return f"{city_name(town)}_{sequence:06d}_{frame:06d}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paths:
-    """Paths of the files of one picture, relative to the dataset's root."""
+    """Paths of the six files that belong to one picture in the Cityscapes layout, relative to the dataset's root.
+
+    The files are the picture, label ids, instance ids, label colours, polygons and camera.
+    """
 
     image: str
     label_ids: str
@@ -121,7 +124,7 @@ class Paths:
 
 
 def paths(town: str, split: str, sequence: int, frame: int) -> Paths:
-    """Paths of the files of one picture."""
+    """The paths of the files that belong to one picture in the Cityscapes layout, relative to the dataset's root."""
     city, name = city_name(town), stem(town, sequence, frame)
     fine = f"gtFine/{split}/{city}/{name}_gtFine"
     return Paths(
@@ -142,8 +145,8 @@ def colour_map(label_ids: npt.NDArray[np.uint8]) -> UInt8Image:
 
 
 def camera_json(camera: CameraRecord, world_from_vehicle: RigidTransform, baseline_m: float) -> Json:
-    """The content of a camera file: intrinsics in index pixels, and pose in the vehicle's frame (x forward, y left, z
-    up).
+    """The JSON content of a Cityscapes camera file: intrinsics in index pixels, and pose in the vehicle's frame (x
+    forward, y left, z up).
 
     Args:
         camera: the left camera.

@@ -1,9 +1,12 @@
-"""Cityscapes polygon files from instance maps.
+"""Makes the polygons of a Cityscapes polygon file from an instance map.
 
-Each connected piece of the map is described by its outline. Polygons are sorted by the area that they enclose, largest
-first, and painted in this order they reproduce the map: a piece inside a hole of another one encloses less, so it is
-painted later. Around a diagonal line one pixel wide, the pieces on both sides are one 8-connected piece, so that a
-later outline can cover parts of an earlier one; the pixels that painting loses are described by additional polygons.
+Each connected piece of the map is described by its outline. The polygons are sorted by the area that they enclose,
+largest first. Painted in this order, they reproduce the map: a piece inside a hole of another piece encloses less area
+and is painted later.
+
+Along a diagonal line one pixel wide, the areas on its two sides touch at corners and form one 8-connected piece. A
+polygon that is painted later can then cover parts of an earlier one. Additional polygons describe the pixels that are
+lost in this way.
 """
 
 from __future__ import annotations
@@ -23,21 +26,20 @@ MIN_PIECE_PX = 4
 """Pieces with fewer pixels are merged into their surroundings."""
 
 MOST_REPAIRS = 8
-"""Largest number of passes that add polygons for lost pixels; one is not enough where thin lines lie behind
-thin lines.
+"""Largest number of passes that add polygons for lost pixels. One pass is not enough where thin lines lie behind thin
+lines.
 """
 
 
 def polygons_json(instances: npt.NDArray[np.uint16]) -> Json:
-    """The content of a polygon file.
+    """The JSON content of a Cityscapes polygon file for one instance map.
 
     Args:
-        instances: (H, W) uint16 instance map.
+        instances: (H, W) uint16 map with label id * 1000 + instance number, or with the label id alone.
 
     Returns:
         Polygons that, painted in order, give the label map except for pieces of fewer than `MIN_PIECE_PX` pixels and
-        single pixels along borders. An instance that is cut into pieces by something in front of it has one polygon per
-        piece.
+        single pixels along borders. An instance that an object in front divides into pieces has one polygon per piece.
     """
     height, width = instances.shape
     pieces = _outlines(instances)

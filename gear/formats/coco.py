@@ -48,15 +48,17 @@ def _categories() -> tuple[Json, ...]:
 
 
 CATEGORIES: tuple[Json, ...] = _categories()
-"""All 80 categories, so that detections of every COCO category can be written, whether or not objects of it occur."""
+"""The 80 categories of COCO. All of them are written into annotation files, so detections of every COCO category are
+valid.
+"""
 
 CATEGORY_NAMES: dict[int, str] = {category["id"]: category["name"] for category in CATEGORIES}
-"""Names by category id."""
+"""Name of each COCO category, by category id."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Annotation:
-    """One object in one picture.
+    """The COCO annotation of one object in one picture.
 
     Attributes:
         category_id: COCO's category id, 1..90.
@@ -64,8 +66,9 @@ class Annotation:
         area_px: number of pixels of the mask.
         rle: compressed run lengths of the visible mask.
         is_crowd: whether evaluations ignore the object.
-        extras: facts that COCO has no field for, written under the key `gear`.
-        polygons: `x, y, x, y, ...` of each polygon of the mask in edge pixels; if empty, `rle` is written instead.
+        extras: values for which COCO has no field, such as the distance; written under the key `gear`.
+        polygons: corners `x, y, x, y, ...` in edge pixels of each polygon of the mask. Without polygons, and for
+            ignored objects (`is_crowd`), `rle` is written.
     """
 
     category_id: int
@@ -79,7 +82,7 @@ class Annotation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
-    """One picture of a split with its annotations.
+    """One picture of a split with the annotations of its objects.
 
     Attributes:
         id: picture id, from 1.
@@ -97,12 +100,12 @@ class Picture:
 
 
 def dataset_json(pictures: Sequence[Picture], *, description: str, created: str) -> Json:
-    """The content of an annotation file.
+    """The JSON content of a COCO annotation file.
 
     Args:
         pictures: pictures in order of id. Annotation ids count from 1 over all pictures, because pycocotools takes the
             id 0 for "no match".
-        description: one line on the split.
+        description: one line that describes the split.
         created: ISO date.
     """
     annotations: list[Json] = []
@@ -117,11 +120,17 @@ def dataset_json(pictures: Sequence[Picture], *, description: str, created: str)
 
 
 class DatasetWriter:
-    """Writes an annotation file picture by picture: `dump(dataset_json(...))` without the pictures in memory."""
+    """Writes a COCO annotation file picture by picture, so that only its encoded bytes are in memory.
+
+    The bytes equal `dump(dataset_json(...))` for all pictures.
+    """
 
     def __init__(self, *, description: str, created: str) -> None:
-        """Args:
-        description, created: as of `dataset_json`.
+        """Starts an annotation file without pictures.
+
+        Args:
+            description: one line that describes the split.
+            created: ISO date.
         """
         self._description, self._created = description, created
         self._images: list[bytes] = []
@@ -129,7 +138,7 @@ class DatasetWriter:
         self._count = 0
 
     def add(self, picture: Picture) -> None:
-        """Adds the next picture."""
+        """Appends the next picture and its annotations to the file."""
         self._images.append(dump(_image_entry(picture, self._created)).rstrip(b"\n"))
         entries = _annotation_entries(picture, self._count + 1)
         self._count += len(entries)
@@ -137,7 +146,7 @@ class DatasetWriter:
             self._annotations.append(dump(entries).rstrip(b"\n")[1:-1])
 
     def data(self) -> bytes:
-        """The bytes of the file."""
+        """The bytes of the complete annotation file with all pictures added so far."""
         head = dump(_head(self._description, self._created)).rstrip(b"\n")[:-1]
         images, annotations = b",".join(self._images), b",".join(self._annotations)
         categories = dump(list(CATEGORIES)).rstrip(b"\n")
@@ -202,7 +211,7 @@ class Detection:
     Attributes:
         category_id: COCO's category id, 1..90.
         box_px: left, top, right, bottom in edge pixels.
-        score: confidence; higher is more certain.
+        score: confidence; a higher score is more certain.
     """
 
     category_id: int
@@ -211,7 +220,7 @@ class Detection:
 
 
 def results_json(image_id: int, detections: Sequence[Detection]) -> list[Json]:
-    """Detections of one picture in the form of COCO's results file."""
+    """The detections of one picture as entries of COCO's results file."""
     return [
         {
             "image_id": image_id,

@@ -1,5 +1,7 @@
-"""Croissant 1.1 with its extension for responsible AI (RAI 1.0): what a dataset is, which files it has, how they are
-read. Source: https://docs.mlcommons.org/croissant/docs/croissant-spec-1.1.html.
+"""Croissant 1.1 metadata with the extension for responsible AI (RAI 1.0).
+
+The metadata state what a dataset is, which files it has and how to read these files. Source:
+https://docs.mlcommons.org/croissant/docs/croissant-spec-1.1.html.
 """
 
 from __future__ import annotations
@@ -53,7 +55,7 @@ CONTEXT: dict[str, Json] = {
     "subField": "cr:subField",
     "transform": "cr:transform",
 }
-"""The specification's own context."""
+"""The JSON-LD context that the specification of Croissant prescribes."""
 
 MEDIA_TYPES = {
     "png": "image/png",
@@ -64,20 +66,22 @@ MEDIA_TYPES = {
 }
 
 SHOWN = ("png", "jpg")
-"""Pictures that readers of Croissant decode; mlcroissant takes the numbers of a TIFF for shares of white."""
+"""Suffixes of files that are described as pictures. TIFF is not among them, because mlcroissant interprets its numbers
+as shares of white.
+"""
 
 ROLES = {"train": "cr:TrainingSplit", "val": "cr:ValidationSplit", "test": "cr:TestSplit"}
-"""Croissant's word for what a split is for, by the first word of its name."""
+"""Croissant's name for the purpose of a split, by the first word of the split's name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FilePattern:
-    """Files of one kind: one file of each sample.
+    """The files of one kind, of which every sample has one.
 
     Attributes:
-        name: of the kind.
-        suffix: of the files, without a dot.
-        globs: patterns that find them, relative to the dataset's root.
+        name: name of the kind, such as `depth`.
+        suffix: suffix of the files, without a dot.
+        globs: glob patterns that find the files, relative to the dataset's root.
     """
 
     name: str
@@ -86,12 +90,12 @@ class FilePattern:
 
 
 def croissant(splits: Sequence[SplitFacts], patterns: Sequence[FilePattern], hashes: Mapping[str, str]) -> Json:
-    """The content of `croissant.json`.
+    """The JSON content of `croissant.json`, the Croissant metadata of a dataset.
 
     Args:
-        splits: at least one.
-        patterns: the files of samples.
-        hashes: SHA-256 of files that several samples share, by path relative to the dataset's root.
+        splits: the finished splits of the dataset; at least one.
+        patterns: the kinds of files that each sample has.
+        hashes: SHA-256 of the files that several samples share, by path relative to the dataset's root.
     """
     first = splits[0]
     shared = [

@@ -1,4 +1,4 @@
-"""Dataset cards: the `README.md` with which Hugging Face's hub and its package `datasets` describe and find data."""
+"""Dataset cards: the `README.md` files by which the Hugging Face hub and the package `datasets` describe a dataset."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ TASK_CATEGORIES = {
     "stereo3d": "object-detection",
     "depth": "depth-estimation",
 }
-"""The hub's name of each of gear's tasks."""
+"""The Hugging Face hub's name for each of gear's tasks."""
 
 SPLITS = {"val": "validation"}
-"""The hub's names of splits, where they differ from gear's."""
+"""Names of splits on the Hugging Face hub, by gear's names; only names that differ are listed."""
 
 SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 
@@ -36,15 +36,15 @@ COLLECTION = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplitFacts:
-    """What a card says of one finished split.
+    """The metadata of one finished split that its dataset card states.
 
     Attributes:
-        name: of the split.
+        name: name of the split.
         task, town, scene, weather, patch, renderer: names.
-        seed: of the split.
+        seed: random seed of the split.
         samples: number of samples.
         created: ISO date.
-        gear, mujoco: versions.
+        gear, mujoco: versions of gear and of MuJoCo.
     """
 
     name: str
@@ -62,12 +62,12 @@ class SplitFacts:
 
     @property
     def hub_name(self) -> str:
-        """The split's name on the hub."""
+        """The split's name on the Hugging Face hub, where `val` is called `validation`."""
         return SPLITS.get(self.name, self.name)
 
     @staticmethod
     def of(info: SplitInfo, task: str, samples: int, manifest: Json) -> SplitFacts:
-        """The facts of a split; "unknown" where the manifest lacks one."""
+        """The metadata of a split for its dataset card. A value that the manifest lacks becomes "unknown"."""
 
         def at(key: str, inner: str) -> str:
             entry = manifest.get(key) if isinstance(manifest, dict) else None
@@ -91,23 +91,23 @@ class SplitFacts:
 
 
 def title(splits: Sequence[SplitFacts]) -> str:
-    """The name of a dataset for people."""
+    """A readable title of the dataset, with task, town, scene and patch of its first split."""
     first = splits[0]
     return f"gear {first.task} {first.town} {first.scene}, patch {first.patch}"
 
 
 def size_category(samples: int) -> str:
-    """The hub's class of sizes."""
+    """The Hugging Face hub's size category for a number of samples, such as `n<1K`."""
     return next((name for most, name in SIZES if samples < most), "n>1M")
 
 
 def card(splits: Sequence[SplitFacts], configs: Mapping[str, Mapping[str, Sequence[str]]], structure: str) -> str:
-    """The text of a dataset card.
+    """The Markdown text of a dataset card, with the YAML header that the Hugging Face hub reads.
 
     Args:
-        splits: at least one.
-        configs: for each configuration of the dataset, patterns of files by split.
-        structure: what the files are, in Markdown.
+        splits: the metadata of each split; at least one.
+        configs: glob patterns of the files of each split, by name of the Hugging Face configuration and by split.
+        structure: Markdown text that describes the files.
     """
     first, samples = splits[0], sum(split.samples for split in splits)
     category = TASK_CATEGORIES.get(first.task)

@@ -1,6 +1,6 @@
-"""Zlib streams of bytes that are given as runs of equal bytes.
+"""Compresses bytes that are given as runs of equal bytes to a zlib stream.
 
-A general compressor looks at every byte. Here each run is encoded as one literal and DEFLATE copies of it, with one
+A general compressor reads every byte. Here each run is encoded as one literal and DEFLATE copies of it, with one
 Huffman code for the whole stream. The time depends on the number of runs instead of the number of bytes, and the result
 does not depend on the processor.
 """
@@ -40,10 +40,10 @@ _COPY_SYMBOL, _COPY_BITS, _COPY_VALUE = _copy_symbols()
 
 
 def compress(values: npt.NDArray[np.uint8], lengths: Ints) -> bytes:
-    """Compresses runs to a zlib stream.
+    """Compresses runs of equal bytes to a zlib stream.
 
     Args:
-        values: (N,) byte of each run.
+        values: (N,) value of the bytes in each run.
         lengths: (N,) number of bytes in each run, at least 1.
     """
     wide = values.astype(np.int64)

@@ -1,4 +1,4 @@
-"""JSON as bytes; the same value always gives the same bytes."""
+"""Encodes JSON as bytes; the same value always gives the same bytes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from gear.values.serial import Json
 
 
 def dump(content: Json) -> bytes:
-    """Encodes a value without spaces, with keys in the given order and a final newline. NaN is refused, because JSON
-    lacks it.
+    """Encodes a value as compact JSON with keys in the given order and a final newline.
+
+    NaN raises an error, because JSON has no NaN.
     """
     return (json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False) + "\n").encode()

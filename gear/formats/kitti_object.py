@@ -22,17 +22,17 @@ TYPES = ("Car", "Van", "Truck", "Pedestrian", "Person_sitting", "Cyclist", "Tram
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KittiLabel:
-    """One line of a label file.
+    """One line (one object) of a KITTI label file.
 
     Attributes:
         type: one of `TYPES`.
         truncated: share of the object outside the picture, 0..1.
         occluded: 0 fully visible, 1 partly, 2 largely hidden, 3 unknown; -1 in DontCare lines.
-        alpha_rad: observation angle.
+        alpha_rad: observation angle, radians.
         box_px: 2D box: left, top, right, bottom in index pixels.
         height_m, width_m, length_m: size of the 3D box.
-        location_m: middle of the bottom face in camera 0.
-        rotation_y_rad: rotation about the camera's y axis.
+        location_m: middle of the bottom face, in the frame of camera 0 (x right, y down, z forward).
+        rotation_y_rad: rotation about the camera's y axis; 0 if the object's front points along +x.
         score: confidence; in result files only.
     """
 
@@ -66,7 +66,11 @@ def dont_care(box_px: BoxPx) -> KittiLabel:
 
 
 def format_label(label: KittiLabel) -> str:
-    """Formats a label line: 15 fields (16 with a score), separated by one space, two decimals, no newline."""
+    """The text of one line of a KITTI label file, without a newline.
+
+    It has 15 fields (16 with a score), separated by one space. Numbers have two decimals, except the fixed numbers of a
+    `DontCare` line.
+    """
     if label.type == "DontCare":
         box = " ".join(f"{v:.2f}" for v in label.box_px)
         return f"DontCare -1 -1 -10 {box} -1 -1 -1 -1000 -1000 -1000 -10"
@@ -90,12 +94,12 @@ def _two(value: float) -> str:
 
 
 def format_labels(labels: Iterable[KittiLabel]) -> bytes:
-    """Formats a label file; empty for a picture without objects."""
+    """The bytes of a KITTI label file, one line per object; empty for a picture without objects."""
     return "".join(format_label(label) + "\n" for label in labels).encode()
 
 
 def parse_label(line: str) -> KittiLabel:
-    """Parses one line of a label or result file.
+    """Parses one line of a KITTI label file or result file.
 
     Raises:
         ValueError: the line has neither 15 nor 16 fields, an unknown type, or a field that is not a number.
@@ -122,50 +126,54 @@ def parse_label(line: str) -> KittiLabel:
 
 
 def parse_labels(text: str) -> tuple[KittiLabel, ...]:
-    """Parses a label file."""
+    """Parses a KITTI label file: one label per line."""
     return tuple(parse_label(line) for line in text.splitlines() if line.strip())
 
 
 def clip_box(box_px: BoxPx, intrinsics: Intrinsics) -> BoxPx | None:
-    """Clips a box to the picture, in index pixels; None if it lies outside."""
+    """Clips a box in index pixels to the picture; None if the box lies outside the picture."""
     left, top = max(0.0, box_px[0]), max(0.0, box_px[1])
     right, bottom = min(intrinsics.width_px - 1.0, box_px[2]), min(intrinsics.height_px - 1.0, box_px[3])
     return (left, top, right, bottom) if right > left and bottom > top else None
 
 
 def from_edge_pixels(box_px: BoxPx, intrinsics: Intrinsics) -> BoxPx:
-    """A box in edge pixels as a label file has it: in index pixels, inside the centres of the outermost pixels."""
+    """Converts a box from edge pixels to the index pixels of KITTI labels, clipped to the centres of the outermost
+    pixels.
+    """
     left, top, right, bottom = (side - 0.5 for side in box_px)
     most_x, most_y = intrinsics.width_px - 1.0, intrinsics.height_px - 1.0
     return (max(0.0, left), max(0.0, top), min(most_x, right), min(most_y, bottom))
 
 
 def to_edge_pixels(box_px: BoxPx) -> BoxPx:
-    """A box in index pixels, such as a label's, in edge pixels."""
+    """Converts a box from index pixels, as in KITTI labels, to edge pixels."""
     left, top, right, bottom = (side + 0.5 for side in box_px)
     return (left, top, right, bottom)
 
 
 def truncation(box_px: BoxPx, clipped_px: BoxPx) -> float:
-    """Share, 0..1, of a projected box that lies outside the picture."""
+    """KITTI's truncation: the share, 0..1, of a projected box that lies outside the picture."""
     whole = (box_px[2] - box_px[0]) * (box_px[3] - box_px[1])
     inside = (clipped_px[2] - clipped_px[0]) * (clipped_px[3] - clipped_px[1])
     return min(1.0, max(0.0, 1.0 - inside / whole)) if whole > 0 else 0.0
 
 
 OCCLUSION_LEVELS = (0.8, 0.5, 0.1)
-"""Smallest visible share of KITTI's occlusion levels 0, 1 and 2. The benchmark states no numbers; these are gear's."""
+"""Smallest visible shares of objects with KITTI's occlusion levels 0, 1 and 2. The numbers are gear's choice, because
+the benchmark states none.
+"""
 
 
 def occlusion_level(visible_fraction: float) -> int:
-    """KITTI's occlusion level of an object.
+    """KITTI's occlusion level of an object, from its visible share.
 
     Args:
         visible_fraction: visible share of the silhouette inside the picture, 0..1.
 
     Returns:
-        0 (fully visible) for at least 80 %, 1 (partly occluded) for at least 50 %, 2 (largely occluded) for at least
-        10 %, and 3 (unknown), which no level of the evaluation counts, for less.
+        0 (fully visible) for a share of at least 0.8, 1 (partly occluded) for at least 0.5, 2 (largely occluded) for at
+        least 0.1, and 3 (unknown) for less. The evaluation ignores objects of level 3 at every difficulty.
     """
     below = (level for level, least in enumerate(OCCLUSION_LEVELS) if visible_fraction >= least)
     return next(below, len(OCCLUSION_LEVELS))
@@ -184,7 +192,7 @@ class Calibration:
     baseline_m: float
 
     def projection(self, camera: int) -> Array:
-        """(3, 4) `P<camera>`: 0 and 2 are the left camera, 1 and 3 the right one."""
+        """The (3, 4) projection matrix `P<camera>` in pixels: 0 and 2 are the left camera, 1 and 3 the right camera."""
         matrix = np.zeros((3, 4))
         matrix[:, :3] = self.intrinsics.matrix
         if camera in (1, 3):
@@ -193,13 +201,13 @@ class Calibration:
 
 
 VELODYNE_TO_CAMERA = ((0.0, -1.0, 0.0, 0.0), (0.0, 0.0, -1.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-"""(3, 4) transform from the laser scanner's axes (x forward, y left, z up) to camera 0; gear's scanner is
-at camera 0.
+"""(3, 4) transform from the laser scanner's frame (x forward, y left, z up) to the frame of camera 0; both origins are
+the same point.
 """
 
 
 def format_calibration(calibration: Calibration) -> bytes:
-    """Formats a calibration file: KITTI's seven lines in their usual order."""
+    """The bytes of a KITTI calibration file: KITTI's seven lines in their usual order."""
     identity = np.eye(3, 4)
     rows: list[tuple[str, Array]] = [(f"P{i}", calibration.projection(i)) for i in range(4)]
     rows += [
@@ -212,25 +220,27 @@ def format_calibration(calibration: Calibration) -> bytes:
 
 
 SCAN = "scan/velodyne"
-"""Name of a laser scan among the auxiliary files of a sample."""
+"""Key of the laser scan among the auxiliary files of a sample."""
 
 
 def format_points(points: npt.NDArray[np.float32]) -> bytes:
-    """The bytes of a laser scan, (N, 4): x forward, y left, z up in metres, intensity 0..1; little-endian float32."""
+    """The bytes of a KITTI laser scan as little-endian float32, from (N, 4) points: x forward, y left, z up in metres,
+    and intensity 0..1.
+    """
     return np.ascontiguousarray(points, dtype="<f4").tobytes()
 
 
 def parse_points(data: bytes) -> npt.NDArray[np.float32]:
-    """(N, 4) float32 points of a laser scan.
+    """The (N, 4) float32 points of a KITTI laser scan: x forward, y left, z up in metres, and intensity 0..1.
 
     Raises:
-        ValueError: the bytes are no whole number of points.
+        ValueError: the number of bytes is not a multiple of 16, the size of a point.
     """
     return np.frombuffer(data, dtype="<f4").reshape(-1, 4).astype(np.float32)
 
 
 def parse_calibration(text: str) -> dict[str, Array]:
-    """Parses a calibration file: matrices by name, `P0` to `P3` (3, 4), `R0_rect` (3, 3), `Tr_…` (3, 4)."""
+    """Parses a KITTI calibration file to matrices by name: `P0` to `P3` (3, 4), `R0_rect` (3, 3), `Tr_…` (3, 4)."""
     found: dict[str, Array] = {}
     for line in text.splitlines():
         if ":" in line:
@@ -241,12 +251,14 @@ def parse_calibration(text: str) -> dict[str, Array]:
 
 
 def read_baseline_m(matrices: dict[str, Array]) -> float:
-    """Distance in metres from the left to the right camera, from `P2` and `P3`."""
+    """The baseline of a stereo pair: the distance in metres from the left to the right camera, from `P2` and `P3`."""
     return float((matrices["P2"][0, 3] - matrices["P3"][0, 3]) / matrices["P2"][0, 0])
 
 
 def label_corners(label: KittiLabel) -> Array:
-    """(8, 3) corners of a label's 3D box in camera 0, the four of the bottom face first."""
+    """The (8, 3) corners in metres of a label's 3D box in the frame of camera 0; the bottom face's four corners come
+    first.
+    """
     c, s = math.cos(label.rotation_y_rad), math.sin(label.rotation_y_rad)
     along = np.array([1, 1, -1, -1, 1, 1, -1, -1]) * label.length_m / 2
     up = np.array([0, 0, 0, 0, -1, -1, -1, -1]) * label.height_m
@@ -255,8 +267,9 @@ def label_corners(label: KittiLabel) -> Array:
 
 
 def split_lists(split: str, ids: Sequence[str]) -> dict[str, bytes]:
-    """The lists of a split: `ImageSets/<split>.txt` with a final newline, and `splits/<split>.txt` without, because its
-    reader would take an empty line for an id.
+    """The lists of sample ids of a split, as bytes by path: `ImageSets/<split>.txt` and `splits/<split>.txt`.
+
+    The second file has no final newline, because its reader would take an empty line for an id.
     """
     return {
         f"ImageSets/{split}.txt": "".join(f"{name}\n" for name in ids).encode(),

@@ -1,7 +1,7 @@
-"""PNG files of label maps, encoded from the pixels that differ from the pixel above.
+"""Fast PNG encoding of label maps, from the pixels that differ from the pixel above.
 
-Label maps consist of areas: of two million pixels about twenty thousand differ from the one above. The files are as
-large as a general encoder's and take a fifth of its time.
+Label maps consist of large areas: of two million pixels, about twenty thousand differ from the pixel above. The files
+are as large as those of a general encoder and take a fifth of its time.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _BUSY_SHARE = 0.2
 
 
 def encode_label_map(labels: Labels) -> bytes:
-    """Encodes an (H, W) uint8 or uint16 map as a grey PNG of 8 or 16 bits."""
+    """Encodes an (H, W) uint8 or uint16 label map as a greyscale PNG of 8 or 16 bits."""
     if labels.ndim != 2 or labels.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"labels must have shape (H, W) of uint8 or uint16, got {labels.shape} of {labels.dtype}")
     places, own, before = _changes(labels)
@@ -35,7 +35,7 @@ def encode_label_map(labels: Labels) -> bytes:
 
 
 def encode_painted(labels: npt.NDArray[np.uint8], rgba: UInt8Image) -> bytes:
-    """Encodes (H, W) uint8 labels as an RGBA PNG, coloured by a (K, 4) uint8 table."""
+    """Encodes (H, W) uint8 labels as an RGBA PNG, coloured by `rgba`, a (K, 4) uint8 table by label."""
     places, own, before = _changes(labels)
     if len(places) > _BUSY_SHARE * labels.size:
         return encode_labels(rgba[labels])

@@ -1,8 +1,8 @@
-"""Polygons of masks along the borders of their pixels, as COCO describes single objects.
+"""Converts masks of objects to polygons along the borders of their pixels, in COCO's form.
 
-The polygons run through the corners of pixels, in edge pixels. pycocotools, which fills pixels whose centre lies
-inside, gives the same mask again. A COCO polygon cannot have a hole, so a piece with a hole is cut in two through the
-hole.
+The polygons run through the corners of pixels, in edge pixels. pycocotools fills the pixels whose centres lie inside a
+polygon, so it restores the same mask. A COCO polygon cannot have a hole; a piece with a hole is therefore cut in two
+through the hole.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ Ring = tuple[tuple[int, int], ...]
 
 
 def mask_polygons(mask: Mask, left_px: int = 0, top_px: int = 0) -> list[list[int]]:
-    """The polygons of a mask.
+    """Converts a mask to polygons that cover exactly its pixels.
 
     Args:
-        mask: (h, w).
+        mask: (h, w) bool mask, a crop of the picture.
         left_px, top_px: column and row of the mask's first pixel in the picture.
 
     Returns:
-        `x, y, x, y, ...` of each polygon in edge pixels. Together they cover the pixels of the mask and no others; no
-        two overlap, and none has a hole. Pieces that touch at corners alone are polygons of their own.
+        Corners `x, y, x, y, ...` of each polygon in edge pixels. The polygons do not overlap and have no holes. Pieces
+        of the mask that touch only at corners are separate polygons.
     """
     polygons: list[list[int]] = []
     parts = [(mask, left_px, top_px)]
@@ -124,16 +124,16 @@ def _partners(order: Ints) -> list[int]:
 
 
 def joined_polygons(polygons: Sequence[Sequence[int]]) -> list[int]:
-    """Several polygons as one, for formats that have one polygon per object.
+    """Joins several polygons to one polygon, for formats that have one polygon per object.
 
-    Each polygon is joined to those before it by a bridge of no width between their two nearest corners. Filled, the
-    result covers what the polygons cover.
+    Each polygon is joined to the polygons before it by a bridge of width 0 between their two nearest corners. The
+    filled result covers the same area as the separate polygons.
 
     Args:
-        polygons: `x, y, x, y, ...` of each; at least one.
+        polygons: corners `x, y, x, y, ...` of each polygon; at least one polygon.
 
     Returns:
-        `x, y, x, y, ...` of the one polygon.
+        The corners `x, y, x, y, ...` of the joined polygon.
     """
     ring = np.asarray(polygons[0], dtype=np.int64).reshape(-1, 2)
     for polygon in polygons[1:]:

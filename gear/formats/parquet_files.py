@@ -1,4 +1,7 @@
-"""The samples of a split as Parquet files: one row per sample, one column per file and per part of its sidecar."""
+"""Encodes the samples of a split as Parquet files: one row per sample.
+
+Columns are the files of a sample and the parts of its sidecar (its JSON file).
+"""
 
 from __future__ import annotations
 
@@ -20,16 +23,16 @@ PICTURES = ("png", "tiff", "tif", "jpg", "jpeg")
 TEXT_SUFFIXES = ("txt", "json", "csv")
 
 ROWS = 100
-"""Rows of a row group, the piece that readers load at a time."""
+"""Number of rows in a row group, the part of a Parquet file that readers load at once."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParquetOptions:
-    """Options of the layouts with Parquet files.
+    """Options of the layouts that write Parquet files.
 
     Attributes:
-        shard_mb: size of the samples' files in one Parquet file, in megabytes (10^6 bytes), 0.01 to 10000. A file holds
-            at least one sample.
+        shard_mb: largest size of the samples in one Parquet file, in megabytes (10^6 bytes), 0.01 to 10000. A file with
+            a single sample may be larger.
     """
 
     shard_mb: float = 256.0
@@ -56,17 +59,18 @@ def pyarrow_parquet() -> tuple[ModuleType, ModuleType]:
 def parquet_files(
     split: ExportSplit, read: Read, options: ParquetOptions, *, with_features: bool = False
 ) -> Iterator[bytes]:
-    """The Parquet files of one split.
+    """The Parquet files of one split, as bytes, in order.
 
-    Columns are `index`, `sequence` and `frame`; `record`, `surfaces` and `facts` as JSON texts; and one for each file
-    of a sample (`gear.formats.sample_parts`): bytes, or text for text files.
+    Columns are `index`, `sequence` and `frame`; the JSON texts `record`, `surfaces` and `facts` of the sidecar; and one
+    column for each file of a sample (`gear.formats.sample_parts`). The cells of a file's column are text for text
+    files, otherwise bytes.
 
     Args:
-        split: a split of any task.
-        read: the bytes of a file of the dataset, by relative path.
-        options: of the layout.
-        with_features: writes pictures as `{bytes, path}` and describes the columns to the package `datasets`, which
-            then shows pictures.
+        split: a finished split of any task.
+        read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        options: options of the layout.
+        with_features: whether pictures are written as `{bytes, path}` and the file describes its columns to the package
+            `datasets`, which then decodes the pictures.
 
     Raises:
         GearError: pyarrow is not installed.
@@ -130,7 +134,10 @@ def _file(rows: Sequence[dict[str, Any]], columns: dict[str, str], with_features
 
 
 def features(columns: dict[str, str]) -> Json:
-    """What the package `datasets` is told of each column: its type."""
+    """The description of columns that the package `datasets` reads from a Parquet file: the type of each column.
+
+    `columns` contains the file suffix of each column of files, by the column's name.
+    """
     described: dict[str, Json] = {key: {"dtype": "int64", "_type": "Value"} for key in NUMBERS}
     for column, suffix in columns.items():
         if suffix in PICTURES:

@@ -1,4 +1,4 @@
-"""Checks the size of a picture by its header before it is decoded, because a small file may unpack to gigabytes."""
+"""Checks the size of a picture by its header, before it is decoded: a small file may decode to gigabytes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ MOST_SIDE_PX = 8192
 
 
 def check_size(data: bytes, *, least_px: int = 1, most_px: int = MOST_SIDE_PX) -> None:
-    """Checks the sides that the header of an encoded picture gives, without decoding it.
+    """Checks the width and height in the header of an encoded picture, without decoding it.
 
     Args:
         data: a PNG, JPEG, TIFF, BMP, WebP or PNM file.

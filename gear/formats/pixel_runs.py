@@ -13,7 +13,7 @@ Box = tuple[int, int, int, int]
 """First column, first row, one past the last column, and one past the last row."""
 
 STRIP_ROWS = 64
-"""Number of rows that are compared at a time, few enough for intermediate results to stay in the processor's cache."""
+"""Number of rows that are compared at once. With so few rows, intermediate results stay in the processor's cache."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,7 +22,7 @@ class Runs:
 
     Attributes:
         shape: height and width of the picture.
-        values: (N,) value of the pixels of each run.
+        values: (N,) value of the pixels in each run.
         starts: (N,) row-major index of each run's first pixel.
         lengths: (N,) number of pixels of each run.
     """
@@ -34,7 +34,7 @@ class Runs:
 
     @staticmethod
     def of(picture: npt.NDArray[Any]) -> Runs:
-        """Finds the runs of an (H, W) picture."""
+        """Finds the runs of equal pixels of an (H, W) picture."""
         height, width = picture.shape
         found = []
         begins = np.ones((min(STRIP_ROWS, height), width), np.bool_)
@@ -47,18 +47,18 @@ class Runs:
         return Runs((height, width), values, starts, np.diff(starts, append=height * width))
 
     def painted(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """The (H, W) picture of the same runs with other (N,) values."""
+        """An (H, W) picture with the same runs, whose pixels get the new (N,) values."""
         return np.repeat(values, self.lengths).reshape(self.shape)
 
     def counts(self, size: int) -> Ints:
-        """(`size`,) number of pixels of each value; all values must be in 0..`size` - 1."""
+        """A (`size`,) array with the number of pixels of each value; all values must be in 0..`size` - 1."""
         return np.bincount(self.values, weights=self.lengths, minlength=size).astype(np.int64)
 
     def boxes(self, keys: npt.NDArray[Any]) -> dict[int, tuple[Box, int]]:
-        """The smallest box around all runs of each key, and the number of their pixels.
+        """The bounding box and the number of pixels of each key, from all runs with this key.
 
         Args:
-            keys: (N,) key of each run; runs with key 0 are skipped.
+            keys: (N,) key of each run, such as an object id; runs with key 0 are skipped.
         """
         used = np.flatnonzero(keys)
         if not used.size:

@@ -28,14 +28,16 @@ TIFF_UNCOMPRESSED = [cv2.IMWRITE_TIFF_COMPRESSION, 1]
 
 
 def encode_rgb(rgb: UInt8Image) -> bytes:
-    """Encodes (H, W, 3) uint8 RGB as an 8-bit RGB PNG."""
+    """Encodes an (H, W, 3) uint8 RGB picture as an 8-bit RGB PNG."""
     if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8:
         raise ValueError(f"rgb must have shape (H, W, 3) of uint8, got {rgb.shape} of {rgb.dtype}")
     return bytes(fpng.from_ndarray(np.ascontiguousarray(rgb)))
 
 
 def encode_labels(labels: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> bytes:
-    """Encodes (H, W) uint8 or uint16 as a grey PNG of 8 or 16 bits, and (H, W, 4) uint8 RGBA as an RGBA PNG."""
+    """Encodes an (H, W) uint8 or uint16 map as a greyscale PNG of 8 or 16 bits, or an (H, W, 4) uint8 picture as an
+    RGBA PNG.
+    """
     if labels.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"labels must be uint8 or uint16, got {labels.dtype}")
     stored = cv2.cvtColor(labels, cv2.COLOR_RGBA2BGRA) if labels.ndim == 3 else labels
@@ -43,7 +45,7 @@ def encode_labels(labels: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> byt
 
 
 def encode_tiff(values: FloatImage) -> bytes:
-    """Encodes (H, W) float32 as an uncompressed one-channel TIFF, without loss."""
+    """Encodes an (H, W) float32 map as an uncompressed one-channel TIFF, without loss."""
     if values.ndim != 2 or values.dtype != np.float32:
         raise ValueError(f"values must have shape (H, W) of float32, got {values.shape} of {values.dtype}")
     return _encode(".tiff", values, TIFF_UNCOMPRESSED)
@@ -64,7 +66,7 @@ def decode_rgb(data: bytes) -> UInt8Image:
 
 
 def decode_plain(data: bytes) -> npt.NDArray[Any]:
-    """Decodes a grey PNG or a float TIFF to (H, W) of the file's dtype.
+    """Decodes a greyscale PNG or a float TIFF to an (H, W) array with the file's dtype.
 
     Raises:
         ValueError: the bytes are not a picture.

@@ -17,19 +17,20 @@ from isal import isal_zlib
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 PLAIN_CHUNKS = {b"IHDR", b"IDAT", b"IEND", b"fdEC"}
-"""Chunks without information on colours; the last one is the marker of fpng."""
+"""PNG chunks that do not change the meaning of pixel values, unlike a palette or a gamma. `fdEC` is fpng's marker."""
 
 CHANNELS = {(8, 0): 1, (16, 0): 1, (8, 2): 3}
-"""Number of channels by bit depth and PNG colour type: grey and RGB."""
+"""Number of channels by bit depth and PNG colour type (0 is grey, 2 is RGB)."""
 
 NONE, SUB, UP = 0, 1, 2
 
 
 def decode_rows(data: bytes) -> npt.NDArray[Any] | None:
-    """Decodes a grey PNG to (H, W) uint8 or uint16, and a colour PNG to (H, W, 3) uint8 RGB.
+    """Decodes a simple PNG file: grey to (H, W) uint8 or uint16, RGB to (H, W, 3) uint8.
 
-    Returns None for files that it does not handle or that are damaged: palettes, alpha, other bit depths, interlacing,
-    chunks that change colours, and filters that use more than one neighbour.
+    The result is None for damaged files and for files with features that gear's own files do not have. These are
+    palettes, alpha, other bit depths, interlacing, chunks that change colours, and filters that use more than one
+    neighbour.
     """
     chunks = _chunks(data)
     header = chunks.get(b"IHDR", b"")
@@ -57,12 +58,12 @@ def decode_rows(data: bytes) -> npt.NDArray[Any] | None:
 
 
 def encode_deep(values: npt.NDArray[np.uint16]) -> bytes:
-    """Encodes (H, W) uint16 as a grey PNG of 16 bits, for values that seldom repeat. The bytes may depend on the
-    processor.
+    """Encodes an (H, W) uint16 map whose values seldom repeat as a greyscale PNG of 16 bits. The bytes may depend on
+    the processor.
 
-    It takes a seventh of OpenCV's time for a predicted depth map, and its files are a quarter larger. If rows can be
-    divided into pixels of three or four bytes, fpng encodes them as if they were colours, because its filter and its
-    compression work on bytes. Files that must be the same on every machine are encoded by `gear.formats.png`.
+    For a predicted depth map, this function takes a seventh of OpenCV's time, and the file is a quarter larger. If the
+    bytes of a row can be divided into pixels of three or four bytes, fpng encodes them as colours, because its filter
+    and its compression work on bytes. Files that must be the same on every machine are encoded by `gear.formats.png`.
     """
     height, width = values.shape
     rows = values.astype(">u2").view(np.uint8).reshape(height, -1)
@@ -78,7 +79,9 @@ def encode_deep(values: npt.NDArray[np.uint16]) -> bytes:
 
 
 def whole(width: int, height: int, depth_bits: int, colour: int, deflated: bytes) -> bytes:
-    """A complete PNG file from its filtered, deflated rows; `colour` is PNG's colour type."""
+    """A complete PNG file, as bytes, from filtered and deflated rows; `colour` is the colour type of the PNG
+    specification.
+    """
     header = struct.pack(">IIBBBBB", width, height, depth_bits, colour, 0, 0, 0)
     return SIGNATURE + b"".join(
         struct.pack(">I", len(content)) + name + content + struct.pack(">I", isal_zlib.crc32(name + content))

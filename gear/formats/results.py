@@ -1,5 +1,6 @@
-"""Result files of predictions, in the layouts that the benchmarks' own scripts read. Paths are relative to
-one folder.
+"""Paths and lines of files with predictions, in the layouts that the benchmarks' own scripts read.
+
+Paths are relative to the folder of the predictions.
 """
 
 from __future__ import annotations
@@ -11,22 +12,26 @@ from gear.formats.kitti_object import KittiLabel
 
 
 def cityscapes_path(town: str, sequence: int, frame: int) -> str:
-    """Path of a picture of label ids; the benchmark's script finds it by its stem, anywhere under the folder."""
+    """Path of a predicted picture of label ids. The benchmark's script finds the file by its name in any subfolder."""
     return f"cityscapes/{city_name(town)}/{stem(town, sequence, frame)}_predLabelIds.png"
 
 
 def kitti_depth_paths(index: int) -> tuple[str, str]:
-    """Paths of the 16-bit picture for the devkit, and of the lossless depth in metres."""
+    """Paths of the two files of a predicted depth map: a 16-bit picture for KITTI's development kit, and a lossless
+    file in metres.
+    """
     return f"depth/rgb_{index:04d}.png", f"depth_metres/rgb_{index:04d}.tiff"
 
 
 def kitti_object_path(index: int) -> str:
-    """Path of a result file; the devkit reads `data/%06d.txt`."""
+    """Path of a file with predicted 3D boxes; KITTI's development kit reads `data/%06d.txt`."""
     return f"data/{index:06d}.txt"
 
 
 def kitti_result_lines(found: Iterable[KittiLabel]) -> bytes:
-    """Result lines of 16 fields with all digits, so that an independent evaluation gets the same numbers as gear's.
+    """The bytes of a KITTI result file: one line of 16 fields per predicted box.
+
+    Numbers have all digits, so that an independent evaluation gets exactly the same metrics as gear.
 
     Raises:
         ValueError: a detection has no score.
@@ -52,5 +57,5 @@ def _result_line(label: KittiLabel) -> str:
 
 
 def coco_path(split: str) -> str:
-    """Path of the results file of a split."""
+    """Path of the file with the detections of a split, in COCO's results format."""
     return f"coco_results_{split}.json"

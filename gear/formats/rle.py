@@ -1,6 +1,7 @@
-"""COCO's run-length encoding: masks by columns, starting with a run of zeros, as the compressed string of pycocotools.
+"""COCO's compressed run-length encoding (RLE) of masks, as strings that pycocotools reads.
 
-Masks are encoded from crops, so that the time depends on the size of the objects and not on that of the picture.
+Pixels are ordered by columns, and the first run consists of zeros. Masks are encoded from crops, so the time depends on
+the size of the object and not on the size of the picture.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ Mask = npt.NDArray[np.bool_]
 
 
 def encode_crop(mask: Mask, left: int, top: int, height_px: int, width_px: int) -> str:
-    """Encodes a picture that is empty except for `mask`, whose first pixel is at (left, top)."""
+    """Encodes a mask of a whole picture as an RLE string. The picture is empty except for the crop `mask`, whose first
+    pixel is at (left, top).
+    """
     rows, columns = mask.shape
     if left < 0 or top < 0 or left + columns > width_px or top + rows > height_px:
         raise ValueError(f"mask of shape {mask.shape} at ({left}, {top}) leaves the picture ({height_px}, {width_px})")
@@ -31,7 +34,7 @@ def encode_crop(mask: Mask, left: int, top: int, height_px: int, width_px: int) 
 
 
 def encode(mask: Mask) -> str:
-    """Encodes an (H, W) mask."""
+    """Encodes an (H, W) bool mask as an RLE string."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not rows.size:
         return encode_crop(np.zeros((0, 0), np.bool_), 0, 0, *mask.shape)
@@ -40,19 +43,19 @@ def encode(mask: Mask) -> str:
 
 
 def check(counts: str, height_px: int, width_px: int) -> None:
-    """Checks that `decode` accepts a compressed string, at a fraction of its cost.
+    """Checks that a string is a valid RLE of a mask of this size. This takes a fraction of the time of decoding.
 
     Raises:
-        ValueError: it is no such string, or the runs do not fill a picture of this size.
+        ValueError: the string is no RLE, or its runs do not fill a picture of this size.
     """
     _runs(counts, height_px, width_px)
 
 
 def decode(counts: str, height_px: int, width_px: int) -> Mask:
-    """Decodes a compressed string to an (H, W) mask.
+    """Decodes an RLE string to an (H, W) bool mask.
 
     Raises:
-        ValueError: it is no such string, or the runs do not fill a picture of this size.
+        ValueError: the string is no RLE, or its runs do not fill a picture of this size.
     """
     runs = _runs(counts, height_px, width_px)
     values = np.repeat(np.arange(len(runs)) % 2 == 1, runs)
@@ -60,10 +63,10 @@ def decode(counts: str, height_px: int, width_px: int) -> Mask:
 
 
 def decode_crop(counts: str, height_px: int, width_px: int, box_px: tuple[int, int, int, int]) -> Mask:
-    """Decodes the part of a mask inside a box (left, top, right, bottom), which must lie inside the picture.
+    """Decodes the part of an RLE mask inside a box (left, top, right, bottom), which must lie inside the picture.
 
     Raises:
-        ValueError: it is no such string, or the runs do not fill a picture of this size.
+        ValueError: the string is no RLE, or its runs do not fill a picture of this size.
     """
     left, top, right, bottom = box_px
     runs = _runs(counts, height_px, width_px)

@@ -1,4 +1,4 @@
-"""Short names for the files of a sample, for layouts that keep the files of a sample together."""
+"""Short names for the files of a sample, for export layouts that store all files of a sample together."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from gear.contracts.tasks import Sidecar
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """One file of a sample.
+    """One file of a sample, with a short name.
 
     Attributes:
-        name: lower-case letters, digits and `_`: the folder of the file, with the end of the file's name where several
-            files of the sample lie in that folder.
-        suffix: of the file, lower-case, without a dot.
-        path: relative to the dataset's root.
-        glob: pattern that finds the files of this name of all samples in the same folder.
+        name: lower-case letters, digits and `_`: the name of the folder. If the sample has several files in the folder,
+            the distinct end of the file's name is appended.
+        suffix: suffix of the file, lower-case, without a dot.
+        path: path relative to the dataset's root.
+        glob: glob pattern that finds the files with this name of all samples in the same folder.
     """
 
     name: str
@@ -29,20 +29,22 @@ class Part:
 
 
 def parts_of(sidecar: Sidecar, split: str) -> list[Part]:
-    """The files of a sample without auxiliary ones, such as probes, in order of name and suffix."""
+    """The files of a sample with their short names, sorted by name and suffix. Auxiliary files, such as probes, are
+    left out.
+    """
     auxiliary = {file.path for file in sidecar.auxiliary.values()}
     return parts([path for path in sidecar.files if path not in auxiliary], split)
 
 
 def parts(paths: Iterable[str], split: str) -> list[Part]:
-    """Names for the files of one sample, in order of name and suffix.
+    """Short names for the files of one sample, sorted by name and suffix.
 
-    `val/image_2/000000.png` is `image_2`; `gtFine/val/city/city_000000_000000_gtFine_labelIds.png` beside
-    `…_gtFine_color.png` is `gtfine_labelids`.
+    `val/image_2/000000.png` gets the name `image_2`. If `…_gtFine_color.png` exists in the same folder,
+    `gtFine/val/city/city_000000_000000_gtFine_labelIds.png` gets the name `gtfine_labelids`.
 
     Args:
-        paths: of the files of one sample, relative to the dataset's root.
-        split: name of the split, a folder that is left out of the names.
+        paths: paths of the files of one sample, relative to the dataset's root.
+        split: name of the split; the folder with this name is left out of the short names.
     """
     listed = sorted(paths)
     for is_full in (False, True):
@@ -81,6 +83,10 @@ def _ends(stems: list[str]) -> list[str]:
 
 
 def column_of(name: str, suffix: str, found: Collection[tuple[str, str]]) -> str:
-    """The name of a part as a column, among all parts that occur."""
+    """The column name of a file in a table: its short name. The suffix is appended if files with different suffixes
+    share the name.
+
+    `found` contains the short name and suffix of every file that occurs.
+    """
     is_shared = sum(other == name for other, _ in found) > 1
     return f"{name}_{suffix.replace('.', '_')}" if is_shared else name

@@ -1,1 +1,3 @@
-"""The layouts of `gear export`. Each module defines one, as `LAYOUT`; `layout` and `registry` are shared code."""
+"""The layouts to which `gear export` can write a dataset. Each module defines one layout as `LAYOUT`; the modules
+`layout` and `registry` contain shared code.
+"""

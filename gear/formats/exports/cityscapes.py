@@ -1,4 +1,4 @@
-"""Cityscapes as the benchmark itself is laid out, with train ids, in the splits that its tools know."""
+"""Export to the layout of the Cityscapes benchmark, with train ids, in the splits `train`, `val` and `test`."""
 
 from __future__ import annotations
 
@@ -13,21 +13,22 @@ from gear.formats.label_png import encode_label_map
 from gear.formats.png import decode_plain
 
 SPLITS = ("train", "val", "test")
-"""The splits of the benchmark; torchvision refuses others, and the benchmark's evaluation reads `val` alone."""
+"""The splits of the benchmark. torchvision refuses other names, and the benchmark evaluates the files of `val` only."""
 
 TRAIN_IDS = np.array([label.train_id for label in LABELS], dtype=np.uint8)
-"""(34,) train ids by label id: 0 to 18, and 255 for what is not evaluated."""
+"""(34,) uint8 train id of each label, by label id: 0 to 18, and 255 for labels that are not evaluated."""
 
 
 def cityscapes_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
-    """The files of the new tree, from a semseg dataset: those of the dataset, and `_gtFine_labelTrainIds.png`.
+    """The files of a semseg dataset in the Cityscapes layout, and one file `_gtFine_labelTrainIds.png` per sample.
 
-    A split of another name than the benchmark's goes to the one that its first word names, such as `val_night` to
-    `val`, or to `val`. Its city is called after it, so that no two splits share a city.
+    A split is written to the benchmark's split that its first word names: `val_night` becomes `val`. A split whose
+    first word is no split of the benchmark also becomes `val`. A split that is not called exactly `train`, `val` or
+    `test` gets its own city name, so no two splits share a city.
 
     Args:
-        splits: of the dataset.
-        read: the bytes of a file of the dataset, by relative path.
+        splits: the finished splits of the dataset.
+        read: function that returns the bytes of a file of the dataset, by path relative to its root.
     """
     for split in splits:
         info = split.info

@@ -1,4 +1,4 @@
-"""COCO as the benchmark itself is laid out: pictures by split, one annotation file for each."""
+"""Export to the layout of the COCO benchmark: a folder of pictures and an annotation file for each split."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from gear.formats.exports.layout import ExportSplit, Layout, Read, Tree, check_r
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CocoOptions:
-    """Options of the layout.
+    """Options of the export to COCO's layout.
 
     Attributes:
-        year: stands behind the split in the names of folders and files, as in `train2017`; 0 for no year.
+        year: number that follows the split in the names of folders and files, as in `train2017`; 0 for no year.
     """
 
     year: int = 2017
@@ -23,15 +23,16 @@ class CocoOptions:
 
 
 def coco_tree(splits: Sequence[ExportSplit], read: Read, options: CocoOptions) -> Tree:
-    """`<split><year>/` with the pictures and `annotations/instances_<split><year>.json`, from a detect2d dataset.
+    """The files of a detect2d dataset in COCO's layout, as pairs of path and bytes.
 
-    The annotation file has the same bytes as the dataset's. Each annotation has an additional key `gear` (object,
-    visibility, distance), which COCO's tools do not read.
+    The pictures lie in `<split><year>/`, the annotations in `annotations/instances_<split><year>.json`. The annotation
+    file is copied unchanged. Each annotation has an additional key `gear` (object, visibility, distance), which COCO's
+    tools ignore.
 
     Args:
-        splits: of the dataset.
-        read: the bytes of a file of the dataset, by relative path.
-        options: of the layout.
+        splits: the finished splits of the dataset.
+        read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        options: options of this layout.
     """
     year = str(options.year) if options.year else ""
     for split in splits:

@@ -1,4 +1,4 @@
-"""A folder for the package `datasets` and the hub of Hugging Face: Parquet files and a dataset card."""
+"""Export to a folder for the Hugging Face hub and its package `datasets`: Parquet files and a dataset card."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ STRUCTURE = (
 
 
 def hf_tree(splits: Sequence[ExportSplit], read: Read, options: ParquetOptions) -> Tree:
-    """`README.md` and `data/<split>-000000.parquet`, … from a dataset of any task.
+    """The files of a dataset of any task for the Hugging Face hub, as pairs of path and bytes.
 
-    `datasets.load_dataset(FOLDER)` reads it. The split `val` is called `validation` there.
+    The files are `README.md` (the dataset card) and `data/<split>-000000.parquet`, `data/<split>-000001.parquet`, ….
+    `datasets.load_dataset(FOLDER)` reads the folder. The split `val` is called `validation` there.
 
     Args:
-        splits: of the dataset.
-        read: the bytes of a file of the dataset, by relative path.
-        options: of the layout.
+        splits: the finished splits of the dataset.
+        read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        options: options of this layout.
 
     Raises:
         GearError: pyarrow is not installed.

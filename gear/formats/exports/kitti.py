@@ -1,4 +1,6 @@
-"""Export to the layout of KITTI's object detection benchmark: pools `training` and `testing`, and lists of ids."""
+"""Export to the layout of KITTI's object detection benchmark: folders `training` and `testing`, and lists of sample
+ids.
+"""
 
 from __future__ import annotations
 
@@ -9,20 +11,20 @@ from gear.formats.kitti_object import SCAN, dont_care, format_labels
 
 FOLDERS = (("image_2", "png"), ("image_3", "png"), ("calib", "txt"), ("label_2", "txt"))
 LISTS = ("train", "val", "trainval", "test")
-"""Lists of ids that converters of other tools read, empty where the dataset has no such split."""
+"""Names of the id lists that converters of other tools read. A list is empty if the dataset has no such split."""
 
 
 def kitti_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
-    """The files of the exported tree, from a stereo3d dataset.
+    """The files of a stereo3d dataset in the layout of KITTI's object benchmark, as pairs of path and bytes.
 
-    Splits whose first word is `test` are the pool `testing`, all others the pool `training`. In each pool ids run from
-    0 through the splits in the order given, so that `ImageSets/<split>.txt` tells them apart. `ImageSets/trainval.txt`
-    joins `train` and `val`. `velodyne` is there if the dataset has laser scans (`scans: true` of a collection). The
-    benchmark keeps the labels of `testing` secret; here they are in `testing/label_2`.
+    Splits whose first word is `test` are written to the folder `testing`, all other splits to `training`. In each of
+    the two folders, ids count from 0 through all splits; `ImageSets/<split>.txt` lists the ids of a split.
+    `ImageSets/trainval.txt` joins `train` and `val`. `velodyne` exists if the dataset has laser scans (`scans: true` in
+    the configuration). The benchmark keeps the labels of `testing` secret; the export has them in `testing/label_2`.
 
     Args:
-        splits: the splits of the dataset.
-        read: returns the bytes of a file of the dataset, by relative path.
+        splits: the finished splits of the dataset.
+        read: function that returns the bytes of a file of the dataset, by path relative to its root.
     """
     lists: dict[str, list[str]] = {name: [] for name in LISTS}
     numbers = {"training": 0, "testing": 0}
@@ -45,10 +47,11 @@ def kitti_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -
 
 
 def labels_of(data: bytes) -> bytes:
-    """A label file as stock converters need it, which the benchmark's own files are.
+    """A KITTI label file in the form that common converters accept: `DontCare` lines last, and never empty.
 
-    MMDetection3D takes the first lines for the objects, as many as are not `DontCare`, so that `DontCare` lines come
-    last. OpenPCDet fails on a file without a line; it gets a `DontCare` region without area, which excuses nothing.
+    MMDetection3D counts the lines that are not `DontCare` and takes that many lines from the top of the file, so
+    `DontCare` lines must come last. OpenPCDet fails on an empty file; such a file gets one `DontCare` region of area 0,
+    which has no effect on the evaluation.
     """
     lines = data.decode().splitlines(keepends=True)
     lines.sort(key=lambda line: line.startswith("DontCare"))

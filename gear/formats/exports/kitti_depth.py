@@ -1,4 +1,6 @@
-"""Export to the layout of KITTI's depth benchmark: drives, annotated depth, and the cropped selection of its devkit."""
+"""Export to the layout of KITTI's depth benchmark: drives (recordings) with pictures and annotated depth, and cropped
+pictures as in the benchmark's development kit.
+"""
 
 from __future__ import annotations
 
@@ -15,16 +17,18 @@ CROP_WIDTH_PX, CROP_HEIGHT_PX = 1216, 352
 
 
 def kitti_depth_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
-    """The files of the exported tree, from a depth dataset.
+    """The files of a depth dataset in the layout of KITTI's depth benchmark, as pairs of path and bytes.
 
-    `<date>/<drive>/image_02/data/` holds pictures, `train|val/<drive>/proj_depth/groundtruth/image_02/` depth in 1/256
-    m. The split `train` is written to `train`, all others to `val`. A split of single pictures is one drive; a split of
-    sequences has one drive per sequence. Splits other than `train` are also written to `val_selection_cropped`, cropped
-    to 1216 x 352 with adapted intrinsics, if their pictures are large enough. There are no laser scans.
+    Pictures are written to `<date>/<drive>/image_02/data/`. Depth, in units of 1/256 m, is written to
+    `train|val/<drive>/proj_depth/groundtruth/image_02/`. The split `train` is written to `train`, all other splits to
+    `val`. A split of single pictures is one drive; a split of sequences has one drive per sequence.
+
+    Splits other than `train` are also written to `val_selection_cropped` if their pictures are large enough: cropped to
+    1216 x 352, with adapted intrinsics. The export has no laser scans.
 
     Args:
-        splits: the splits of the tree.
-        read: returns the bytes of a file of the dataset, by relative path.
+        splits: the finished splits of the dataset.
+        read: function that returns the bytes of a file of the dataset, by path relative to its root.
     """
     drives: dict[tuple[str, int], int] = {}
     for split in splits:

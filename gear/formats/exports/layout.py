@@ -1,4 +1,6 @@
-"""What a layout of `gear export` is: a finished dataset in, the files of another tree out."""
+"""The interface of a layout of `gear export`: a function from a finished dataset to the files of another directory
+tree.
+"""
 
 from __future__ import annotations
 
@@ -11,21 +13,26 @@ from gear.values.errors import FieldError
 from gear.values.serial import Json
 
 Read = Callable[[str], bytes]
-"""The bytes of a file of the dataset, by path relative to its root; a file that was changed raises `DatasetError`."""
+"""Function that returns the bytes of a dataset's file, by path relative to the dataset's root. It raises `DatasetError`
+if the file was changed after it was written.
+"""
 
 Tree = Iterator[tuple[str, bytes]]
-"""Paths and bytes of the files of a new tree. No path comes twice; at most one file is in memory at a time."""
+"""Pairs of path and bytes, the files of a new directory tree. No path occurs twice; at most one file is in memory at a
+time.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ExportSplit:
-    """One finished split.
+    """One finished split of a dataset that is exported.
 
     Attributes:
         info: names and seed of the split.
         task: name of its task.
-        sidecars: of its samples, in order of index. Each is read when it is accessed.
-        sidecar_paths: where the sidecars lie, relative to the dataset's root.
+        sidecars: the sidecar of each sample (its JSON file), in order of index; each file is read when its entry is
+            accessed.
+        sidecar_paths: paths of the sidecars, relative to the dataset's root.
         manifest: versions, renderer and configuration of the split.
     """
 
@@ -38,18 +45,19 @@ class ExportSplit:
 
 @dataclass(frozen=True, slots=True)
 class NoOptions:
-    """The options of a layout that has none."""
+    """The empty options of a layout that has no options."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """A layout to export to.
+    """A layout to which `gear export` can write a dataset.
 
     Attributes:
-        tasks: names of the tasks whose datasets it takes; empty for any.
-        summary: one line.
-        tree: the files of the new tree, from splits, a function that reads the dataset's files, and the options.
-        options: frozen dataclass of the options, all with defaults.
+        tasks: names of the tasks whose datasets the layout accepts; empty for all tasks.
+        summary: a one-line description.
+        tree: function that yields the files of the new tree. Its arguments are the splits, a function that reads the
+            dataset's files, and the options.
+        options: frozen dataclass of the layout's options, all with defaults.
     """
 
     tasks: tuple[str, ...]
@@ -59,10 +67,10 @@ class Layout:
 
 
 def check_range(name: str, value: float, low: float, high: float) -> None:
-    """Refuses an option of a layout out of its range.
+    """Checks that the value of a layout's option lies in its range `low` to `high`.
 
     Raises:
-        FieldError: names the option, its range and the value.
+        FieldError: the value is out of range; the message names the option, its range and the value.
     """
     if not low <= value <= high:
         raise FieldError(name, f"must be {low:g} to {high:g}, got {value:g}")

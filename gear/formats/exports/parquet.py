@@ -1,4 +1,4 @@
-"""Parquet: one row per sample, with pictures as bytes."""
+"""Export to Parquet files with one row per sample, in which pictures are stored as bytes."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from gear.formats.parquet_files import ParquetOptions, parquet_files
 
 
 def parquet_tree(splits: Sequence[ExportSplit], read: Read, options: ParquetOptions) -> Tree:
-    """`<split>-000000.parquet`, `<split>-000001.parquet`, … from a dataset of any task.
+    """The Parquet files `<split>-000000.parquet`, `<split>-000001.parquet`, … of a dataset of any task.
 
     Args:
-        splits: of the dataset.
-        read: the bytes of a file of the dataset, by relative path.
-        options: of the layout.
+        splits: the finished splits of the dataset.
+        read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        options: options of this layout.
 
     Raises:
         GearError: pyarrow is not installed.

@@ -1,4 +1,4 @@
-"""The layouts of `gear export`, found by the names of their modules."""
+"""Finds the layouts of `gear export` by the names of their modules in this folder."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from gear.formats.exports.layout import Layout
 from gear.values.errors import UnknownNameError
 
 NO_LAYOUTS = ("layout", "registry")
-"""Modules of the folder that are no layout."""
+"""Modules of this folder that do not define a layout."""
 
 
 def layout_names() -> list[str]:
-    """Names of the layouts, sorted; `kitti_depth.py` is the layout `kitti-depth`."""
+    """The names of all layouts, sorted. Names have hyphens: the module `kitti_depth.py` is the layout `kitti-depth`."""
     return sorted(
         one.name.replace("_", "-") for one in pkgutil.iter_modules(exports.__path__) if one.name not in NO_LAYOUTS
     )
 
 
 def find_layout(name: str) -> Layout:
-    """A layout by its name.
+    """Finds the layout of `gear export` with this name, such as `kitti-depth`.
 
     Raises:
         UnknownNameError: there is no such layout.

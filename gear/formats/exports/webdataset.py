@@ -1,4 +1,6 @@
-"""WebDataset: tar archives, in which the files of a sample follow one another and share the part before the dot."""
+"""Export to WebDataset: tar archives in which the files of a sample are adjacent and share the part of the name before
+the dot.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +20,11 @@ BLOCK = tarfile.BLOCKSIZE
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WebdatasetOptions:
-    """Options of the layout.
+    """Options of the export to WebDataset.
 
     Attributes:
-        shard_mb: size that an archive does not exceed, in megabytes (10^6 bytes), 0.01 to 10000. An archive holds at
-            least one sample.
+        shard_mb: largest size of an archive in megabytes (10^6 bytes), 0.01 to 10000. An archive with a single sample
+            may be larger.
     """
 
     shard_mb: float = 256.0
@@ -32,15 +34,16 @@ class WebdatasetOptions:
 
 
 def webdataset_tree(splits: Sequence[ExportSplit], read: Read, options: WebdatasetOptions) -> Tree:
-    """`<split>-000000.tar`, `<split>-000001.tar`, … and `<split>.json`, an index of them (wids, version 1).
+    """The tar archives `<split>-000000.tar`, … of a dataset, and for each split an index `<split>.json` (wids, version
+    1).
 
-    A sample is `000000.<part>.<suffix>` for each of its files, and `000000.json`, its sidecar with scene, ground truth
-    and hashes. The same dataset gives the same bytes: members have a fixed order, no time and no owner.
+    Each file of a sample is called `000000.<part>.<suffix>`. `000000.json` is the sample's sidecar: scene, ground truth
+    and hashes. The same dataset gives the same bytes, because members have a fixed order and neither time nor owner.
 
     Args:
-        splits: of the dataset, of any task.
-        read: the bytes of a file of the dataset, by relative path.
-        options: of the layout.
+        splits: the finished splits of a dataset of any task.
+        read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        options: options of this layout.
     """
     most = int(options.shard_mb * 1e6)
     for split in splits:
@@ -79,7 +82,7 @@ def _shard(split: str, samples: Sequence[Sequence[Member]], index: list[dict[str
 
 
 def tar_bytes(members: Iterator[Member]) -> bytes:
-    """A POSIX archive (ustar) of files in the order given: mode 644, no time, owner 0 without a name."""
+    """The bytes of a POSIX tar archive (ustar) with files in the given order: mode 644, time 0, owner 0."""
     stream = io.BytesIO()
     with tarfile.open(fileobj=stream, mode="w", format=tarfile.USTAR_FORMAT) as archive:
         for name, data in members:

@@ -1,4 +1,4 @@
-"""YOLO as Ultralytics reads it: `data.yaml`, `images/`, and a text file of labels for each picture."""
+"""Export to the YOLO layout that Ultralytics reads: `data.yaml`, pictures, and one text file of labels per picture."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from gear.formats.rle import decode_crop
 from gear.values.serial import Json
 
 DIGITS = 6
-"""Decimals of coordinates, which are shares of the picture: a thousandth of a pixel in pictures of 1000 pixels."""
+"""Number of decimals of coordinates. Coordinates are shares of the picture's size, so the step is a thousandth of a
+pixel in a picture of 1000 pixels.
+"""
 
 CLASS_OF = {category["id"]: number for number, category in enumerate(CATEGORIES)}
 """Class number by COCO's category id: 0 to 79 in COCO's order, as in the `coco.yaml` of Ultralytics."""
@@ -22,25 +24,25 @@ CLASS_OF = {category["id"]: number for number, category in enumerate(CATEGORIES)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class YoloOptions:
-    """Options of the layout.
+    """Options of the export to the YOLO layout.
 
     Attributes:
-        labels: `boxes`, for detection, or `polygons` of the masks, for the `-seg` models.
+        labels: `boxes` for detection, or `polygons` of the masks for the `-seg` models.
     """
 
     labels: Literal["boxes", "polygons"] = "boxes"
 
 
 def yolo_tree(splits: Sequence[ExportSplit], read: Read, options: YoloOptions) -> Tree:
-    """`images/<split>/`, `labels/<split>/` and `data.yaml`, from a detect2d dataset.
+    """The files of a detect2d dataset in the YOLO layout: `images/<split>/`, `labels/<split>/` and `data.yaml`.
 
-    Objects that COCO's evaluation ignores (`iscrowd` 1) are left out: the format has no way to say it. A picture
-    without an object has an empty file.
+    Objects that COCO's evaluation ignores (`iscrowd` 1) are left out, because the YOLO format cannot mark them. A
+    picture without objects has an empty label file.
 
     Args:
-        splits: of the dataset.
-        read: the bytes of a file of the dataset, by relative path.
-        options: of the layout.
+        splits: the finished splits of the dataset.
+        read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        options: options of this layout.
     """
     for split in splits:
         name = split.info.split
