@@ -2,9 +2,9 @@
 
     L' = L T + A (1 - T)
 
-The transmittance T depends on depth; the light A that the air scatters towards the camera depends on direction. Both
-are independent of the colours of surfaces, so frames stay linear in every albedo and a patch changes only pixels that
-show it.
+L is the light of a surface and L' the light that reaches the camera. The transmittance T depends on depth; the light A
+that the air scatters towards the camera depends on direction. T and A do not depend on the colours of surfaces. Frames
+therefore stay linear in every albedo, and a patch changes only the pixels that show the patch.
 
 Depth is sampled at pixel centres. In `film` quality, a pixel on a silhouette mixes the colours of two objects but gets
 the fog of the object at its centre. In thick fog, silhouettes of near objects are therefore as hard as in `fast`.
@@ -24,7 +24,9 @@ from gear.values.geometry import Array
 from gear.values.scene import CameraRecord
 
 SKY_DISTANCE_M = 2e4
-"""Length in metres that is assumed for rays that hit nothing (sky), where the fog does not thin with height."""
+"""Length in metres that is assumed for rays that hit nothing (sky). It matters for fog that has the same density at all
+heights.
+"""
 
 _COARSE_PX = 16
 _STRIP_ROWS = 32
@@ -50,8 +52,8 @@ class Fog:
     def thickness(self, length_m: FloatImage, rise: FloatImage, height_m: float) -> FloatImage:
         """Optical thickness of the fog along rays: the integral of the extinction, in closed form.
 
-        If the density decreases by the factor exp(-x) between the two ends of a ray, its mean is (1 - exp(-x)) / x
-        times the density at the lower end.
+        If the density decreases by the factor exp(-x) between the two ends of a ray, the mean density is (1 - exp(-x))
+        / x times the density at the lower end.
 
         Args:
             length_m: (h, w) lengths of the rays in metres.
@@ -59,7 +61,7 @@ class Fog:
             height_m: height at which the rays start (the camera's), metres.
 
         Returns:
-            (h, w) float32, without unit.
+            (h, w) float32 optical thickness, without unit.
         """
         inside_m = np.maximum(length_m - np.float32(self.from_m), 0)
         if self.thinning_per_m <= 0:
@@ -103,7 +105,7 @@ class Air:
             camera: the camera that takes the picture.
 
         Returns:
-            (H, W, 3) uint16, a new array, rounded.
+            (H, W, 3) uint16 frame with fog and haze, a new array.
         """
         if not self.fogs and not self.clear_per_m.any():
             return linear_rgb.copy()
@@ -125,8 +127,8 @@ class Air:
         return np.asarray(cv2.merge(planes), dtype=np.uint16)
 
     def transmittance(self, depth_m: FloatImage, camera: CameraRecord) -> FloatImage:
-        """(H, W, 3) float32 in 0..1: the share of a surface's light that reaches the camera, for each pixel and
-        channel.
+        """The transmittance of the air between surface and camera: (H, W, 3) float32, 0..1, the share of a surface's
+        light that reaches the camera, for each pixel and channel.
         """
         rays, _ = self._directions(camera)
         return np.stack(self._through(depth_m, rays, float(camera.world_from_camera.position_m[2])), axis=-1)

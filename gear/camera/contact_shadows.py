@@ -3,13 +3,13 @@
     L' = L (1 - s o)
 
 o is the share of the sky that the actor hides from a point on level ground, weighted by the cosine of the angle to the
-vertical. It is computed once per asset: the mean of the shadows of its triangles over directions from the whole sky.
-s is the sky's share in the light of the ground. Under a vehicle s is 1, because the sun does not reach that ground.
-Beside a vehicle the frame does not tell whether the sun shines there, so s is the mean of both cases. Neither o nor s
-depends on any albedo, so frames stay linear.
+vertical. It is computed once per asset: the mean of the shadows of its triangles over directions from the whole sky. s
+is the sky's share in the light of the ground. Under a vehicle s is 1, because the sun does not reach that ground.
+Beside a vehicle, the frame does not show whether the ground is in the sun, so s is the mean of its values in sun and
+shade. o and s do not depend on any albedo, so frames stay linear.
 
-No renderer of gear has these shadows: their sky light casts none, and `gear.render.occlusion` reaches a few decimetres
-only. Without them, cars seem to float under an overcast sky and in the shade of houses.
+The renderers of gear do not compute these shadows: their sky light casts no shadows, and `gear.render.occlusion` has a
+range of a few decimetres. Without them, cars seem to float under an overcast sky and in the shade of houses.
 """
 
 from __future__ import annotations
@@ -39,15 +39,17 @@ OUTLINE = np.float32(0.5)
 """Share of a pixel on an actor's silhouette that shows the background."""
 
 _FULL_FROM, _BESIDE_TO = 0.75, 0.4
-"""Hidden shares of the sky: above the first no sunlight is assumed; below the second there may be sunlight."""
+"""Two hidden shares of the sky. Above the first share, the ground is assumed to get no sunlight; below the second,
+sunlight is possible.
+"""
 
 _CELLS_PER_M = {"large": 12.5, "small": 16.0}
 _LARGE_M = 2.5
 _REACH_HEIGHTS, _LEAST_REACH_M, _MOST_REACH_M = 1.6, 0.6, 3.0
 _RIM = 0.4
 _STEP_M, _FADE_M = 0.2, 0.15
-"""Height difference between ground and wheels up to which shadows are full (a kerb), and the further difference
-over which they fade to nothing; metres.
+"""Height differences between ground and wheels, metres. Up to the first one (a kerb) shadows have full strength; over
+the second, they fade to 0.
 """
 
 _NEAREST_M, _FARTHEST_M = 0.3, 200.0
@@ -59,10 +61,11 @@ _EDGES = np.array([(i, i | bit) for bit in (1, 2, 4) for i in range(8) if not i 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkyOcclusion:
-    """Share of the sky that one asset hides from the level ground under and around it.
+    """Share of the sky that one asset hides from the level ground, as a map of the ground under and around the asset.
 
     Attributes:
-        share: (rows, columns) float32 in 0..1, 0 at the border. Rows go to the actor's left, columns to its front.
+        share: (rows, columns) float32 in 0..1, 0 at the border. Row indices increase to the actor's left, column
+            indices to its front.
         cells_per_m: cells per metre along both axes.
     """
 
@@ -188,7 +191,7 @@ class ContactShadows:
             record: the scene, for its actors.
 
         Returns:
-            (H, W, 3) uint16; `linear_rgb` itself where nothing is darkened.
+            (H, W, 3) uint16 frame with contact shadows; `linear_rgb` itself if no pixel is darkened.
         """
         left = self.factors(depth_m, is_ground, camera, record)
         if left is None:
@@ -203,7 +206,7 @@ class ContactShadows:
     def factors(
         self, depth_m: FloatImage, is_ground: Mask, camera: CameraRecord, record: SceneRecord
     ) -> FloatImage | None:
-        """(H, W) float32 factors by which the frame's values are multiplied; None if no pixel is darkened.
+        """The (H, W) float32 factors 0..1 by which contact shadows darken a frame; None if no pixel is darkened.
 
         The arguments are those of `apply`.
         """
@@ -260,7 +263,9 @@ class ContactShadows:
 
 
 def sky_share_beside(even_share: float) -> float:
-    """The sky's share in the light beside an actor: the mean of shade (1) and sun (`even_share`)."""
+    """The sky's share, 0..1, of the light on the ground beside an actor: the mean of 1 (ground in shade) and
+    `even_share` (in the sun).
+    """
     return (1 + even_share) / 2
 
 

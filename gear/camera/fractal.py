@@ -1,6 +1,7 @@
-"""Fractal textures (sums of periodic noise at several scales), bilinear reads of textures, and a smooth step.
+"""Fractal textures (sums of periodic noise at several scales), bilinear interpolation of textures, and a smooth step
+function.
 
-`gear.camera.effects.noise` is another thing: the noise of the camera's sensor.
+The noise of the camera's sensor is computed in `gear.camera.effects.noise` instead.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ def periodic_noise(rng: np.random.Generator, octaves: Sequence[int], slope: floa
         slope: the scale with n cells has the weight n ** -slope.
 
     Returns:
-        (`TILE_PX`, `TILE_PX`) float32.
+        (`TILE_PX`, `TILE_PX`) float32 texture that repeats without seams.
     """
     total = np.zeros((TILE_PX, TILE_PX), np.float32)
     for octave in octaves:
@@ -52,7 +53,7 @@ def sampled(
         is_periodic: whether the picture repeats. If not, positions outside it read the nearest border pixel.
 
     Returns:
-        (N,) or (N, C) float32.
+        (N,) or (N, C) float32 interpolated values.
     """
     # OpenCV's remap takes 1 to 32767 columns, so the list is folded into rows.
     rows = max(1, -(-len(x) // _FOLD))
@@ -66,8 +67,8 @@ def sampled(
 
 
 def smooth_step(value: npt.NDArray[np.float32], edge: float, width: float) -> npt.NDArray[np.float32]:
-    """A smooth step from 0 to 1, elementwise: 0 up to `edge`, 1 from `edge + width` on, a cubic polynomial
-    between them.
+    """A smooth step function from 0 to 1, elementwise: 0 up to `edge`, 1 from `edge + width` on, and a cubic polynomial
+    in between.
     """
     t = np.clip((value - edge) / width, 0, 1)
     return np.asarray(t * t * (3 - 2 * t), dtype=np.float32)

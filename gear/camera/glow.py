@@ -40,8 +40,8 @@ class LitWindows:
         corners_m: (N, 4, 3) corners in world coordinates, in order around each window.
         normal: (N, 3) unit vectors that point out of the house.
         geom_id: (N,) id of the geom to which each window belongs.
-        gain: (N, 3) factors on the frame's light, for what lamps inside make visible (curtains, goods).
-        light: (N, 3) light that is added, as a share of full scale.
+        gain: (N, 3) factors on the frame's light: curtains or goods that lamps inside make visible.
+        light: (N, 3) light that is added to the frame, as a share of full scale.
         reach_m: windows farther from the camera than this are dark.
     """
 
@@ -53,10 +53,10 @@ class LitWindows:
     reach_m: float = 1200.0
 
     def seen(self, geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord) -> npt.NDArray[np.int32]:
-        """(H, W) int32: index of the lit window that each pixel shows, -1 for none.
+        """The index of the lit window that each pixel shows: (H, W) int32, -1 for no window.
 
-        A pixel shows a window if it has the window's geom id and its position lies in the window's plane. The id alone
-        is not enough: one geom may contain many houses, of which one hides another.
+        A pixel shows a window if it has the window's geom id and its world position lies in the window's plane. The
+        geom id alone is not sufficient, because one geom may contain many houses, and one house may hide another.
         """
         pose = camera.world_from_camera_transform
         found = np.full(geom_id.shape, -1, np.int32)
@@ -90,7 +90,7 @@ class LampGlare:
 
     Attributes:
         position_m: (N, 3) world positions.
-        places_px: (N, 2) column and row in the picture, index pixels.
+        places_px: (N, 2) column and row of each lamp in the picture, index pixels.
         size_px: (N,) radius of the lamp's glass in the picture, pixels.
         strength: (N,) light at the middle of the spot; 1.0 is the frame's full scale.
     """
@@ -130,8 +130,8 @@ class LampGlare:
         )
 
     def spots(self, size_px: tuple[int, ...]) -> FloatImage:
-        """(height, width) float32 light, equal for all channels: for each lamp a narrow Gaussian spot and a
-        wide, faint one.
+        """The spots of all lamps as a picture: (height, width) float32 light, equal for all channels. Each spot is the
+        sum of a narrow Gaussian and a wide, faint Gaussian.
         """
         result = np.zeros(size_px, np.float32)
         for place, size, strength in zip(self.places_px, self.size_px, self.strength, strict=True):
@@ -143,8 +143,8 @@ class LampGlare:
         return result
 
     def streaks(self, camera: CameraRecord, ground_m: float) -> FloatImage:
-        """(H, W) float32 light, equal for all channels: reflections of the lamps on wet ground, as streaks that point
-        to the camera.
+        """The reflections of the lamps on wet ground, as streaks that point to the camera: (H, W) float32 light, equal
+        for all channels.
 
         Args:
             camera: the camera that takes the picture.

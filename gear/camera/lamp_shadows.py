@@ -20,18 +20,22 @@ from gear.values.frames import FloatImage, Shape
 from gear.values.scene import ActorRecord, SceneRecord
 
 LEAST_LIGHT = 0.002
-"""Lamps that give a surface less light than this need no shadows: a fifteenth of the night's light on the ground."""
+"""A lamp casts no shadows on surfaces to which it gives less light than this: a fifteenth of the night's light on the
+ground.
+"""
 
 SHADOWED_WITHIN_M = 100.0
 """Lamps farther from the camera than this cast no shadows, metres."""
 
 WORTH = 0.85
-"""Share of a lamp's reach within which road users cast shadows; farther away its light is too faint to matter."""
+"""Share of a lamp's range within which road users cast shadows. Farther away, the lamp's light is too faint for visible
+shadows.
+"""
 
 STANDING = Layout(cells=384, zoom=1.0)
 DRIVING = Layout(cells=384, zoom=2.2)
-"""Layouts of the shadow maps of static lamps and of headlamps. Headlamps cast shadows only within 49 degrees of
-their axis; farther from it there is only scattered light.
+"""Layouts (size and field of view) of the shadow maps of static lamps (`STANDING`) and of headlamps (`DRIVING`).
+Headlamps cast shadows only within 49 degrees of their axis; beyond this angle there is only scattered light.
 """
 
 _PIECE_M = 24.0
@@ -56,7 +60,7 @@ class Casters:
 
     @staticmethod
     def of(corners_m: Floats) -> Casters:
-        """Sorts (N, 3, 3) triangles into pieces."""
+        """Sorts (N, 3, 3) triangles, the corners in world coordinates, into spatial pieces."""
         cells = np.floor(corners_m[:, 0, :2] / np.float32(_PIECE_M)).astype(np.int64)
         keys = cells[:, 0] * (1 << 32) + cells[:, 1]
         order = np.argsort(keys, kind="stable")
@@ -70,7 +74,9 @@ class Casters:
         return Casters(corners_m=corners_m, ends=ends, low_m=low_m, high_m=high_m)
 
     def near(self, place_m: Floats, reach_m: float) -> Floats:
-        """(K, 3, 3) triangles that may reach into the sphere of radius `reach_m` around the position `place_m` (3,)."""
+        """The (K, 3, 3) triangles that may reach into a sphere of radius `reach_m` around the world position `place_m`,
+        (3,).
+        """
         away = np.maximum(np.maximum(self.low_m - place_m, place_m - self.high_m), 0)
         chosen = np.flatnonzero(lengths(away.T) < reach_m).tolist()
         starts = np.append(0, self.ends)
@@ -82,7 +88,7 @@ class Casters:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class User:
-    """A road user as a set of points that block light.
+    """A road user as a shadow caster: a set of surface points that block light.
 
     Attributes:
         points_m: (N, 3) float32 points on its surface, world coordinates.
@@ -96,7 +102,11 @@ class User:
     radius_m: float
 
     def is_before(self, lamp_frame: LampFrame, reach_m: float) -> bool:
-        """Whether the bounding sphere is within a lamp's reach and in the field of view of the lamp's shadow map."""
+        """Whether the road user may cast a shadow in the light of a lamp.
+
+        It may if its bounding sphere is within the share `WORTH` of the lamp's range, and in the field of view of the
+        lamp's shadow map.
+        """
         away = self.middle_m - lamp_frame.place_m
         away_m = float(np.linalg.norm(away))
         if away_m >= WORTH * reach_m + self.radius_m:
@@ -123,7 +133,9 @@ class LampShadows:
     _scenes: list[SceneShadows] = field(default_factory=list, init=False, repr=False)
 
     def scene(self, record: SceneRecord) -> SceneShadows:
-        """The shadow casters together with the road users of one scene; cached, because a scene has several views."""
+        """The shadow casters of one scene: those of the town and the scene's road users. The result is cached, because
+        a scene has several views.
+        """
         if not self._scenes or self._scenes[0].record is not record:
             users = [
                 self._user(actor, self.shapes[actor.asset]) for actor in record.actors if actor.asset in self.shapes
@@ -143,7 +155,9 @@ class LampShadows:
         return User(points_m=points_m, spacing_m=spacing_m, middle_m=middle_m, radius_m=radius_m)
 
     def standing(self, kind: str, index: int, lamp_frame: LampFrame, reach_m: float) -> Floats:
-        """(cells, cells) distances at which static objects stop the light of a static lamp; computed once per lamp."""
+        """The distances in metres at which static objects stop the light of a static lamp: (cells, cells) float32,
+        computed once per lamp.
+        """
         if (kind, index) not in self._fixed:
             self._fixed[kind, index] = first_hits(self.casters.near(lamp_frame.place_m, reach_m), lamp_frame)
         return self._fixed[kind, index]
@@ -165,13 +179,13 @@ class SceneShadows:
     _maps: dict[tuple[str, int], ShadowMap] = field(default_factory=dict, init=False, repr=False)
 
     def map(self, kind: str, index: int, lamps: Lamps, *, stands: bool) -> ShadowMap:
-        """The shadow map of one lamp. In the light of a moving lamp (headlamp), only road users cast shadows.
+        """The shadow map of one lamp. In the light of a headlamp, only road users cast shadows.
 
         Args:
             kind: kind of the lamp.
             index: its index among the lamps of that kind.
             lamps: all lamps of that kind.
-            stands: whether the lamp is a static one of the town.
+            stands: whether the lamp is a static lamp of the town.
         """
         if (kind, index) not in self._maps:
             place_m, axis = lamps.position_m[index], lamps.axis[index]
@@ -193,9 +207,9 @@ class LampShadow:
 
     Attributes:
         scene: shadow casters of the scene.
-        kind, index: which lamp: its kind, and its index among the lamps of that kind.
+        kind, index: kind of the lamp, and its index among the lamps of that kind.
         lamps: all lamps of that kind.
-        stands: whether the lamp is a static one of the town.
+        stands: whether the lamp is a static lamp of the town.
     """
 
     scene: SceneShadows
@@ -212,7 +226,7 @@ class LampShadow:
         facing: FloatImage,
         up: FloatImage,
     ) -> None:
-        """Multiplies a lamp's light, in place, by the share that reaches each surface.
+        """Multiplies a lamp's light on surfaces by the share, 0..1, that shadows leave; `light` is changed in place.
 
         Args:
             light: (h, W) light of the lamp without shadows.

@@ -50,7 +50,7 @@ class Lamps:
     down_m: float
 
     def shares_towards(self, place_m: Array) -> Array:
-        """(N,) share of its intensity that each lamp sends towards the world position `place_m` (3,)."""
+        """The share of its intensity that each lamp sends towards the world position `place_m` (3,): an (N,) array."""
         away = place_m - self.position_m
         away = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
         across = np.einsum("nd,nd->n", away, sides_of(self.axis))
@@ -59,7 +59,7 @@ class Lamps:
 
 
 def sides_of(axis: Array) -> Array:
-    """(N, 3) horizontal unit vectors that point to the left of (N, 3) axes; zero for vertical axes."""
+    """The (N, 3) horizontal unit vectors that point to the left of (N, 3) axes; 0 for vertical axes."""
     side = np.stack([-axis[:, 1], axis[:, 0], np.zeros(len(axis))], axis=1)
     length = np.linalg.norm(side, axis=1, keepdims=True)
     return np.asarray(np.where(length > _UPRIGHT, side / np.maximum(length, _UPRIGHT), 0.0))
@@ -79,20 +79,28 @@ class Headlamps:
 
 
 def street_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImage:
-    """Angular distribution of a street lamp: more light to the sides than straight down, none upwards. See
-    `Lamps.beam`.
+    """The angular distribution of a street lamp: more light to the sides than straight down, no light upwards.
+
+    Arguments and result are those of `Lamps.beam`: components of unit vectors from the lamp, and shares of its
+    intensity.
     """
     return np.asarray(np.clip(along * 3.5, 0, 1) * (1 + 1.6 * (1 - along * along)))
 
 
 def globe_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImage:
-    """Angular distribution of a globe lamp: light to all sides, less upwards. See `Lamps.beam`."""
+    """The angular distribution of a globe lamp: light to all sides, less light upwards.
+
+    Arguments and result are those of `Lamps.beam`: components of unit vectors from the lamp, and shares of its
+    intensity.
+    """
     return np.asarray(np.clip(1 - 0.9 * up, 0.1, 1), dtype=np.float32)
 
 
 def low_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImage:
-    """Angular distribution of a low beam: wide, with a sharp cut-off just above its brightest direction. See
-    `Lamps.beam`.
+    """The angular distribution of a car's low beam: wide, with a sharp cut-off just above its brightest direction.
+
+    Arguments and result are those of `Lamps.beam`: components of unit vectors from the lamp, and shares of its
+    intensity.
     """
     ahead = np.maximum(along, 1e-3)
     side, rise = across / ahead, up / ahead + np.float32(HEAD_DIP)
@@ -112,7 +120,7 @@ def headlamps(record: SceneRecord, vehicles: Mapping[str, Headlamps]) -> Lamps:
 
     Args:
         record: the scene.
-        vehicles: positions of headlamps by asset name; assets that are missing here have none.
+        vehicles: positions of headlamps by asset name; assets that are missing in this mapping have no headlamps.
     """
     positions, axes = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for actor in drivers(record, vehicles):

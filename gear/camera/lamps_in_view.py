@@ -24,8 +24,8 @@ class LampsInView:
 
     Attributes:
         lamps: all N lamps of the kind.
-        boxes: (N, 4) first column, last column, first row and last row that each lamp may light; empty if it lights
-            none.
+        boxes: (N, 4) first column, last column, first row and last row that each lamp may light; an empty range if the
+            lamp lights no pixel.
         sides: (N, 3) horizontal unit vectors to the left of the lamps' axes.
         origin_m: (3,) world position of the camera.
     """
@@ -63,11 +63,13 @@ class LampsInView:
         return np.flatnonzero((first < last) & (above < below) & (away_m < within_m)).tolist()
 
     def light(self, strip: Strip, shadows: Mapping[int, LampShadow] | None = None) -> FloatImage | None:
-        """(h, W) float32 light of the lamps on white surfaces, without colour; None if no lamp lights the strip.
+        """The light of the lamps on white surfaces in a strip of the picture: (h, W) float32, without colour; None if
+        no lamp lights the strip.
 
         Args:
             strip: some rows of the view.
-            shadows: shadows of some of the lamps, by index.
+            shadows: shadows of some of the lamps, by the lamp's index; lamps that are missing in this mapping cast no
+                shadows.
         """
         top, bottom = strip.rows.start, strip.rows.stop
         first, last, above, below = self.boxes.T

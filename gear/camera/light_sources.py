@@ -17,7 +17,9 @@ from gear.values.scene import CameraRecord, SceneRecord
 Where = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 BOARD_LIGHT, BOARD_FALL = 0.33, 0.3
-"""Light of a white board at its upper edge (1.0 is full scale), and the share by which its lower edge is darker."""
+"""Light of a white board at its upper edge (1.0 is full scale), and the share of this light by which its lower edge is
+darker.
+"""
 
 INSIDE_LIGHT = (0.62, 0.60, 0.54)
 """Light of a white surface inside a bus, for red, green and blue."""
@@ -25,7 +27,7 @@ INSIDE_LIGHT = (0.62, 0.60, 0.54)
 FRONT_LIGHT, BACK_LIGHT = (0.9, 0.85, 0.75), (0.30, 0.008, 0.004)
 BACK_GAIN = 0.35
 ENDS = 0.6
-"""Lamps that are on lie beyond this share of the distance from a vehicle's middle to its front or back. Glass
+"""Position from which lamps are on, as a share of the distance from a vehicle's middle to its front or back. Glass
 nearer to the middle belongs to blue lights on the roof, which are off.
 """
 
@@ -39,19 +41,19 @@ def vehicle_lamp_light(
     geoms: GeomTable,
     vehicles: Mapping[str, Headlamps],
 ) -> Iterator[tuple[Where, float, tuple[float, float, float]]]:
-    """Pixels that show lamps of vehicles which are switched on, with the light that they emit.
+    """The pixels that show lit lamps of vehicles, with the light that these lamps emit.
 
     Args:
         lenses: (ngeom + 1,) bool: whether a geom is a glass of a lamp; the last entry is for geom id -1.
         geom_id, depth_m: (H, W) ids and planar z of a view.
         camera: the camera that takes the picture.
         record: the scene.
-        geoms: table that says what each geom is.
+        geoms: label and object of each geom.
         vehicles: positions of headlamps by asset name.
 
     Yields:
         For the front and for the back of each vehicle: rows and columns of the pixels, the factor on the frame's light
-            there, and the (3,) light that is added.
+        at these pixels, and the (3,) light that is added.
     """
     rows, columns = np.nonzero(lenses[geom_id])
     if not len(rows):
@@ -80,7 +82,7 @@ def bus_interior_light(
         panes: (ngeom + 1,) bool: whether a geom is a window of a bus; the last entry is for geom id -1.
         geom_id: (H, W) ids of a view.
         record: the scene.
-        geoms: table that says what each geom is.
+        geoms: label and object of each geom.
         vehicles: positions of headlamps by asset name.
     """
     rows, columns = np.nonzero(panes[geom_id])
@@ -92,16 +94,16 @@ def bus_interior_light(
 def board_light(
     geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
 ) -> Iterator[tuple[Where, FloatImage]]:
-    """Pixels that show the faces of boards which stand on the ground, with the light of the boards' own lamps.
+    """The pixels that show the faces of boards which stand on the ground, with the light of the boards' own lamps.
 
     Args:
         geom_id, depth_m: (H, W) ids and planar z of a view.
         camera: the camera that takes the picture.
         record: the scene.
-        geoms: table that says what each geom is.
+        geoms: label, object and surface of each geom.
 
     Yields:
-        For each board: rows and columns of its N pixels, and (N,) light that a white face has there.
+        For each board: rows and columns of its N pixels, and (N,) light of a white face at these pixels.
     """
     index = np.append(geoms.surface_index, -1)[geom_id]
     for number, surface in enumerate(record.surfaces):
@@ -116,7 +118,7 @@ def board_light(
 def world_positions(
     rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp], depth_m: FloatImage, camera: CameraRecord
 ) -> Array:
-    """(N, 3) world positions of the surfaces that N pixels show, metres.
+    """The (N, 3) world positions in metres of the surface points that N pixels show.
 
     Args:
         rows, columns: (N,) index pixels.

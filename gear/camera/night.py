@@ -3,8 +3,8 @@
     L' = L (k + E / A) + G
 
 L is the frame under even light: a surface appears as its albedo times A, where A is the irradiance for its normal. k is
-the share of that even light that is left at night, E the irradiance by lamps, and G emitted light. None of these
-depends on any albedo. Frames therefore stay linear, and a patch changes only pixels that show it.
+the share of that even light that is left at night, E the irradiance by lamps, and G emitted light. k, E, A and G do not
+depend on any albedo. Frames therefore stay linear, and a patch changes only the pixels that show the patch.
 
 Normals are computed from depth. Static objects of the town and the scene's road users cast shadows.
 """
@@ -35,18 +35,20 @@ from gear.values.scene import CameraRecord, SceneRecord
 HalfImage = npt.NDArray[np.float16]
 
 GLARE = {"street": 0.12, "globe": 0.6, "head": 0.03}
-"""Light at the middle of the spot of a visible lamp per unit of its intensity towards the camera, by kind of lamp."""
+"""Factor from the intensity that a lamp sends to the camera to the light at the middle of the lamp's spot, by kind of
+lamp.
+"""
 
 SIGNAL_GAIN = 0.9
 STREAK_SHARE = 0.12
-"""Share of a lamp's spot that wet ground reflects as a streak."""
+"""Share of the light of a lamp's spot that appears as a streak on wet ground."""
 
 _GRAIN_PX = 128
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class NightLight:
-    """The light of lamps in one view of one scene. It does not depend on the patches shown.
+    """The light of lamps in one view of one scene. It does not depend on the patches in the scene.
 
     Attributes:
         share: (H, W, 3) float16, the factor k + E / A of the module's formula.
@@ -59,7 +61,9 @@ class NightLight:
     streaks: HalfImage | None
 
     def apply(self, linear_rgb: UInt16Image) -> UInt16Image:
-        """The frame at night, (H, W, 3) uint16: a new array, rounded with a fixed dither pattern."""
+        """Converts a frame under even light to night: a new (H, W, 3) uint16 array, rounded with a fixed dither
+        pattern.
+        """
         result = np.empty_like(linear_rgb)
         for rows in _bands(len(linear_rgb)):
             light = self.share[rows].astype(np.float32) * linear_rgb[rows] + self.glow[rows]
@@ -67,7 +71,9 @@ class NightLight:
         return result
 
     def apply_reflections(self, linear_rgb: UInt16Image) -> UInt16Image:
-        """The frame with the reflections of lamps on wet ground; the frame itself if the ground is dry."""
+        """Adds the reflections of lamps on wet ground to a frame; the result is `linear_rgb` itself if the ground is
+        dry.
+        """
         if self.streaks is None:
             return linear_rgb
         result = np.empty_like(linear_rgb)
@@ -81,10 +87,11 @@ class Night:
     """The lamps of a town in one weather.
 
     Attributes:
-        level, sky_level: share of the even light that is left at night on surfaces and in the sky, 0..1.
+        level, sky_level: shares 0..1 of the light without direct sun (even light) that remain at night, on surfaces and
+            in the sky.
         lit: strength of the lamps, 0..1; small at dusk, when lamps are on but look pale.
-        even: (3, 3) even light of white surfaces: rows for surfaces that face up, sideways and down, columns for red,
-            green and blue; 1.0 is the frame's full scale.
+        even: (3, 3) light of white surfaces without direct sun: rows for surfaces that face up, sideways and down,
+            columns for red, green and blue; 1.0 is the frame's full scale.
         lamps: lamps of the town by kind: `street` and `globe`.
         windows: lit windows.
         vehicles: positions of headlamps by asset name.
@@ -93,7 +100,7 @@ class Night:
         is_lens: (ngeom,) bool: whether a geom is a glass of a vehicle's lamp.
         is_pane: (ngeom,) bool: whether a geom is a window of a bus.
         is_display: whether frames hold display values instead of light (the classic renderer).
-        shadows: what casts shadows; None for no shadows.
+        shadows: the objects that cast shadows; None for no shadows.
     """
 
     level: float
@@ -117,7 +124,7 @@ class Night:
             truth: depth and ids of the view.
             camera: the camera that takes the picture.
             record: the scene, for its vehicles.
-            geoms: table that says what each geom is.
+            geoms: label, object and surface of each geom.
         """
         kinds = {**self.lamps, "head": headlamps(record, self.vehicles)}
         share, glow = self._own(truth.geom_id, truth.depth_m, camera, record, geoms)

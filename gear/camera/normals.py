@@ -12,15 +12,15 @@ from gear.values.frames import FloatImage
 from gear.values.scene import CameraRecord
 
 STRIP_ROWS = 32
-"""Number of rows per strip: small enough that the arrays of a strip stay in the processor's cache."""
+"""Number of rows per strip. It is small, so the arrays of a strip stay in the processor's cache."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Strip:
-    """Positions and normals of some rows of a view.
+    """World positions and normals of the surfaces that a strip of h rows of a view shows.
 
     Attributes:
-        rows: which rows of the picture.
+        rows: the range of rows in the picture.
         is_seen: (h, W) bool, True where a surface was hit.
         position_m: (3, h, W) float32 vectors from the camera to the surface, world axes; zero where nothing was hit.
         normal: (3, h, W) float32 unit normals, world axes, on the camera's side; zero where nothing was hit.
@@ -33,12 +33,12 @@ class Strip:
 
 
 def strips_of(depth_m: FloatImage, camera: CameraRecord) -> Iterator[Strip]:
-    """Positions and normals of a view, in strips from top to bottom.
+    """Computes the positions and normals of a view, in strips of rows from top to bottom.
 
     A normal is the cross product of two differences of positions, one along the row and one along the column. Each
-    difference is taken to one neighbour only, the one that more likely lies on the same surface. On a plane, 1/z is
-    linear over the picture; so the neighbour on the side with the smaller second difference of 1/z is used. In this way
-    neither silhouettes nor edges of road paint (some millimetres above the road) tilt a normal.
+    difference is taken to one neighbour only: the neighbour that more likely lies on the same surface. On a plane, 1/z
+    is linear over the picture. The neighbour on the side with the smaller second difference of 1/z is therefore used.
+    Silhouettes and edges of road paint (some millimetres above the road) therefore do not tilt a normal.
 
     Args:
         depth_m: (H, W) float32 planar z, NaN where nothing was hit.

@@ -29,7 +29,7 @@ class CameraPipeline:
 
     Attributes:
         response: exposure and tone curve.
-        contact_shadows: darker ground under and beside road users; None to leave it out.
+        contact_shadows: darker ground under and beside road users; None for no contact shadows.
         night: the town's lamps; None by day.
         air: fog, haze and the veil of rain.
         water: puddles and wet ground.
@@ -46,7 +46,9 @@ class CameraPipeline:
     effects: CameraEffects
 
     def with_effects(self, record: SceneRecord) -> SceneRecord:
-        """The scene's record, with what ground truth must know about the camera's effects, such as the lens."""
+        """Adds the parameters of the active camera effects that ground truth depends on, such as the lens, to the
+        cameras of a scene record.
+        """
         cameras = record.cameras
         for effect in self.effects.active():
             cameras = tuple(effect.recorded(camera) for camera in cameras)
@@ -55,27 +57,28 @@ class CameraPipeline:
     def night_light(
         self, truth: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable
     ) -> NightLight | None:
-        """The light of lamps in a view, to be passed to `view` as `night_light`; None by day.
+        """Computes the light of lamps in a view, an argument of `CameraPipeline.view`; None by day.
 
         Args:
             truth: depth and ids of the view.
             camera: the camera of the view.
             record: the scene.
-            geoms: table that says what each geom is.
+            geoms: label, object and surface of each geom.
         """
         return self.night.light(truth, camera, record, geoms) if self.night is not None else None
 
     def mirror_camera(self, camera: CameraRecord, record: SceneRecord) -> CameraRecord | None:
-        """The camera below the ground that renders the reflections on wet ground; None where nothing is wet.
+        """The camera below the ground that renders the reflections on wet ground; None if the ground is dry.
 
-        At night it is None as well: `NightLight` contains the reflections of lamps, and nothing else is bright enough.
+        At night the result is also None: `NightLight` contains the reflections of lamps, and other reflections are too
+        dark.
         """
         if self.night is not None or (self.water.share <= 0 and self.water.film <= 0):
             return None
         return mirror_camera(camera, record.ego.world_from_actor.position_m[2])
 
     def reflection(self, below: MirrorView | None, record: SceneRecord) -> Reflection | None:
-        """The reflections on wet ground.
+        """The reflections on wet ground, from a rendered view of the mirrored camera; None without such a view.
 
         Args:
             below: a render by `mirror_camera` in which the ground is left out and surfaces are neutral; None for no
@@ -100,13 +103,14 @@ class CameraPipeline:
         night_light: NightLight | None = None,
         reflection: Reflection | None = None,
     ) -> View:
-        """One finished view: colour with weather and camera effects, and depth and ids aligned with it.
+        """The finished view of a camera: colour with weather and camera effects, and depth and ids aligned with the
+        colour.
 
         Args:
             raw: linear colour, depth and ids from a renderer.
             camera: the camera that takes the picture.
             record: the scene, for its seed and the ego car's motion.
-            geoms: table that says what each geom is.
+            geoms: label, object and surface of each geom.
             night_light: result of `night_light` for this view (it may be shared by renders with other patches);
                 computed here if None.
             reflection: reflections on wet ground; if None, puddles reflect only the sky.

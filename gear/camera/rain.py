@@ -1,10 +1,10 @@
-"""Falling rain: streaks of drops, hidden by objects that are nearer.
+"""Falling rain: streaks of drops in the picture; objects hide the drops behind them.
 
     L' = L (1 - a) + D a
 
 The share a of a pixel that drops cover follows from the sample's random generator and from depth. D is the light in a
-drop, which is that of the sky. Neither depends on any albedo, so frames stay linear, and a patched sample and its
-unpatched twin have the same drops.
+drop, which is that of the sky. a and D do not depend on any albedo. Frames therefore stay linear, and a sample has the
+same drops with and without a patch.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Rain:
             rng: random generator of this sample and camera.
 
         Returns:
-            (H, W, 3) uint16, a new array, rounded.
+            (H, W, 3) uint16 frame with streaks, a new array.
         """
         if self.intensity <= 0:
             return linear_rgb.copy()
@@ -90,7 +90,9 @@ class Rain:
     def cover(
         self, depth_m: FloatImage, camera: CameraRecord, velocity_world_mps: Vec3, rng: np.random.Generator
     ) -> FloatImage:
-        """(H, W) float32 in 0..1: the share of each pixel that drops cover. The arguments are those of `apply`."""
+        """The share of each pixel that falling drops cover: (H, W) float32 in 0..1. `Rain.apply` explains the
+        arguments.
+        """
         falling = np.array([*self.wind_world_mps[:2], -FALL_MPS]) - np.asarray(velocity_world_mps)
         motion = camera.world_from_camera_transform.rotation.T @ falling * SHUTTER_S
         clear = np.ones(depth_m.shape, np.float32)

@@ -20,19 +20,19 @@ from gear.values.scene import CameraRecord, Pose
 _Floats = npt.NDArray[np.float32]
 
 MirrorView = tuple[RawView, CameraRecord]
-"""A render by the mirrored camera, and that camera (`mirror_camera`)."""
+"""A view that the mirrored camera renders, and the mirrored camera itself (`mirror_camera`)."""
 
 SHARE_PX = 0.5
-"""Resolution of the reflection relative to the picture; it may be lower, because ripples and rough ground hide
-detail.
+"""Resolution of the reflection as a share of the picture's resolution. It is lower, because ripples and rough ground
+hide detail.
 """
 
 _RAYS = (33, 65)
-"""Numbers of columns and rows of rays that are tested to find which part of the street the picture can reflect."""
+"""Numbers of columns and rows of test rays. They determine the part of the street that the picture can reflect."""
 
 _STEP_PX, _MARGIN_PX = 32, 8
-"""Sizes of reflections are multiples of the first, since renderers keep buffers for each size; the second is a
-margin. Pixels.
+"""Two lengths in pixels. The sizes of reflections are multiples of the first, because renderers keep buffers for each
+size. The second is a margin.
 """
 
 _STEEPEST = 0.2
@@ -45,7 +45,7 @@ _BLUR_RAD = (0.008, 0.04)
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Reflection:
-    """The street as a mirror at the height of the ground shows it.
+    """The mirror image of the street in a level mirror at the height of the ground.
 
     Attributes:
         camera: the mirrored camera.
@@ -53,7 +53,7 @@ class Reflection:
         sharp: (h, w, 4) float32. The last channel is the share 0..1 of the pixel whose reflection is known; the others
             are light times that share (1.0 is the frame's full scale). The reflection is unknown where objects below
             the mirror hide it.
-        soft: the same, blurred as on damp ground.
+        soft: `sharp`, blurred as on damp ground.
     """
 
     camera: CameraRecord
@@ -63,10 +63,10 @@ class Reflection:
 
     @staticmethod
     def of(view: RawView, camera: CameraRecord, height_m: float) -> Reflection:
-        """Makes the reflection from a render of the world without its ground.
+        """Makes the reflection from a rendered view of the world without its ground.
 
         Args:
-            view: render by `camera`.
+            view: the view that `camera` renders.
             camera: the mirrored camera, from `mirror_camera`.
             height_m: height of the mirror in world coordinates.
         """
@@ -79,7 +79,7 @@ class Reflection:
         return Reflection(camera=camera, height_m=height_m, sharp=sharp, soft=np.asarray(soft, dtype=np.float32))
 
     def at(self, picture: _Floats, east: _Floats, north: _Floats, up: _Floats) -> _Floats:
-        """(N, 4) values of `sharp` or `soft` in given directions.
+        """Reads the reflection in N directions: (N, 4) values of `sharp` or `soft`.
 
         Args:
             picture: `sharp` or `soft`.
@@ -97,9 +97,9 @@ class Reflection:
 
 
 def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
-    """The camera whose render shows what a level mirror reflects to a given camera; None if the camera sees no ground.
+    """The mirrored camera, whose view is what a level mirror reflects to `camera`; None if `camera` sees no ground.
 
-    The mirrored camera has no roll and its principal point lies in the middle of its picture, which is just large
+    The mirrored camera has no roll, and its principal point is the middle of its picture. The picture is just large
     enough for all reflected rays.
 
     Args:
@@ -141,7 +141,8 @@ def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
 
 
 def beyond_mirror(depth_m: FloatImage, camera: CameraRecord, height_m: float) -> tuple[FloatImage, CameraRecord]:
-    """The part of each mirrored ray that lies above the mirror, as a depth and a camera at the height of the mirror.
+    """The part above the mirror of each ray of the mirrored camera, as a depth map and a camera at the height of the
+    mirror.
 
     Args:
         depth_m: (h, w) planar z of the mirrored camera.

@@ -7,7 +7,7 @@ For light x in 0..1 (1 is the frame's full scale):
     picture = sRGB(z)               the encoding that readers of PNG files expect
 
 The curve increases strictly from 0 to 1, so it clips nothing and can be inverted. It does not depend on the content of
-the picture: a patch cannot change how the rest of a scene is shown.
+the picture, so a patch cannot change the brightness of other parts of the scene.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ DISPLAY_POWER = 1 / 2.2
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """One setting of exposure and tone curve.
+    """The response of a camera: exposure and tone curve.
 
     Attributes:
-        exposure: gain g of the darkest values, above 0; values below 1 darken.
+        exposure: gain g of the darkest values, above 0; a gain below 1 darkens the picture.
         contrast: exponent c of the tone curve, 0.5 to 2.
         encoding: `srgb`, or `none` for frames that already hold display values.
 
@@ -64,7 +64,7 @@ class Response:
             linear_rgb: (..., 3) uint16, 0..`LINEAR_FULL_SCALE`.
 
         Returns:
-            (..., 3) uint8, a new array.
+            (..., 3) uint8 picture, a new array.
         """
         return np.asarray(self._table[linear_rgb])
 
@@ -90,8 +90,8 @@ IDENTITY = Response(encoding="none")
 def response_for(renderer_name: str, weather: Weather) -> Response:
     """The response that belongs to a renderer and a weather.
 
-    When the sun is low, streets lie in shadow and the exposure is raised. Clouds lower the contrast of light, so the
-    tone curve adds some.
+    When the sun is low, streets lie in shadow and the exposure is raised. Under clouds the exposure is lower. Clouds
+    also lower the contrast of light, so the tone curve adds contrast.
     """
     if renderer_name == "classic":
         return IDENTITY
@@ -102,17 +102,18 @@ def response_for(renderer_name: str, weather: Weather) -> Response:
 
 
 def face_light(renderer_name: str, face: UInt8Image) -> Floats:
-    """Converts the bytes of a patch's face to weights w of a linear frame.
+    """Converts the bytes of a face's texture (a patch) to the weights w by which frames are composed.
 
     A frame that shows the face is I = B + w (W - B), where B and W are the frames with a black and a white face. The
-    classic renderer lights display values; the others first decode sRGB to albedo.
+    classic renderer computes light with display values, so w is the byte / 255. All other renderers decode sRGB, so w
+    is the albedo.
 
     Args:
         renderer_name: name of the renderer.
-        face: (...) uint8.
+        face: (...) uint8 picture of the face.
 
     Returns:
-        (...) float64 in 0..1.
+        (...) float64 weights w in 0..1.
     """
     values = np.asarray(face, dtype=np.float64) / 255
     return values if renderer_name == "classic" else decode_srgb(values)

@@ -56,7 +56,7 @@ class Layout:
         return 2 * math.atan(math.sqrt(2) / self.zoom)
 
     def empty(self) -> Floats:
-        """(cells, cells) float32 shadow map in which nothing stops light."""
+        """A (cells, cells) float32 shadow map in which no object stops light: all distances are infinite."""
         return np.full((self.cells, self.cells), np.inf, np.float32)
 
 
@@ -76,7 +76,7 @@ class LampFrame:
 
     @staticmethod
     def of(place_m: Array, axis: Array, layout: Layout) -> LampFrame:
-        """The frame of a lamp at position `place_m` (3,) that shines along `axis` (3,)."""
+        """The position and axes of a lamp at the world position `place_m` (3,) that shines along `axis` (3,)."""
         along = axis / np.linalg.norm(axis)
         across = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < _LEVEL else (0.0, 1.0, 0.0))
         across /= np.linalg.norm(across)
@@ -84,7 +84,8 @@ class LampFrame:
         return LampFrame(place_m=place_m.astype(np.float32), frame=frame.astype(np.float32), layout=layout)
 
     def places(self, unit: Floats) -> tuple[Floats, Floats]:
-        """Columns and rows, (N,) each, of the directions `unit` (3, N) in the map; whole numbers are centres of cells.
+        """The columns and rows in the shadow map, (N,) each, of the directions `unit` (3, N); whole numbers are centres
+        of cells.
 
         Directions behind the lamp get positions outside the map.
         """
@@ -94,7 +95,7 @@ class LampFrame:
         return across * scale + middle, up * scale + middle
 
     def directions(self, column: Indices, row: Indices) -> Floats:
-        """(N, 3) world unit vectors from the lamp through the centres of (N,) cells."""
+        """The (N, 3) world unit vectors from the lamp through the centres of the cells at (N,) columns and rows."""
         across, up = ((2 * (cell + 0.5) / self.layout.cells - 1) / self.layout.zoom for cell in (column, row))
         square = across * across + up * up
         unit = np.stack([2 * across, 2 * up, 1 - square], axis=1) / (1 + square)[:, None]
@@ -102,7 +103,7 @@ class LampFrame:
 
 
 def lengths(vectors: Floats) -> Floats:
-    """(N,) lengths of (3, N) vectors."""
+    """The (N,) lengths of N vectors, which are the columns of a (3, N) array."""
     x, y, z = vectors
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
@@ -113,8 +114,8 @@ class ShadowMap:
 
     Attributes:
         lamp_frame: position and axes of the lamp.
-        stop_m: (cells, cells) float32 distance in metres at which light is stopped, by direction; infinite where
-            nothing stops it, and in the border. It must not be changed after construction.
+        stop_m: (cells, cells) float32 distance in metres at which light is stopped, by direction; infinite where no
+            object stops light, and in the border. It must not be changed after construction.
     """
 
     lamp_frame: LampFrame
@@ -128,7 +129,7 @@ class ShadowMap:
         object.__setattr__(self, "_most_m", cv2.dilate(self.stop_m, nine))
 
     def through(self, unit: Floats, away_m: FloatImage, facing: FloatImage, up: FloatImage) -> Floats:
-        """(N,) share of the lamp's light that reaches each surface, 0..1.
+        """The share of the lamp's light that reaches each of N surfaces: (N,) values in 0..1.
 
         Args:
             unit: (3, N) unit vectors from the lamp to the surfaces.
@@ -170,9 +171,9 @@ def _weights(share: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def first_hits(corners_m: Floats, lamp_frame: LampFrame) -> Floats:
-    """(cells, cells) float32 distances at which triangles stop a lamp's light.
+    """The shadow map of triangles: (cells, cells) float32 distances in metres at which they stop a lamp's light.
 
-    Back faces are skipped, because the front of the same body is nearer.
+    Back faces of triangles are skipped, because the front of the same body is nearer.
 
     Args:
         corners_m: (N, 3, 3) triangles in world coordinates.

@@ -12,14 +12,14 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 
 def longest_edges(corners: npt.NDArray[Real]) -> npt.NDArray[Real]:
-    """(N,) lengths of the longest edge of each of (N, 3, 3) triangles."""
+    """The (N,) lengths of the longest edges of (N, 3, 3) triangles."""
     along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     longest = np.maximum(np.linalg.norm(along, axis=1), np.linalg.norm(across, axis=1))
     return np.asarray(np.maximum(longest, np.linalg.norm(across - along, axis=1)), corners.dtype)
 
 
 def points_on(corners: npt.NDArray[Real], steps: npt.NDArray[np.int64]) -> Iterator[npt.NDArray[Real]]:
-    """Points on a regular grid on each triangle.
+    """Makes points on triangles, on a regular grid on each triangle.
 
     Args:
         corners: (N, 3, 3) corners of the triangles.

@@ -1,5 +1,6 @@
-"""The camera's response in torch, for gradients. It is a module of its own so that collecting datasets does not
-import torch.
+"""The camera's response (exposure and tone curve) in torch, for gradients.
+
+It is separate from `gear.camera.response`, so that collecting datasets does not import torch.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ from gear.camera.response import Response
 
 
 def apply(response: Response, light: torch.Tensor) -> torch.Tensor:
-    """`Response.curve` for tensors; differentiable once.
+    """Applies exposure and tone curve to a tensor, like `Response.curve`; differentiable once.
 
     Args:
         response: exposure and tone curve.
-        light: (...) float linear light, clamped to 0..1 as the frame's full scale clips it.
+        light: (...) float linear light; it is clamped to 0..1, as frames are clipped at full scale.
 
     Returns:
         (...) picture values 0..1 with the dtype of `light`, not rounded to bytes.
@@ -40,8 +41,11 @@ def apply(response: Response, light: torch.Tensor) -> torch.Tensor:
 
 
 def face_light(renderer_name: str, face: torch.Tensor) -> torch.Tensor:
-    """`gear.camera.response.face_light` for tensors: converts picture values 0..1 to weights 0..1, in a tensor
-    of the same shape.
+    """Converts a face's picture values 0..1 to the weights w by which frames are composed, in a tensor of the same
+    shape.
+
+    A frame that shows the face is B + w (W - B), where B and W are the frames with a black and a white face. w is the
+    picture value for the classic renderer, and the albedo decoded from sRGB for all other renderers.
     """
     return face if renderer_name == "classic" else decode_srgb(face)
 

@@ -4,9 +4,10 @@
     L'' = L' (1 - p) + p (L d (1 - F) + R F)    with puddles on it
 
 p is the share of still water, a fixed random pattern of the town. F is the Fresnel reflectance of water, and d darkens
-the bottom of a puddle. f is the reflectance of a film of water on rough ground. R and S are the street as still water
-and as damp ground reflect it (`gear.camera.reflection`), rendered with neutral surfaces. None of these depends on any
-patch, so frames stay linear in every albedo and a patch changes only pixels that show it.
+the bottom of a puddle. f is the reflectance of a film of water on rough ground. R and S are the reflections of the
+street in still water and on damp ground (`gear.camera.reflection`), rendered with neutral surfaces. All of these
+quantities are independent of patches. Frames therefore stay linear in every albedo, and a patch changes only the pixels
+that show the patch.
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ TILE_M = 96.0
 WATER_F0 = 0.02
 BOTTOM = 0.6
 FILM_F0, FILM_F90 = 0.03, 0.55
-"""Reflectance of damp ground seen from above and at a grazing angle; lower than that of a mirror, because the
-ground is rough.
+"""Reflectances of damp ground, for a view from above and for a view at a grazing angle. The second is lower than that
+of a mirror, because the ground is rough.
 """
 
 LEVEL_M = (0.2, 0.5)
-"""Height differences between ground and mirror, metres: up to the first the reflection is full, beyond the
-second there is none.
+"""Two height differences between ground and mirror, metres. Up to the first, the reflection has full strength; beyond
+the second, there is no reflection.
 """
 
 _ALL = 0.999
@@ -60,7 +61,7 @@ class Water:
         share: share of open ground that is under water, 0..1.
         ripples: strength of ripples by falling rain, 0..1.
         film: wetness of the ground between puddles, 0..1.
-        mirrored: (rows, columns, 3) float32 light of sky and houses, reflected where the street's reflection is
+        mirrored: (rows, columns, 3) float32 light of sky and houses, which is reflected if the street's reflection is
             unknown; 1.0 is the frame's full scale. Rows are sines of the elevation, from level (row 0) to overhead;
             columns are azimuths, counter-clockwise from east.
     """
@@ -84,14 +85,14 @@ class Water:
         Args:
             linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`.
             depth_m: (H, W) float32 planar z, NaN where nothing was hit.
-            open_ground: (H, W) bool, True where there may be water.
+            open_ground: (H, W) bool, True where a pixel shows ground that may be wet.
             camera: the camera that takes the picture.
             reflection: the reflected street, for ground at the height of its mirror. Ground at other heights, and
                 unknown parts of the street, reflect `mirrored`. If None, puddles reflect `mirrored` and there is no
                 film.
 
         Returns:
-            (H, W, 3) uint16, a new array, rounded.
+            (H, W, 3) uint16 frame with water, a new array.
         """
         result = linear_rgb.copy()
         film = self.film if reflection is not None else 0.0

@@ -85,10 +85,11 @@ class CameraEffects:
 
 
 def recorded_effects(camera: CameraRecord) -> tuple[Effect, ...]:
-    """The effects that move pixels (`Effect.MOVES_PIXELS`) and that a camera's record describes.
+    """The pixel-moving effects, such as lens distortion, with which the pictures of a camera were made, from the
+    camera's record.
 
     Returns:
-        No effect for a pinhole camera, otherwise one.
+        An empty tuple for a pinhole camera, otherwise a tuple with one effect.
     """
     found = (kind.from_record(camera) for kind in EFFECTS if kind.MOVES_PIXELS)
     return tuple(effect for effect in found if effect is not None)

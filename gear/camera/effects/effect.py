@@ -23,12 +23,12 @@ Pixels = npt.NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Exposure:
-    """Everything besides the pixels that an effect may use: the camera and the scene of one picture.
+    """The camera and the scene of one picture: the data, besides pixels, that a camera effect may use.
 
     Attributes:
         camera: the camera that takes the picture.
         scene: the scene, for its seed, its index and the ego car's velocity.
-        geoms: table that says what each geom id is; None where it is not known, as when patches are put into stored
+        geoms: label and object of each geom id; None if they are not known, as when patches are composed into stored
             pictures.
     """
 
@@ -39,12 +39,13 @@ class Exposure:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PixelMap:
-    """For each pixel of a picture with an effect: the position in the picture without the effect that it shows.
+    """The mapping of pixels by an effect that moves pixels, such as lens distortion. Positions are in index pixels.
 
     Attributes:
-        x, y: (H, W) float32 column and row in the picture without the effect, index pixels.
-        forward: the inverse map: takes (..., 2) float64 index pixels (x, y) without the effect to index pixels with it.
-            It is also defined for points outside the picture.
+        x, y: (H, W) float32 column and row in the picture without the effect, for each pixel of the picture with the
+            effect.
+        forward: the inverse mapping, a function from (..., 2) float64 positions (x, y) without the effect to positions
+            with the effect. It is also defined for points outside the picture.
     """
 
     x: FloatImage
@@ -54,13 +55,13 @@ class PixelMap:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PixelSamples:
-    """N output pixels as weighted means of S input pixels each.
+    """N output pixels of an effect, each as a weighted mean of S pixels of its input.
 
     Attributes:
         x, y: (N, S) float64 columns and rows in the input, index pixels; values between pixels are allowed.
         weight: (N, S) float64 weights.
-        inverse_depth: function from (N, S) x and y to the inverse of planar depth there, in a unit that the caller
-            chooses. Values of 0 and below mean behind the camera or infinitely far.
+        inverse_depth: function from (N, S) x and y to 1 / depth (planar) at these positions, in a unit that the caller
+            chooses. A value of 0 or less means a point behind the camera or at infinity.
     """
 
     x: Array
@@ -79,11 +80,11 @@ class Effect(ABC):
 
     Attributes:
         ORDER: effects are applied by increasing order, from the scene to the sensor.
-        MOVES_PIXELS: whether depth and ids move together with the colours. Ground truth then follows `pixel_map`. At
-            most one effect may do so.
-        IS_LINEAR: whether the output is linear in the input's light. The probes of a dataset include linear effects.
-            The compositor applies the other effects with `torch_at`, so these must have a higher order than all linear
-            effects.
+        MOVES_PIXELS: whether the effect moves pixels, with their depth and ids. Ground truth then follows `pixel_map`.
+            At most one effect may move pixels.
+        IS_LINEAR: whether the output is linear in the input's light. The probes of a dataset (samples rendered with
+            black and white surfaces) include linear effects. When a patch is composed into a sample, the effects that
+            are not linear are applied with `torch_at`, so they must have a higher order than all linear effects.
     """
 
     __slots__ = ()
@@ -94,20 +95,23 @@ class Effect(ABC):
     @property
     @abstractmethod
     def is_active(self) -> bool:
-        """Whether the parameters switch the effect on."""
+        """Whether the effect is on: its parameters change the picture."""
 
     @abstractmethod
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
-        """The view with the effect: colour always, depth and ids if `MOVES_PIXELS`. The input is not changed.
+        """Applies the effect to a view.
 
         Args:
             view: linear colour (never None), depth and ids, after the effects of lower order.
             exposure: camera and scene.
+
+        Returns:
+            A new view. Its colour is changed; depth and ids are changed only by effects with `MOVES_PIXELS`.
         """
 
     @abstractmethod
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """The same as `apply` for colour, in torch: differentiable and without rounding.
+        """Applies the effect to the colour of pictures in torch: differentiable and without rounding.
 
         Implementations call only methods of the tensors, so that this module can be imported without torch.
 
@@ -117,11 +121,12 @@ class Effect(ABC):
             exposure: camera and scene.
 
         Returns:
-            (B, 3, H, W) with the dtype and device of `light`.
+            (B, 3, H, W) linear light with the effect, with the dtype and device of `light`.
         """
 
     def torch_at(self, pixels: tuple[Pixels, Pixels], exposure: Exposure, like: Tensor) -> Callable[[Tensor], Tensor]:
-        """The effect on selected pixels, for effects that are not linear and treat each pixel independently.
+        """The effect on selected pixels, as a function in torch. It is defined for effects that are not linear and
+        treat each pixel independently.
 
         Args:
             pixels: (N,) rows and (N,) columns.
@@ -138,7 +143,7 @@ class Effect(ABC):
         raise NotImplementedError(f"{type(self).__name__} has no twin on single pixels")
 
     def trace(self, samples: PixelSamples, exposure: Exposure) -> PixelSamples:
-        """Replaces samples of the effect's output by samples of its input.
+        """Replaces each sample of the effect's output by the weighted samples of its input from which it is computed.
 
         The default returns `samples` unchanged, which is right for effects that only scale a pixel's light or add to
         it.
@@ -150,26 +155,31 @@ class Effect(ABC):
         return samples
 
     def check(self, camera: CameraRecord) -> None:
-        """Checks that the parameters fit a camera; the default accepts all.
+        """Checks that the effect's parameters are valid for a camera. The default implementation accepts every camera.
 
         Raises:
-            FieldError: a parameter does not fit; the message names it.
+            FieldError: a parameter is not valid; the message names it.
         """
         return
 
     def recorded(self, camera: CameraRecord) -> CameraRecord:
-        """The camera's record with everything that `from_record` needs to restore the effect; unchanged by default."""
+        """The camera's record, completed with the parameters of the effect.
+
+        `from_record` restores the effect from this record. The default returns the record unchanged, for effects that
+        do not move pixels.
+        """
         return camera
 
     @classmethod
     def from_record(cls, camera: CameraRecord) -> Effect | None:
-        """The effect that a camera's record describes, for effects with `MOVES_PIXELS`; None if the record has
-        no such effect.
+        """Restores the effect from a camera's record, for effects with `MOVES_PIXELS`.
+
+        The result is None if the record has no such effect.
         """
         return None
 
     def pixel_map(self, camera: CameraRecord) -> PixelMap:
-        """The map of pixels, for effects with `MOVES_PIXELS`.
+        """The mapping between the pixels with and without the effect, for effects with `MOVES_PIXELS`.
 
         Raises:
             NotImplementedError: the effect does not move pixels.

@@ -31,7 +31,8 @@ class Lens:
     with r² = x² + y².
 
     Attributes:
-        k1, k2: -0.5 to 0.5. Negative values give barrel distortion, positive values pincushion distortion.
+        k1, k2: coefficients, -0.5 to 0.5. Negative values give barrel distortion, positive values pincushion
+            distortion.
     """
 
     k1: float = 0.0
@@ -45,7 +46,7 @@ class Lens:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensMap:
-    """For each pixel of a distorted picture: its position in the picture of a pinhole camera.
+    """The position in a pinhole camera's picture of each pixel of a distorted picture.
 
     Attributes:
         x, y: (H, W) float32 columns and rows in the pinhole picture, index pixels; read-only.
@@ -75,23 +76,25 @@ class LensDistortion(Effect):
 
     @property
     def is_active(self) -> bool:
-        """Whether any coefficient differs from 0."""
+        """Whether the distortion is on: any coefficient differs from 0."""
         return self.lens.k1 != 0 or self.lens.k2 != 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
-        """The view with the distortion: colour is resampled and rounded, depth and ids are those of the nearest
+        """Distorts a view: colour is resampled bilinearly and rounded; depth and ids are taken from the nearest
         pixel.
         """
         return distort(view, self.lens, exposure.camera.intrinsics)
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """The same as `apply` for colour in torch; `Effect.apply_torch` documents the arguments."""
+        """Distorts (B, 3, H, W) linear light in torch, differentiable and without rounding; `Effect.apply_torch`
+        explains the arguments.
+        """
         found = lens_map(self.lens, exposure.camera.intrinsics)
         return read_bilinear(light, found.x.astype(np.float64), found.y.astype(np.float64))
 
     def trace(self, samples: PixelSamples, exposure: Exposure) -> PixelSamples:
-        """For (N, 1) whole pixels of the distorted picture: the (N, 4) pixels of the pinhole picture that each
-        one mixes.
+        """Replaces (N, 1) whole pixels of the distorted picture by the (N, 4) pixels of the pinhole picture that are
+        interpolated for them.
         """
         found = lens_map(self.lens, exposure.camera.intrinsics)
         at = (samples.y[:, 0].astype(int), samples.x[:, 0].astype(int))
@@ -108,7 +111,8 @@ class LensDistortion(Effect):
         )
 
     def check(self, camera: CameraRecord) -> None:
-        """Checks that the distortion does not fold the picture of a camera over (map two points to one).
+        """Checks that the distortion does not fold the picture over: no two points of the pinhole picture appear at the
+        same point.
 
         Raises:
             FieldError: the picture would fold over.
@@ -119,20 +123,20 @@ class LensDistortion(Effect):
             raise FieldError("lens", f"{error}; take k1 and k2 nearer to 0, or a narrower field of view") from error
 
     def recorded(self, camera: CameraRecord) -> CameraRecord:
-        """The camera's record, completed with the coefficients of the lens."""
+        """The camera's record, completed with the coefficients of the distortion."""
         found = lens_map(self.lens, camera.intrinsics)
         return replace(camera, lens=LensRecord(k1=self.lens.k1, k2=self.lens.k2, focal_px=found.focal_px))
 
     @classmethod
     def from_record(cls, camera: CameraRecord) -> LensDistortion | None:
-        """The lens that a camera's record describes; None for a pinhole camera."""
+        """The lens distortion that a camera's record describes; None for a pinhole camera."""
         return None if camera.lens is None else cls(lens=Lens(k1=camera.lens.k1, k2=camera.lens.k2))
 
     def pixel_map(self, camera: CameraRecord) -> PixelMap:
         """The map between the pixels of the distorted picture and those of the pinhole picture.
 
-        Outside the picture's corners `forward` continues on a straight line, because the polynomial would fold over
-        there or grow without bounds.
+        Outside the picture's corners, `forward` is extended linearly, because the polynomial would fold over there or
+        grow without bounds.
 
         Raises:
             ValueError: the distortion folds the picture over.
@@ -157,7 +161,8 @@ class LensDistortion(Effect):
 
 
 def distort(view: RawView, lens: Lens, pinhole: Intrinsics) -> RawView:
-    """The view of a pinhole camera as a lens shows it: colour is rounded, depth and ids are those of the nearest pixel.
+    """Distorts the view of a pinhole camera: colour is resampled and rounded; depth and ids are taken from the nearest
+    pixel.
 
     Args:
         view: view of the pinhole camera.
@@ -181,7 +186,7 @@ def distort(view: RawView, lens: Lens, pinhole: Intrinsics) -> RawView:
 
 @lru_cache(maxsize=8)
 def lens_map(lens: Lens, pinhole: Intrinsics) -> LensMap:
-    """The map from a distorted picture to the pinhole picture.
+    """The position in the pinhole picture of each pixel of the distorted picture.
 
     The distorted picture gets a longer focal length if it would otherwise show directions that the pinhole picture does
     not contain.
@@ -210,7 +215,7 @@ def lens_map(lens: Lens, pinhole: Intrinsics) -> LensMap:
 
 
 def undistorted(lens: Lens, distorted: Array) -> Array:
-    """Pinhole positions of points in a distorted picture, by Newton's method on the radius.
+    """Converts points of a distorted picture to the pinhole picture, by Newton's method on the radius.
 
     Args:
         lens: coefficients of the distortion.

@@ -1,4 +1,4 @@
-"""Motion blur: things smear in the picture because the ego car drives while the shutter is open."""
+"""Motion blur: objects are smeared in the picture, because the ego car drives while the shutter is open."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 Real = TypeVar("Real", np.float32, np.float64)
 
 MOMENTS = 9
-"""Number of moments, evenly spaced while the shutter is open, whose pictures are averaged. Ground truth is that
-of the middle one.
+"""Number of moments, evenly spaced while the shutter is open, whose pictures are averaged. Ground truth belongs to the
+middle moment.
 """
 
 _LEAST_DENOMINATOR = 0.1
@@ -30,9 +30,9 @@ _LEAST_DENOMINATOR = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionBlur(Effect):
-    """Blur by the ego car's motion: each pixel is a mean along the path that its point takes over the picture.
+    """Blur by the ego car's motion. Each pixel is the mean of the picture along the path of the pixel's scene point.
 
-    The path follows from depth and the ego car's velocity. Other road users are treated as if they stood still, and
+    The path is computed from depth and the ego car's velocity. Other road users are treated as if they stood still, and
     rotation is neglected. The sky and the ego car's own bonnet stay sharp.
 
     Attributes:
@@ -49,12 +49,12 @@ class MotionBlur(Effect):
 
     @property
     def is_active(self) -> bool:
-        """Whether the exposure time is above 0."""
+        """Whether the blur is on: the exposure time is above 0."""
         return self.shutter_s > 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
-        """The view with blurred and rounded colour. Depth and ids are not blurred: they are those of the middle
-        moment.
+        """Blurs the colour of a view and rounds it. Depth and ids are not blurred: they belong to the middle moment of
+        the exposure.
         """
         import cv2  # not at the top: configs are read without OpenCV
 
@@ -65,14 +65,18 @@ class MotionBlur(Effect):
         return replace(view, linear_rgb=np.asarray(total / np.float32(MOMENTS) + np.float32(0.5), dtype=np.uint16))
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """The same as `apply` for colour in torch; `Effect.apply_torch` documents the arguments."""
+        """Blurs (B, 3, H, W) linear light in torch, differentiable and without rounding; `Effect.apply_torch` explains
+        the arguments.
+        """
         total = light * 0
         for from_x, from_y in self._paths(truth, exposure):
             total = total + read_bilinear(light, from_x.astype(np.float64), from_y.astype(np.float64))
         return total / MOMENTS
 
     def trace(self, samples: PixelSamples, exposure: Exposure) -> PixelSamples:
-        """Replaces (N, S) samples of the blurred picture by (N, 9 S) samples of the sharp picture (`MOMENTS` = 9)."""
+        """Replaces (N, S) samples of the blurred picture by the (N, 9 S) samples of the sharp picture that are averaged
+        (`MOMENTS` = 9).
+        """
         pinhole = exposure.camera.intrinsics
         inverse = np.maximum(samples.inverse_depth(samples.x, samples.y), 0.0)
         xs, ys = [], []

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 class Noise(Effect):
     """Gaussian sensor noise whose variance is a constant plus a part that is proportional to light.
 
-    The random draws depend only on the sample's seed, its index and the camera's name, so a patched sample and its
-    unpatched twin have the same noise.
+    The random draws depend only on the sample's seed, its index and the camera's name, so a sample has the same noise
+    with and without a patch.
 
     Attributes:
         shot_noise: standard deviation at full scale, 0 to 20 percent of full scale; it grows with the square root of
@@ -45,11 +45,11 @@ class Noise(Effect):
 
     @property
     def is_active(self) -> bool:
-        """Whether one of the two standard deviations is above 0."""
+        """Whether the noise is on: one of the two standard deviations is above 0."""
         return self.shot_noise > 0 or self.read_noise > 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
-        """The view with noise, rounded and clipped to 0..`LINEAR_FULL_SCALE`."""
+        """Adds noise to the colour of a view, rounded and clipped to 0..`LINEAR_FULL_SCALE`."""
         assert view.linear_rgb is not None
         light = view.linear_rgb.astype(np.float32)
         variance = light * np.float32((self.shot_noise / 100) ** 2 * LINEAR_FULL_SCALE)
@@ -59,11 +59,15 @@ class Noise(Effect):
         return replace(view, linear_rgb=clipped.astype(np.uint16))
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """See `Effect.apply_torch`; the result is not clipped."""
+        """Adds noise to (B, 3, H, W) linear light in torch, differentiable, without rounding and clipping;
+        `Effect.apply_torch` explains the arguments.
+        """
         return self._noisy(light, light.new_tensor(_draws(exposure).transpose(2, 0, 1)))
 
     def torch_at(self, pixels: tuple[Pixels, Pixels], exposure: Exposure, like: Tensor) -> Callable[[Tensor], Tensor]:
-        """See `Effect.torch_at`; the result is not clipped."""
+        """The noise on selected pixels, as a differentiable function of their (N, 3) linear light, without clipping;
+        `Effect.torch_at` explains the arguments.
+        """
         normal = like.new_tensor(_draws(exposure)[pixels])
         return lambda light: self._noisy(light, normal)
 

@@ -1,4 +1,4 @@
-"""Bilinear interpolation of pictures in torch."""
+"""Bilinear interpolation of pictures in torch, at positions that a NumPy array gives."""
 
 from __future__ import annotations
 

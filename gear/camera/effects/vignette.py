@@ -35,11 +35,11 @@ class Vignette(Effect):
 
     @property
     def is_active(self) -> bool:
-        """Whether the corners lose light."""
+        """Whether the vignette is on: the corners lose light."""
         return self.vignette > 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
-        """The view with darker corners, rounded."""
+        """Darkens the corners of a view; colours are rounded."""
         import cv2  # imported here, so that configs can be read without OpenCV
 
         assert view.linear_rgb is not None
@@ -48,13 +48,17 @@ class Vignette(Effect):
         return replace(view, linear_rgb=np.asarray(dimmed, dtype=np.uint16))
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """The same as `apply` for colour in torch; `Effect.apply_torch` documents the arguments."""
+        """Darkens the corners of (B, 3, H, W) linear light in torch, differentiable and without rounding;
+        `Effect.apply_torch` explains the arguments.
+        """
         return light * light.new_tensor(vignette_map(self.vignette, light.shape[-1], light.shape[-2]))
 
 
 @lru_cache(maxsize=8)
 def vignette_map(strength: float, width_px: int, height_px: int) -> FloatImage:
-    """(H, W) float32 factors on light, read-only: 1 in the middle, 1 - `strength` in the corners."""
+    """The (H, W) float32 factors on light of a vignette, read-only: 1 in the middle of the picture, 1 - `strength` in
+    the corners.
+    """
     x, y = np.meshgrid(np.linspace(-1, 1, width_px), np.linspace(-1, 1, height_px))
     aspect = height_px / width_px
     square = (x**2 + (aspect * y) ** 2) / (1 + aspect**2)
