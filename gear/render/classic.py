@@ -1,7 +1,7 @@
 """MuJoCo's own OpenGL renderer, through EGL or OSMesa.
 
-It computes light with display values, without tone curve and gamma. To show the same MJCF correctly, it uses a copy of
-the model with display colours: textures marked sRGB are not decoded, and linear albedos of materials and geoms are
+It computes light with display values, without tone curve and gamma. To render the same MJCF correctly, it uses a copy
+of the model with display colours: textures marked sRGB are not decoded, and linear albedos of materials and geoms are
 encoded. Its frames are linear in the 8-bit values of a patch; Filament's frames are linear in the albedo that these
 values encode.
 
@@ -39,10 +39,10 @@ _FLAGS = mujoco.mjtRndFlag
 
 
 class ClassicRenderer:
-    """An OpenGL context with one model in it. Not thread-safe."""
+    """The classic renderer: an OpenGL context with one model in it. It is not thread-safe."""
 
     def __init__(self, model: mujoco.MjModel, *, quality: Quality = "film") -> None:
-        """Opens the OpenGL context.
+        """Opens an OpenGL context and loads the model.
 
         Raises:
             BackendError: there is no OpenGL driver.
@@ -84,7 +84,8 @@ class ClassicRenderer:
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """Renders one raw view for each camera; `gear.contracts.rendering.Renderer` documents the arguments.
+        """Renders one raw view (linear colour, depth, geom ids) per camera. `gear.contracts.rendering.Renderer`
+        documents the arguments.
 
         Raises:
             ValueError: the stage belongs to another model, or a patch does not have the size of its texture.
@@ -99,7 +100,7 @@ class ClassicRenderer:
         )
 
     def close(self) -> None:
-        """Frees the context; may be called twice."""
+        """Frees the graphics context; a second call has no effect."""
         if self._closed:
             return
         self._closed = True

@@ -1,5 +1,6 @@
-"""Finds the geoms that a view needs, because OpenGL draws everything in a scene, up to three times if there are
-shadows.
+"""Finds the geoms that can be visible in a view.
+
+OpenGL draws every geom of a scene, up to three times if there are shadows, so geoms outside the view are left out.
 """
 
 from __future__ import annotations
@@ -16,19 +17,22 @@ Mask = npt.NDArray[np.bool_]
 
 
 def bounding_spheres(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:
-    """Bounding spheres of geoms: (ngeom, 3) centres in world coordinates and (ngeom,) radii, metres; planes have
-    infinite radii.
+    """The bounding spheres of geoms: (ngeom, 3) centres in world coordinates and (ngeom,) radii, metres; the radii of
+    planes are infinite.
     """
     return data.geom_xpos, bounding_radii(model)
 
 
 def bounding_radii(model: mujoco.MjModel) -> Array:
-    """(ngeom,) radii of bounding spheres, metres; infinite for geoms without bounds, such as planes."""
+    """The (ngeom,) radii of the bounding spheres of geoms, metres; infinite for geoms without bounds, such as
+    planes.
+    """
     return np.asarray(np.where(model.geom_rbound > 0, model.geom_rbound, np.inf))
 
 
 def in_frustum(frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
-    """(ngeom,) bool: False only for spheres that are certainly outside the view volume.
+    """Tests which bounding spheres may be in a camera's view volume: (ngeom,) bool, False only for spheres that are
+    certainly outside.
 
     Args:
         frustum: the camera's view volume.
@@ -51,7 +55,8 @@ def in_frustum(frustum: Frustum, centres_m: Array, radii_m: Array) -> Mask:
 
 
 def in_beam(centre_m: Array, direction: Array, half_side_m: float, centres_m: Array, radii_m: Array) -> Mask:
-    """(ngeom,) bool: False only for spheres that are certainly outside a square beam of light.
+    """Tests which bounding spheres may be in a square beam of light: (ngeom,) bool, False only for spheres that are
+    certainly outside.
 
     The square may be rotated about the beam's axis, so the round beam around it is tested.
 
@@ -69,7 +74,8 @@ def in_beam(centre_m: Array, direction: Array, half_side_m: float, centres_m: Ar
 
 
 def may_shadow(receivers_m: Array, axes: Array, margin_m: float, centres_m: Array, radii_m: Array) -> Mask:
-    """(ngeom,) bool: False only for spheres that certainly cast no shadow on a convex part of the world.
+    """Tests which bounding spheres may cast a shadow on a convex part of the world: (ngeom,) bool, False only if a
+    sphere certainly casts none.
 
     Args:
         receivers_m: (N, 3) corners of that part.
@@ -93,7 +99,7 @@ def may_shadow(receivers_m: Array, axes: Array, margin_m: float, centres_m: Arra
 
 
 def near_to_far(chosen: Mask, depth_m: Array) -> npt.NDArray[np.intp]:
-    """Indices of the chosen geoms, smallest depth first; geoms with equal depths keep their order.
+    """The indices of the chosen geoms, sorted by depth, smallest depth first; geoms with equal depths keep their order.
 
     Args:
         chosen: (ngeom,) bool.

@@ -15,13 +15,15 @@ SHADOW_REACH_M = 50.0
 """Half the side of the square in front of the camera in which the sun casts shadows, metres."""
 
 SHADOW_MAP_PX = 2048
-"""Side of the shadow map in texels, five centimetres each. Twice as many would make a frame a tenth slower."""
+"""Side of the shadow map in texels; a texel covers five centimetres. With twice as many texels, a frame would take a
+tenth more time.
+"""
 
 LIFT = 2.4
 """Factor by which the darkest colours are brightened, like the tone curve does with Filament's frames.
 
-The colours of the town are brightened instead of its light, because more light would clip white, such as that of a
-patch. Patches are not brightened.
+The colours of the town are brightened instead of its light, because more light would clip the white parts of a patch.
+Patches are not brightened.
 """
 
 
@@ -38,9 +40,9 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
     """A copy of a model whose colours are display values.
 
     OpenGL would decode a texture that is marked sRGB and show the linear result without encoding it, far too dark. In
-    the copy such textures are not marked, linear colours of geoms and materials are encoded, and both are brightened.
-    Lights of type `image`, which MuJoCo's OpenGL does not support, are off; of the headlight only the ambient light is
-    kept.
+    the copy such textures are not marked. If the model has linear colours, colours of geoms and materials are encoded
+    and brightened, and colour textures are brightened. Lights of type `image`, which MuJoCo's OpenGL does not support,
+    are off; the headlight gives ambient light only.
     """
     shown = copy.copy(model)
     shown.tex_colorspace[:] = mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
@@ -63,7 +65,9 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def displayed_colour(albedo: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Converts linear albedo 0..1 to the display values 0..1 that it has in full light, elementwise."""
+    """Converts linear albedo 0..1 to the display values 0..1 of a surface in full light, elementwise: sRGB-encoded and
+    brightened.
+    """
     return _lifted(encode_srgb(albedo))
 
 

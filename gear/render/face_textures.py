@@ -1,4 +1,6 @@
-"""The textures by which the faces of surfaces show patches."""
+"""The textures of faces, the flat geoms on which patches are drawn: finds these textures and checks patches for
+them.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ from gear.values.frames import UInt8Image
 
 
 def texture_of_face(model: mujoco.MjModel, geom_id: int) -> int:
-    """Id of the colour texture of a geom's material.
+    """The id of the colour texture of a face, from the material of its geom.
 
     Raises:
         ValueError: the geom has no such texture, so it cannot be a face.
@@ -24,14 +26,14 @@ def texture_of_face(model: mujoco.MjModel, geom_id: int) -> int:
 
 
 def checked_faces(model: mujoco.MjModel, faces: Mapping[int, UInt8Image]) -> dict[int, tuple[int, UInt8Image]]:
-    """Checks the patches of a stage.
+    """Checks the patches of a stage (a posed world that is rendered): their dtype and size.
 
     Args:
         model: the compiled world.
-        faces: (H, W, 3) uint8 sRGB by geom id.
+        faces: patches, (H, W, 3) uint8 sRGB, by geom id of their face.
 
     Returns:
-        For each geom id: the id of the texture that is replaced, and the patch.
+        The id of the texture that each patch replaces, and the patch, by geom id.
 
     Raises:
         ValueError: a patch is not uint8, or does not have the size of its texture.

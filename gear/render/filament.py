@@ -1,8 +1,8 @@
 """The physically based renderer Filament on Vulkan, through MuJoCo's module `mjrf`.
 
-Filament's post-processing is off. It dithers by frame number and detects edges by contrast, so a frame would depend on
-earlier frames, and a patch could change pixels that do not show it. Without it, frames are linear and repeatable;
-supersampling and gear's camera pipeline take its place.
+Filament's post-processing is off. Post-processing dithers by frame number and detects edges by contrast. A frame would
+therefore depend on earlier frames, and a patch could change pixels that do not show the patch. Without post-processing,
+frames are linear and repeatable. gear uses supersampling and its camera pipeline instead.
 
 A patch's texture is filtered as follows (measured). Texels are decoded from sRGB and then filtered trilinearly in
 linear light, over mip levels of 2 x 2 averages; the texture repeats. The level is isotropic: log2 of the longer of a
@@ -44,7 +44,7 @@ _FACE_TEXTURES_KEPT = 16
 _M_ARENA_MAX = -8
 _WHITE = np.ones(4, np.float32)
 _FRAMES_TO_SETTLE = 24
-"""Number of frames after which Filament frees its upload buffers, a quarter of the memory for a town."""
+"""Number of frames after which Filament frees its upload buffers, which take a quarter of the memory for a town."""
 
 _FIRST_LOOK = CameraRecord(
     name="first", width_px=16, height_px=16, focal_px=8.0, world_from_camera=Pose(position_m=(0.0, 0.0, -1e5))
@@ -62,10 +62,10 @@ class _Target:
 
 
 class FilamentRenderer:
-    """A Vulkan context with one model in it. Not thread-safe."""
+    """The renderer Filament: a Vulkan context with one model in it. It is not thread-safe."""
 
     def __init__(self, model: mujoco.MjModel, *, quality: Quality = "film") -> None:
-        """Opens the Vulkan context.
+        """Opens a Vulkan context and loads the model.
 
         Raises:
             BackendError: there is no Vulkan driver, or this build of MuJoCo has no Filament.
@@ -107,7 +107,8 @@ class FilamentRenderer:
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """Renders one raw view for each camera; `gear.contracts.rendering.Renderer` documents the arguments.
+        """Renders one raw view (linear colour, depth, geom ids) per camera. `gear.contracts.rendering.Renderer`
+        documents the arguments.
 
         Raises:
             ValueError: the stage belongs to another model, or a patch does not have the size of its texture.
@@ -121,7 +122,7 @@ class FilamentRenderer:
         return tuple(self._view(camera, shape, colour=colour) for camera, shape in zip(cameras, known, strict=True))
 
     def close(self) -> None:
-        """Frees the context; may be called twice."""
+        """Frees the graphics context; a second call has no effect."""
         if self._closed:
             return
         self._closed = True

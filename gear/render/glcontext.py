@@ -1,6 +1,6 @@
 """Opens an OpenGL context without a window: through EGL if it works, otherwise through OSMesa.
 
-If none can be opened, the error names the cause: an environment variable, or a missing package.
+If no context can be opened, the error names the cause: an environment variable, or a missing package.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _SETTINGS = ("MUJOCO_GL", "PYOPENGL_PLATFORM")
 def backend_setting() -> str | None:
     """Name of the environment variable that selects EGL or OSMesa in this process; None if no variable does.
 
-    PyOpenGL binds a process to one platform for its whole life, and sets `PYOPENGL_PLATFORM` when it does.
+    PyOpenGL binds a process to one platform until the process ends, and then sets `PYOPENGL_PLATFORM`.
     """
     for name in _SETTINGS:
         if os.environ.get(name, "").strip().lower() in ("egl", "osmesa"):
@@ -34,13 +34,14 @@ def backend_setting() -> str | None:
 
 
 def choose_backend(renderer: str) -> str:
-    """`egl` or `osmesa`: the one that the environment selects, otherwise the first one that works on this machine.
+    """Chooses `egl` or `osmesa`: the backend that an environment variable selects, otherwise the first backend that
+    works on this machine.
 
     Args:
         renderer: name of the renderer that needs a context, for error messages.
 
     Raises:
-        BackendError: neither works; the message says what to install.
+        BackendError: no backend works; the message says what to install.
     """
     setting = backend_setting()
     if setting is not None:
@@ -58,7 +59,7 @@ def open_context(backend: str, renderer: str) -> Any:
 
     Args:
         backend: `egl` or `osmesa`.
-        renderer: name of the renderer that needs it, for error messages.
+        renderer: name of the renderer that needs the context, for error messages.
 
     Raises:
         BackendError: the driver is missing, or `MUJOCO_EGL_DEVICE_ID` is not the number of a device.
@@ -96,7 +97,7 @@ def _cause(backend: str, error: Exception) -> tuple[str, str]:
 
 
 def egl_problem() -> tuple[str, str] | None:
-    """What is missing for EGL without a display, and what to install; None if EGL can start a device."""
+    """The reason why EGL cannot be used without a display, and what to install; None if EGL can start a device."""
     if not _loads("libEGL.so.1"):
         return "the EGL library libEGL.so.1 is not installed", _NO_LIBRARY
     devices = _egl_devices()
@@ -116,7 +117,7 @@ def _remedy(install: str, *settings: str) -> str:
 
 
 def driver_and_device() -> tuple[str, str]:
-    """Name of the current context's driver (with version) and of its device."""
+    """The name of the current OpenGL context's driver (with version), and the name of its device."""
     from OpenGL import GL  # type: ignore[import-untyped]
 
     version, device = GL.glGetString(GL.GL_VERSION), GL.glGetString(GL.GL_RENDERER)
@@ -124,7 +125,7 @@ def driver_and_device() -> tuple[str, str]:
 
 
 def is_software(device: str) -> bool:
-    """Whether a device's name is that of a CPU driver of Mesa."""
+    """Whether the name of a device belongs to a driver of Mesa that renders on the CPU."""
     return any(word in device.casefold() for word in ("llvmpipe", "softpipe", "swrast", "software"))
 
 

@@ -1,4 +1,4 @@
-"""Combines a renderer's 8-bit samples to linear frames in 0..`LINEAR_FULL_SCALE`."""
+"""Combines the 8-bit samples of a renderer to linear frames, with values in 0..`LINEAR_FULL_SCALE`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,9 @@ def sum_2x2(samples: UInt8Image) -> UInt16Image:
 
 
 def four_times(samples: UInt8Image) -> UInt16Image:
-    """Multiplies (H, W, 3) uint8 by four, to uint16: the same full scale as the sum of four samples."""
+    """Multiplies (H, W, 3) uint8 samples by four, to uint16. The full scale then equals that of the sum of four samples
+    (`sum_2x2`).
+    """
     return np.left_shift(samples, 2, dtype=np.uint16)
 
 
@@ -37,7 +39,7 @@ def smooth_edges(linear_rgb: UInt16Image, geom_id: IdImage, depth_m: FloatImage)
     Other pixels are unchanged.
 
     Edges are found by ids and depth alone and the filter is linear, so frames stay linear in every albedo. A patch
-    cannot influence it, unlike a filter that detects contrast.
+    cannot influence the filter, unlike a filter that detects contrast.
 
     Args:
         linear_rgb: (H, W, 3) uint16.
@@ -45,7 +47,7 @@ def smooth_edges(linear_rgb: UInt16Image, geom_id: IdImage, depth_m: FloatImage)
         depth_m: (H, W) float32, NaN where nothing was hit.
 
     Returns:
-        (H, W, 3) uint16, a new array.
+        (H, W, 3) uint16 smoothed frame, a new array.
     """
     smooth = cv2.GaussianBlur(linear_rgb, (3, 3), 0.8)
     edges = edge_mask(geom_id, depth_m)
@@ -53,8 +55,8 @@ def smooth_edges(linear_rgb: UInt16Image, geom_id: IdImage, depth_m: FloatImage)
 
 
 def edge_mask(geom_id: IdImage, depth_m: FloatImage) -> npt.NDArray[np.uint8]:
-    """(H, W) uint8: 255 where one of the four neighbours shows another geom, or a silhouette or crease of the same
-    geom; 0 elsewhere.
+    """The pixels on edges: (H, W) uint8, 255 for edges and 0 elsewhere. An edge is a pixel with a neighbour (of four)
+    that shows another geom, or a pixel on a silhouette or crease of one geom.
 
     On a plane 1/z is linear over the picture, so a second difference of 1/z other than zero means that the surface is
     not a plane.
@@ -73,13 +75,13 @@ def edge_mask(geom_id: IdImage, depth_m: FloatImage) -> npt.NDArray[np.uint8]:
 
 
 def ids_from_rgb(pixels: UInt8Image) -> IdImage:
-    """Decodes ids from colours.
+    """Decodes geom ids from a picture in which each geom has a colour of its own.
 
     Args:
         pixels: (H, W, 3) uint8 with r + 256 g + 65536 b = id + 1.
 
     Returns:
-        (H, W) int32, -1 where the picture is black.
+        (H, W) int32 ids, -1 where the picture is black.
     """
     packed = cv2.cvtColor(pixels, cv2.COLOR_RGB2RGBA)
     packed[..., 3] = 0

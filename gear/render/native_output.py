@@ -21,7 +21,7 @@ _CHATTER = re.compile(
 
 @contextmanager
 def native_output(descriptors: tuple[int, ...] = (1, 2)) -> Iterator[list[str]]:
-    """Catches what native code prints to stdout and stderr, at the level of file descriptors.
+    """Context in which the output of native code to stdout and stderr is caught, at the level of file descriptors.
 
     Yields:
         A list. When the context ends, it contains the known informational lines; all other lines are written to their

@@ -1,7 +1,8 @@
 """Ambient occlusion from depth: corners, kerbs and the ground under cars become darker than open surfaces.
 
 Filament's own ambient occlusion is off, because with Mesa's software Vulkan (22.3) it leaks about a megabyte per frame.
-This one works for all renderers. It depends on depth alone, so frames stay linear in every albedo.
+The ambient occlusion of this module works for all renderers. It depends on depth alone, so frames stay linear in every
+albedo.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ _MAX_REACH = 0.06
 
 
 def openness(depth_m: FloatImage, focal_px: float) -> FloatImage:
-    """Ambient visibility of each pixel: the factor by which occlusion reduces light.
+    """The ambient visibility of each pixel: the factor by which ambient occlusion reduces light.
 
     Each pixel is compared with pairs of opposite neighbours. On a plane 1/z is linear over the picture, so the mean of
     a pair lies on the plane, whatever its slant. If the mean is nearer than the pixel, the surface is concave there.
@@ -36,7 +37,7 @@ def openness(depth_m: FloatImage, focal_px: float) -> FloatImage:
         focal_px: horizontal focal length, pixels.
 
     Returns:
-        (H, W) float32 in 1 - `STRENGTH`..1.
+        (H, W) float32 factors in 1 - `STRENGTH`..1; 1 for open surfaces.
     """
     height, width = depth_m.shape
     step = max(1, math.ceil(width / _COARSE_WIDTH_PX))
@@ -76,7 +77,9 @@ def _pair(
 
 
 def shade(linear_rgb: UInt16Image, share: npt.NDArray[np.float32]) -> UInt16Image:
-    """Multiplies (H, W, 3) uint16 light by (H, W) float32 factors and rounds; a new array."""
+    """Multiplies an (H, W, 3) uint16 linear frame by (H, W) float32 factors, with rounding; the result is a new
+    array.
+    """
     shaded = np.empty_like(linear_rgb)
     # In bands, since the shares of a whole picture, once for each colour, take more memory than the picture.
     for top in range(0, len(share), _BAND_ROWS):

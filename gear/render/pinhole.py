@@ -13,7 +13,7 @@ from gear.values.scene import CameraRecord
 
 NEAR_M = 0.1
 FAR_M = 2000.0
-"""Farthest distance that is rendered, metres. Reversed depth in 32-bit floats keeps its precision over this range."""
+"""Farthest distance that is rendered, metres. Reversed depth in 32-bit floats is precise over this range."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +39,9 @@ class Frustum:
 
     @staticmethod
     def of(camera: CameraRecord) -> Frustum:
-        """The view volume of a camera's pinhole; index (0, 0) is the centre of the picture's first pixel."""
+        """The view volume of the pinhole camera in a camera record. Pixel coordinates (0, 0) are the centre of the
+        picture's first pixel.
+        """
         world_from_camera, pinhole = camera.world_from_camera_transform, camera.intrinsics
         return Frustum(
             position_world_m=world_from_camera.translation_m,
@@ -52,7 +54,9 @@ class Frustum:
         )
 
     def slice_corners(self, begin_m: float, end_m: float) -> Array:
-        """(8, 3) corners, world coordinates, of the part of the view between two distances along the optical axis."""
+        """The (8, 3) corners, in world coordinates, of the part of the view volume between two distances along the
+        optical axis.
+        """
         right = np.cross(self.forward_world, self.up_world)
         rays = [
             self.forward_world
@@ -71,7 +75,8 @@ def depth_from_reversed(reversed_depth: npt.NDArray[np.float32]) -> FloatImage:
         reversed_depth: (H, W) float32 depth d; it is overwritten.
 
     Returns:
-        The same array with z = n f / (n + d (f - n)), where n is `NEAR_M` and f is `FAR_M`; NaN where d is 0.
+        (H, W) float32 planar z = n f / (n + d (f - n)) in the same array, where n is `NEAR_M` and f is `FAR_M`; NaN
+        where d is 0.
     """
     depth_m = reversed_depth
     nothing = depth_m <= 0

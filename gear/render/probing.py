@@ -1,4 +1,4 @@
-"""Tests whether a renderer works on this machine, with a small reference frame."""
+"""Tests whether a renderer works on this machine, by rendering a small reference frame."""
 
 from __future__ import annotations
 
@@ -56,11 +56,11 @@ class ProbeResult:
 
 
 def probe(name: str, *, quality: Quality = "film") -> ProbeResult:
-    """Renders the reference frame twice.
+    """Tests a renderer: starts it, renders the reference frame twice, and measures the times.
 
     Raises:
         UnknownNameError: there is no renderer with this name.
-        BackendError: it cannot start on this machine; the message says what to install.
+        BackendError: the renderer cannot start on this machine; the message says what to install.
     """
     model = mujoco.MjModel.from_xml_string(_REFERENCE_MJCF)
     data = mujoco.MjData(model)
@@ -101,12 +101,12 @@ _CAMERA = CameraRecord(
 
 @cache
 def renderer_info(name: str) -> RendererInfo:
-    """Name, driver and device of a renderer, without rendering a frame. The renderer must be started for it, so the
+    """Name, driver and device of a renderer, without rendering a frame. The renderer is started to find them, so the
     result is cached.
 
     Raises:
         UnknownNameError: there is no renderer with this name.
-        BackendError: it cannot start on this machine; the message says what to install.
+        BackendError: the renderer cannot start on this machine; the message says what to install.
     """
     renderer = open_renderer(name, mujoco.MjModel.from_xml_string(_REFERENCE_MJCF))
     try:

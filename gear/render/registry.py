@@ -1,4 +1,4 @@
-"""Finds renderers by name."""
+"""Finds and opens renderers by name: `raster`, `filament`, `classic`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SUMMARIES = {
 
 
 def open_renderer(name: str, model: mujoco.MjModel, *, quality: Quality = "film") -> Renderer:
-    """Makes a renderer for one compiled model. The caller closes it.
+    """Opens a renderer for one compiled model. The caller must close the renderer.
 
     Args:
         name: one of `RENDERERS`.
@@ -30,7 +30,7 @@ def open_renderer(name: str, model: mujoco.MjModel, *, quality: Quality = "film"
 
     Raises:
         UnknownNameError: there is no renderer with this name.
-        BackendError: it cannot start on this machine; the message says what to install.
+        BackendError: the renderer cannot start on this machine; the message says what to install.
     """
     if name == "filament":
         from gear.render.filament import FilamentRenderer

@@ -1,4 +1,4 @@
-"""The geom groups that are rendered."""
+"""The geom groups that MuJoCo's renderers draw."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import mujoco
 
 
 def geoms_only() -> mujoco.MjvOption:
-    """Visualisation options that show geoms of groups 0 to 2, and no collision geoms, sites, skins or helpers."""
+    """MuJoCo visualisation options that show geoms of groups 0 to 2, and no collision geoms, sites, skins or other
+    helpers.
+    """
     option = mujoco.MjvOption()
     mujoco.mjv_defaultOption(option)
     option.geomgroup[:] = (1, 1, 1, 0, 0, 0)

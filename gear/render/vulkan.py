@@ -1,4 +1,4 @@
-"""Lists Vulkan devices. gear checks first that there is one, because Filament ends the process otherwise."""
+"""Lists Vulkan devices. gear calls this before Filament, because Filament ends the process if there is no device."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class _PropertiesHead(ctypes.Structure):
 
 @dataclass(frozen=True, slots=True)
 class VulkanDevice:
-    """One physical device.
+    """One physical Vulkan device.
 
     Attributes:
         name: name that the driver reports.
@@ -49,11 +49,11 @@ class VulkanDevice:
 
 
 class VulkanUnavailableError(Exception):
-    """The Vulkan loader, a driver or a device is missing; the message says which."""
+    """The Vulkan loader, a driver or a device is missing; the message names the missing part."""
 
 
 def vulkan_devices() -> tuple[VulkanDevice, ...]:
-    """All devices of the installed drivers, at least one.
+    """The Vulkan devices of all installed drivers; at least one device.
 
     Raises:
         VulkanUnavailableError: there is no device.

@@ -1,5 +1,5 @@
-"""gear's own physically based OpenGL renderer: its pictures of streets look like Filament's and take a fraction of the
-time.
+"""gear's own physically based OpenGL renderer: its pictures of streets look like those of Filament and take a fraction
+of the time.
 
 Filament shades every sample with one general shader that is compiled into MuJoCo. This renderer has a shader for each
 kind of material. It draws ids and depth first, so that hidden surfaces are not shaded, draws the shadows of static
@@ -30,7 +30,7 @@ def open_raster(model: mujoco.MjModel, *, quality: Quality = "film") -> RasterRe
 
     Args:
         model: the compiled world; it is not changed.
-        quality: see `gear.contracts.rendering.Quality`.
+        quality: `film` takes several samples per pixel; `fast` takes one and smooths edges.
 
     Raises:
         BackendError: EGL has no driver for OpenGL 4.5; the message names the setting or the missing package.

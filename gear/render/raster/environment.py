@@ -1,4 +1,4 @@
-"""Mip levels of cube maps, of which rough surfaces reflect the coarser ones.
+"""Mip levels of cube maps (environment maps). Rough surfaces reflect the coarser levels.
 
 Faces are in OpenGL's and MuJoCo's order: +x, -x, +y, -y, +z, -z of a cube whose y axis points up in the world and whose
 z axis points south.
@@ -16,7 +16,7 @@ def mip_chain(radiance: Array) -> tuple[Array, ...]:
         radiance: (6, n, n, 3) float64, the finest level.
 
     Returns:
-        (6, n, n, 3), (6, n // 2, n // 2, 3), ..., (6, 1, 1, 3).
+        The levels, finest first: arrays of shape (6, n, n, 3), (6, n // 2, n // 2, 3), ..., (6, 1, 1, 3).
     """
     levels = [radiance]
     while levels[-1].shape[1] > 1:

@@ -1,4 +1,4 @@
-"""Triangles of a model's geoms in the form that OpenGL draws: one vertex buffer, one index buffer and draw commands."""
+"""The triangles of a model's geoms as OpenGL draws them: one vertex buffer, one index buffer and draw commands."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _PLANE, _FIELD = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFI
 _BITS = 21
 _CELL_M = 48.0
 _WHOLE = 512
-"""Meshes with fewer triangles are not cut into pieces, because a draw command costs about as much as so many
-triangles.
+"""Meshes with fewer triangles than this are not cut into pieces, because a draw command takes about as long as this
+number of triangles.
 """
 
 _Key = tuple[int, int, tuple[float, ...], tuple[float, ...]]
@@ -32,7 +32,7 @@ _Key = tuple[int, int, tuple[float, ...], tuple[float, ...]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Geometry:
-    """Triangles of all geoms in P pieces, so that pieces outside the view can be skipped.
+    """The triangles of all geoms, cut into P pieces, so that pieces outside the view can be skipped.
 
     Attributes:
         vertices: (V,) of type `VERTEX`.

@@ -23,7 +23,7 @@ def require_version() -> None:
     """Checks that the current context has OpenGL 4.5.
 
     Raises:
-        BackendError: it has a lower version; the message names it.
+        BackendError: the context has a lower version; the message names this version.
     """
     words = _text(GL.glGetString(GL.GL_VERSION))
     found = re.match(r"(\d+)\.(\d+)", words)
@@ -35,15 +35,15 @@ class Program:
     """A compiled and linked pair of a vertex and a fragment shader."""
 
     def __init__(self, vertex: str, fragment: str, flags: tuple[str, ...] = ()) -> None:
-        """Compiles two shaders of this folder. `frame.glsl` is put before each, and `pose.glsl` too before those that
-        draw geoms.
+        """Compiles two shaders of this folder. The source of `frame.glsl` is put before each shader, and that of
+        `pose.glsl` before shaders that draw geoms.
 
         Args:
             vertex, fragment: names of the files, without `.glsl`.
-            flags: preprocessor definitions for both, such as `SHADOWS` or `LIGHTS 2`.
+            flags: preprocessor definitions for both shaders, such as `SHADOWS` or `LIGHTS 2`.
 
         Raises:
-            BackendError: they do not compile; the message is the driver's.
+            BackendError: a shader does not compile; the message is the driver's.
         """
         self.handle = GL.glCreateProgram()
         head = _VERSION + "".join(f"#define {flag}\n" for flag in flags) + _source("frame")
@@ -62,10 +62,10 @@ class Program:
             raise BackendError("raster", f"{vertex}.glsl with {fragment}.glsl: {said}", _REMEDY)
 
     def use(self, **matrices: npt.NDArray[np.float64]) -> None:
-        """Makes the program current and sets its uniforms.
+        """Makes the shader program current and sets its uniform variables.
 
         Args:
-            **matrices: values by name: (4, 4) or (3, 3) matrices, or vectors of four numbers.
+            **matrices: values by name of the uniform: (4, 4) or (3, 3) matrices, or vectors of four numbers.
         """
         GL.glUseProgram(self.handle)
         for name, matrix in matrices.items():
@@ -80,7 +80,7 @@ class Program:
 
 
 def static_buffer(content: npt.NDArray[Any]) -> int:
-    """Makes a buffer with constant content and returns its OpenGL name."""
+    """Makes an OpenGL buffer with constant content. Returns its OpenGL name."""
     buffer = np.zeros(1, np.uint32)
     GL.glCreateBuffers(1, buffer)
     if content.nbytes:
@@ -89,7 +89,7 @@ def static_buffer(content: npt.NDArray[Any]) -> int:
 
 
 class StreamBuffer:
-    """A buffer whose content is replaced in each frame."""
+    """An OpenGL buffer whose content is replaced in each frame."""
 
     def __init__(self, target: int) -> None:
         self._target = target
@@ -120,7 +120,7 @@ class RenderTarget:
 
     @staticmethod
     def create(width: int, height: int, colour_format: int | None, depth: int | None = None) -> RenderTarget:
-        """Makes a render target.
+        """Makes a render target of `width` x `height` pixels.
 
         Args:
             width: pixels.
@@ -154,7 +154,7 @@ class RenderTarget:
 
 
 def upload_texture(content: npt.NDArray[np.uint8], *, is_srgb: bool) -> int:
-    """Uploads a 2D texture with mip levels. It repeats and is filtered trilinearly.
+    """Uploads a 2D texture with mip levels. The texture repeats and is filtered trilinearly.
 
     Args:
         content: (H, W, C) uint8 with one to four channels; one channel is read as grey.
@@ -181,7 +181,7 @@ def upload_texture(content: npt.NDArray[np.uint8], *, is_srgb: bool) -> int:
 
 
 def upload_cubemap(levels: tuple[npt.NDArray[Any], ...]) -> int:
-    """Uploads a cube map from its mip levels, (6, n, n, 3) linear floats each; returns its OpenGL name."""
+    """Uploads a cube map from its mip levels, each of (6, n, n, 3) linear floats. Returns its OpenGL name."""
     texture = _texture(GL.GL_TEXTURE_CUBE_MAP)
     size = levels[0].shape[1]
     GL.glTextureStorage2D(texture, len(levels), GL.GL_RGBA16F, size, size)
@@ -195,7 +195,7 @@ def upload_cubemap(levels: tuple[npt.NDArray[Any], ...]) -> int:
 
 
 def upload_table(content: npt.NDArray[Any]) -> int:
-    """Uploads a lookup table of (H, W, 2) floats, filtered bilinearly and clamped at its borders; returns its
+    """Uploads a lookup table of (H, W, 2) floats, which is filtered bilinearly and clamped at its borders. Returns its
     OpenGL name.
     """
     height, width = content.shape[:2]
@@ -213,14 +213,14 @@ def upload_table(content: npt.NDArray[Any]) -> int:
 
 
 class Mask:
-    """A texture of one byte per pixel that is filled again for each frame."""
+    """A texture with one byte per pixel, whose content is replaced for each frame."""
 
     def __init__(self, width: int, height: int) -> None:
         self._size = (width, height)
         self.handle = _plain_texture(width, height, GL.GL_R8)
 
     def upload(self, content: npt.NDArray[np.uint8]) -> None:
-        """Replaces the content, (height, width) uint8; shaders read 0..1."""
+        """Replaces the content of the texture by (height, width) uint8 values; shaders read them as 0..1."""
         GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
         GL.glTextureSubImage2D(
             self.handle, 0, 0, 0, *self._size, GL.GL_RED, GL.GL_UNSIGNED_BYTE, np.ascontiguousarray(content)
@@ -228,8 +228,9 @@ class Mask:
 
 
 def shadow_map(width: int, height: int) -> int:
-    """Makes a depth texture with comparison: a read returns the lit share, and 1 outside the borders. Returns
-    its OpenGL name.
+    """Makes a depth texture with comparison for shadows. Returns its OpenGL name.
+
+    A read in a shader returns the lit share 0..1, and 1 outside the borders.
     """
     texture = _texture(GL.GL_TEXTURE_2D)
     GL.glTextureStorage2D(texture, 1, GL.GL_DEPTH_COMPONENT32F, width, height)

@@ -1,4 +1,4 @@
-"""Lights of a model, in units of the frame: a radiance of 1 is full scale."""
+"""The lights of a model, in units of the frame: a radiance of 1 is full scale."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gear.values.geometry import Array
 
 MAX_LIGHTS = 4
 MIN_SUN = 1e-3
-"""Irradiance below which shadows cannot be seen: a tenth of a step of eight bits."""
+"""Irradiance below which shadows are not visible: a tenth of a step of 8-bit colour."""
 
 _TYPE = mujoco.mjtLightType
 
@@ -26,7 +26,7 @@ irradiance along their axis.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Environment:
-    """Light from all directions.
+    """The light that reaches surfaces from all directions (sky and houses).
 
     Attributes:
         irradiance: (4, 3) float64 irradiance divided by pi, as a linear function of the normal. The rows are the mean
@@ -40,7 +40,7 @@ class Environment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lights:
-    """N distant lights and point lights.
+    """The N lights of a model: distant lights, such as the sun, and point lights.
 
     Attributes:
         towards: (N, 4) float64. For a distant light: the unit vector towards it, and 0. For a point light: its world
@@ -55,11 +55,11 @@ class Lights:
 
 
 def environment_of(model: mujoco.MjModel, faces_of: dict[int, Array]) -> Environment:
-    """The environment from the first active light of type `image`; black if there is none.
+    """The environment light from the first active light of type `image`; black if the model has no such light.
 
     Args:
         model: the compiled world.
-        faces_of: (6, n, n, 3) linear faces of its cube textures, by texture id, in OpenGL's order.
+        faces_of: (6, n, n, 3) linear faces of the model's cube textures, by texture id, in OpenGL's order.
     """
     for light in np.flatnonzero((model.light_type == _TYPE.mjLIGHT_IMAGE) & model.light_active).tolist():
         faces = faces_of.get(int(model.light_texid[light]))
@@ -76,7 +76,7 @@ def irradiance_over_pi(radiance: Array) -> Array:
         radiance: (6, n, n, 3) faces of the environment map.
 
     Returns:
-        (4, 3): the mean of all faces, and the slopes along the normal's x, y and z.
+        (4, 3) array: the mean of all faces, and the slopes along the normal's x, y and z; columns are red, green, blue.
     """
     east, west, up, down, south, north = radiance.mean(axis=(1, 2))
     slopes = DIRECTIONAL_SHARE * np.stack([east - west, north - south, up - down])
@@ -84,10 +84,11 @@ def irradiance_over_pi(radiance: Array) -> Array:
 
 
 def lights_of(model: mujoco.MjModel, data: mujoco.MjData) -> Lights:
-    """The first `MAX_LIGHTS` active lights that are not images; a light that casts shadows comes first.
+    """The first `MAX_LIGHTS` active lights of a model, except lights of type `image`; a light that casts shadows comes
+    first.
 
     Only distant lights cast shadows, and point lights shine in all directions. A light without an intensity gives its
-    diffuse colour as irradiance to a surface that faces it; a point light does so at a distance of one metre.
+    diffuse colour as irradiance to a surface that faces it; for a point light, this holds at a distance of one metre.
 
     Args:
         model: the compiled world.

@@ -1,12 +1,12 @@
-"""Which pixels of `film` get four samples: for all other pixels one sample is enough.
+"""Chooses the pixels that get four samples in quality `film`; one sample is enough for all other pixels.
 
     needs samples = edge of ids or depth, or a face, or contrast of the picture with one sample per pixel
 
-A pixel inside a plain surface looks the same with one sample and with four. Shading is most of a picture's time, and
-one pixel in six needs four samples (docs/results/rendering.md).
+A pixel inside a uniform surface looks the same with one sample and with four. Shading takes most of a picture's time,
+and one pixel in six needs four samples (docs/results/rendering.md).
 
-Faces and the pixels beside them always have four, so that no pixel's number of samples depends on a patch: the
-contrast of a pixel depends on its eight neighbours only.
+Faces, on which patches are drawn, and the pixels beside faces always have four samples. The contrast of a pixel depends
+on its eight neighbours only, so the number of samples never depends on a patch.
 """
 
 from __future__ import annotations
@@ -24,10 +24,14 @@ from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, IdImage, UInt16Ima
 Mask = npt.NDArray[np.bool_]
 
 LOD_BIAS = -1.0
-"""Added to the mip level of textures where a pixel has one sample: the level that four samples read."""
+"""Value that is added to the mip level of textures in pixels with one sample, so that they read the level that four
+samples read.
+"""
 
 CONTRAST = 32
-"""Difference, of 255 steps of a picture by day, between neighbouring pixels above which they get four samples."""
+"""Difference in display values (0..255) between neighbouring pixels, for the response to a clear day. Pixels with a
+larger difference get four samples.
+"""
 
 _FULL = 65535
 _AROUND = np.ones((3, 3), np.uint8)
@@ -35,15 +39,15 @@ _SHIFT = 4
 _DISPLAYED = Response(exposure=4.5, contrast=1.43).apply(
     np.round(np.arange((_FULL >> _SHIFT) + 1) * (LINEAR_FULL_SCALE / (_FULL >> _SHIFT))).astype(np.uint16)
 )
-"""Display values of light in 4096 steps, by the camera's response to a clear day."""
+"""Display values 0..255 of light in 4096 steps, with the camera's response for a clear day."""
 
 
 def at_edges_and_faces(geom_id: IdImage, depth_m: FloatImage, faces: Iterable[int]) -> Mask:
-    """(H, W) bool, pixels that get four samples for their geometry alone: edges, and faces with the pixels beside them.
+    """The pixels that get four samples because of geometry: (H, W) bool, True on edges, on faces and beside faces.
 
     Args:
-        geom_id: (H, W) int32, -1 where nothing is.
-        depth_m: (H, W) float32, NaN where nothing is.
+        geom_id: (H, W) int32, -1 where nothing was hit.
+        depth_m: (H, W) float32, NaN where nothing was hit.
         faces: ids of the geoms that can show a patch.
     """
     needed = edge_mask(geom_id, depth_m)
@@ -53,7 +57,9 @@ def at_edges_and_faces(geom_id: IdImage, depth_m: FloatImage, faces: Iterable[in
 
 
 def at_contrasts(light: UInt16Image) -> Mask:
-    """(H, W) bool, pixels that differ from one of their eight neighbours, or whose neighbours differ.
+    """The pixels that get four samples because of contrast: (H, W) bool.
+
+    A pixel is True if the green display values in the 3 x 3 pixels around it differ by more than `CONTRAST`.
 
     Args:
         light: (H, W, 3) uint16, one sample per pixel; 65535 is full scale.

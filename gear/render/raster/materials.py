@@ -25,7 +25,7 @@ _MOST_SHININESS = 128
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeomMaterials:
-    """Materials, one row for each geom.
+    """The materials of all geoms, one array row per geom.
 
     Attributes:
         albedo: (ngeom, 3) float32, linear RGB.
@@ -41,11 +41,11 @@ class GeomMaterials:
 
 
 def materials_of(model: mujoco.MjModel) -> GeomMaterials:
-    """Materials of all geoms as the model has them, without the colours and patches that each sample changes
-    (`Stage.paint_rgb`, `Stage.faces`).
+    """The materials of all geoms in a model. Colours and patches that differ between samples (`Stage.paint_rgb`,
+    `Stage.faces`) are not included.
 
-    If a material has no roughness, it follows from Phong's shininess: (2 / (2 + 128 shininess)) ^ (1/4) is the
-    perceptual roughness with an equally wide highlight. Partly transparent geoms are drawn as opaque.
+    If a material has no roughness, the roughness is computed from Phong's shininess: (2 / (2 + 128 shininess)) ^ (1/4)
+    is the perceptual roughness with an equally wide highlight. Partly transparent geoms are drawn as opaque.
     """
     material = model.geom_matid
     bare = material < 0

@@ -13,8 +13,8 @@ from gear.values.geometry import Array
 
 _AROUND, _UPWARDS = 48, 24
 _BOX_TEXTURE = ((1, 2), (0, 2), (0, 1))
-"""For the sides of a box that face along x, y and z: the axis along which u increases, and the axis against
-which v increases. As in MuJoCo, opposite sides have the same axes.
+"""Texture axes of the sides of a box that face along x, y and z. The first number is the axis along which u increases,
+the second the axis against which v increases. As in MuJoCo, opposite sides have the same axes.
 """
 
 _GEOM = mujoco.mjtGeom
@@ -64,7 +64,7 @@ def primitive(kind: int, size_m: Array) -> Triangles:
 
 
 def height_field(model: mujoco.MjModel, index: int) -> Triangles:
-    """The upper surface of a height field.
+    """The triangles of the upper surface of a height field, in the geom's frame.
 
     Args:
         model: the compiled world.

@@ -1,4 +1,6 @@
-"""The renderer: a pass for ids and depth, passes for shadow maps, and a colour pass over the visible pieces."""
+"""The raster renderer, which draws a view in several passes: ids and depth, shadow maps, and colour of the visible
+pieces.
+"""
 
 from __future__ import annotations
 
@@ -32,15 +34,15 @@ _MASK_UNIT = 1
 
 
 class RasterRenderer:
-    """An OpenGL context with one model in it. Not thread-safe."""
+    """The raster renderer: an OpenGL context with one model in it. It is not thread-safe."""
 
     def __init__(self, model: mujoco.MjModel, context: Any, *, quality: Quality = "film") -> None:
-        """Uploads a model into a context.
+        """Uploads a model into an OpenGL context.
 
         Args:
             model: the compiled world; every stage must be of this model.
             context: MuJoCo's `GLContext`, current; `close` frees it.
-            quality: see `gear.contracts.rendering.Quality`.
+            quality: `film` takes several samples per pixel; `fast` takes one and smooths edges.
 
         Raises:
             BackendError: the driver does not support OpenGL 4.5.
@@ -87,7 +89,8 @@ class RasterRenderer:
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """Renders one raw view for each camera; `gear.contracts.rendering.Renderer` documents the arguments.
+        """Renders one raw view (linear colour, depth, geom ids) per camera. `gear.contracts.rendering.Renderer`
+        documents the arguments.
 
         Raises:
             ValueError: the stage belongs to another model, or a patch does not have the size of its texture.
@@ -106,7 +109,7 @@ class RasterRenderer:
         )
 
     def close(self) -> None:
-        """Frees the context; may be called twice."""
+        """Frees the graphics context; a second call has no effect."""
         if self._closed:
             return
         self._closed = True

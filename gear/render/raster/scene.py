@@ -77,11 +77,13 @@ class Scene:
         self._light_flags: tuple[str, ...] = ("LIGHTS 0",)
 
     def set_faces(self, stage: Stage) -> None:
-        """Makes the faces show the patches of a stage instead of those of the last stage."""
+        """Uploads the patches of a stage (a posed world), which replace the patches of the previous stage on the
+        faces.
+        """
         self._face_of_geom = self._textures.faces(stage.faces)
 
     def set_poses(self, stage: Stage, camera_m: Array) -> None:
-        """Uploads poses and colours of all geoms.
+        """Uploads the poses and colours of all geoms of a posed world.
 
         Args:
             stage: the posed world.
@@ -127,19 +129,23 @@ class Scene:
         self._light_flags = (f"LIGHTS {count}", *(("SHADOWS",) if maps is not None else ()))
 
     def spheres(self, stage: Stage) -> tuple[Array, Array]:
-        """Bounding spheres of the P pieces: (P, 3) centres in world coordinates and (P,) radii, metres."""
+        """The bounding spheres of the P pieces of triangles: (P, 3) centres in world coordinates and (P,) radii,
+        metres.
+        """
         centres_m, radii_m = self._spheres
         turns = stage.data.geom_xmat.reshape(-1, 3, 3)[self.geom_of_piece]
         return np.einsum("pij,pj->pi", turns, centres_m) + stage.data.geom_xpos[self.geom_of_piece], radii_m
 
     def present(self, stage: Stage) -> Mask:
-        """(P,) bool: which pieces belong to geoms that a stage shows."""
+        """The pieces of triangles that a stage contains: (P,) bool, True if the geom of the piece is drawn."""
         if stage.is_absent is None:
             return np.ones(len(self.geom_of_piece), np.bool_)
         return np.asarray(~stage.is_absent[self.geom_of_piece])
 
     def sample_vertices(self, stage: Stage, chosen: Mask) -> Array:
-        """(N, 3) world positions of a few vertices of each chosen piece; the origin if no piece is chosen."""
+        """The (N, 3) world positions of a few vertices of each chosen piece of triangles. If no piece is chosen, the
+        only position is the origin.
+        """
         marks_m = self._samples_m[chosen]
         geoms = self.geom_of_piece[chosen]
         turns = stage.data.geom_xmat.reshape(-1, 3, 3)[geoms]
@@ -147,7 +153,7 @@ class Scene:
         return np.concatenate([places.reshape(-1, 3), np.zeros((int(len(geoms) == 0), 3))])
 
     def draw_depth(self, selection: Selection) -> None:
-        """Draws pieces with the current program, without materials, in the given order.
+        """Draws pieces of triangles with the current shader program, without materials, in the given order.
 
         Args:
             selection: indices of the pieces.
@@ -155,7 +161,7 @@ class Scene:
         self._submit([(selection, None)])
 
     def draw_shaded(self, selection: Selection, matrix: Array, flags: tuple[str, ...]) -> None:
-        """Draws pieces with their materials.
+        """Draws pieces of triangles with their materials.
 
         Args:
             selection: indices of the pieces; pieces of the same material keep their order.

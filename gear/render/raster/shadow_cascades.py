@@ -14,13 +14,13 @@ CASCADE_ENDS_M = (40.0, 160.0)
 """Distances in front of the camera, metres, at which the map of all geoms and the map of moving geoms end."""
 
 TOWARDS_SUN_RANGE_M = 600.0
-"""Range of depth of a map towards the sun, metres. Geoms farther towards the sun are clamped to it and still
-cast shadows.
+"""Range of depth of a shadow map towards the sun, metres. Geoms beyond this range are clamped to its end and still cast
+shadows.
 """
 
 _MARGIN = 1.005
-"""Factor by which maps are larger than the part that they must cover, so that filtered reads at its edge stay
-inside.
+"""Factor by which shadow maps are larger than the part of the world that they must cover. Filtered reads at the edge
+therefore stay inside the map.
 """
 
 _WIDEST_M = 500.0
@@ -46,22 +46,23 @@ class Cascade:
 
     @property
     def scale(self) -> Array:
-        """(3,) factors from metres along `axes` to map coordinates: -1..1 across the map, and 0..1 away from the
-        sun.
+        """The (3,) factors that convert metres along `axes` to map coordinates: -1..1 across the map, and 0..1 away
+        from the sun.
         """
         return np.array([1 / self.half_side_m, 1 / self.half_side_m, -1 / (TOWARDS_SUN_RANGE_M + 2 * self.half_side_m)])
 
     def offset(self, origin_m: Array) -> Array:
-        """(3,) offset that is added to scaled positions which are relative to an origin.
+        """The (3,) offset of map coordinates for positions relative to an origin: map coordinates are scaled positions
+        plus this offset.
 
         Args:
-            origin_m: (3,) origin, in the same coordinates as the centre.
+            origin_m: (3,) origin, in world coordinates.
         """
         towards_sun = -self.scale[2] * (TOWARDS_SUN_RANGE_M + self.half_side_m)
         return np.asarray((0.0, 0.0, towards_sun) - self.scale * (self.axes @ (self.centre_m - origin_m)))
 
     def seen_part(self, margin_m: float) -> tuple[Array, Array]:
-        """(2,) smallest and (2,) largest map coordinates, -1..1, of the shadows that are visible.
+        """The part of the map in which shadows are visible: (2,) smallest and (2,) largest map coordinates, -1..1.
 
         Args:
             margin_m: distance by which the visible part of the world is enlarged.
@@ -74,10 +75,10 @@ class Cascade:
         return low, high
 
     def matrix(self, origin_m: Array) -> Array:
-        """(4, 4) matrix from positions relative to an origin to map coordinates.
+        """The (4, 4) matrix that converts positions relative to an origin to map coordinates.
 
         Args:
-            origin_m: (3,) origin, in the same coordinates as the centre.
+            origin_m: (3,) origin, in world coordinates.
         """
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = self.scale[:, None] * self.axes, self.offset(origin_m)
@@ -90,12 +91,12 @@ class ShadowMaps:
 
     Attributes:
         axes: (3, 3) rows: the axes that all three maps share.
-        scale: (3, 3) one row for each map: factors from metres along the axes to texture coordinates 0..1 and depth
-            0..1.
-        offset: (3, 3) one row for each map: offset for positions relative to the camera.
+        scale: (3, 3), one row per map: factors from metres along the axes to texture coordinates 0..1 and depth 0..1.
+        offset: (3, 3), one row per map: offset for positions relative to the camera.
         texel_m: (3,) side of a texel in metres.
         end_m: (2,) distances in front of the camera, metres, at which the first two maps end.
-        town_ends: texture coordinate 0..1 of the row at which the town's map ends; the other two maps lie below it.
+        town_ends: texture coordinate 0..1 of the row at which the map of the whole town ends; the two smaller maps lie
+            below this row.
     """
 
     axes: Array
@@ -107,7 +108,8 @@ class ShadowMaps:
 
 
 def view_cascades(frustum: Frustum, towards_sun: Array) -> tuple[Cascade, ...]:
-    """The squares that cover everything in the view up to each of `CASCADE_ENDS_M`.
+    """The squares of two shadow maps. The first covers the view up to the first distance in `CASCADE_ENDS_M`, the
+    second the view between the two distances.
 
     Args:
         frustum: the camera's view volume.
@@ -130,10 +132,10 @@ def view_cascades(frustum: Frustum, towards_sun: Array) -> tuple[Cascade, ...]:
 
 
 def town_cascade(points_m: Array, towards_sun: Array) -> Cascade:
-    """The square that covers the whole town; outliers far outside are ignored.
+    """The square of the shadow map that covers the whole town; vertices far outside the town are ignored.
 
     Args:
-        points_m: (N, 3) some of the town's vertices, world coordinates.
+        points_m: (N, 3) some vertices of the town, world coordinates.
         towards_sun: (3,) unit vector, world axes.
     """
     axes = _axes(towards_sun)

@@ -14,15 +14,16 @@ _SAMPLES = 32
 
 @cache
 def split_sum_table(size: int = TABLE_PX) -> Array:
-    """Computes the share of uniform light that a rough surface reflects: f0 * scale + offset, with the reflectance f0
-    at normal incidence.
+    """Computes the table of scale and offset with which a rough surface reflects the share f0 * scale + offset of
+    uniform light. f0 is the reflectance at normal incidence.
 
     Args:
         size: number of rows and of columns of the table.
 
     Returns:
         (size, size, 2) float64, read-only: scale and offset. Rows are perceptual roughness, columns are the cosine
-        between the normal and the direction to the camera; both are 0..1 at the centres of cells.
+        between the normal and the direction to the camera; the values of rows and columns are 0..1, at the centres of
+        cells.
     """
     middles = (np.arange(size) + 0.5) / size
     cosine = middles[None, :, None]

@@ -27,19 +27,19 @@ _PARTS_PX = ((0, 4096, _NEAR_PX), (2048, 4096, _NEAR_PX), (0, 0, _TOWN_PX))
 _UNIT = 4
 _SLOPE_BIAS, _UNIT_BIAS = 1.5, 2.0
 _SEEN_TEXELS = 2
-"""Geoms that are smaller than this number of texels cast no shadow in a map."""
+"""Size in texels of the smallest geom that casts a shadow in a map."""
 
 _READ_TEXELS = 4
-"""Distance in texels from a surface at which its shader may read: 1.5 along the normal, 0.75 to the side, and
-one for the filter.
+"""Largest distance in texels from a surface at which its shader reads the shadow map: 1.5 along the normal, 0.75 to the
+side, and 1 for the filter.
 """
 
 
 class SunShadows:
-    """The shadow maps of one model."""
+    """Draws the shadow maps of the sun for one model."""
 
     def __init__(self, model: mujoco.MjModel, scene: Scene) -> None:
-        """Allocates the texture. The first call of `draw` draws the town's map.
+        """Allocates the texture of the shadow maps. The first call of `draw` draws the town's map.
 
         Args:
             model: the compiled world.
@@ -54,7 +54,8 @@ class SunShadows:
         self._town: tuple[Array, Cascade] | None = None
 
     def draw(self, stage: Stage, frustum: Frustum, towards_sun: Array, spheres: tuple[Array, Array]) -> ShadowMaps:
-        """Draws the maps that change with the picture, and binds all three. The scene must be posed for this camera.
+        """Draws the two shadow maps that change with the picture, and binds all three maps. The scene must be posed for
+        this camera.
 
         Args:
             stage: the posed world that casts shadows.
@@ -63,7 +64,7 @@ class SunShadows:
             spheres: bounding spheres of the pieces, from `Scene.spheres`.
 
         Returns:
-            The maps in the form that shaders read.
+            The positions and scales of the three maps, in the form that shaders read.
         """
         centres_m, _ = spheres
         if self._town is None or not np.array_equal(self._town[0], towards_sun):

@@ -21,7 +21,7 @@ _SKY = int(mujoco.mjtTexture.mjTEXTURE_SKYBOX)
 
 
 class TextureStore:
-    """Textures on the graphics device: those of the model by texture id, patches by content."""
+    """The textures on the graphics device: the textures of the model by texture id, and patches by content."""
 
     def __init__(self, model: mujoco.MjModel, used: list[int]) -> None:
         """Uploads the textures that geoms use.
@@ -38,15 +38,15 @@ class TextureStore:
         self._faces: OrderedDict[bytes, int] = OrderedDict()
 
     def of(self, texture: int) -> int:
-        """OpenGL name for a texture id; 0 for -1 and for cube textures."""
+        """The OpenGL name of the texture with this id in the model; 0 for id -1 (no texture) and for cube textures."""
         return self._handles.get(texture, 0)
 
     def faces(self, srgb_of_geom: Mapping[int, UInt8Image]) -> dict[int, int]:
-        """Uploads patches and returns the OpenGL names of their textures by geom id; they are valid until the next
+        """Uploads patches. Returns the OpenGL names of their textures by geom id; the textures are valid until the next
         call.
 
         Args:
-            srgb_of_geom: (H, W, 3) uint8 sRGB by geom id.
+            srgb_of_geom: patches, (H, W, 3) uint8 sRGB, by geom id of their face.
         """
         shown = {geom: self._face(srgb) for geom, srgb in srgb_of_geom.items()}
         idle = [key for key, texture in self._faces.items() if texture not in shown.values()]
@@ -66,7 +66,9 @@ class TextureStore:
 
 
 def linear_cubes(model: mujoco.MjModel) -> dict[int, Array]:
-    """Linear faces, (6, n, n, 3) float64 in 0..1, of the model's cube textures with three channels, by texture id."""
+    """The linear faces, (6, n, n, 3) float64 in 0..1, of the model's cube textures with three channels, by
+    texture id.
+    """
     cubes = {}
     for texture in range(model.ntex):
         width = int(model.tex_width[texture])
