@@ -1,1 +1,3 @@
-"""The MJCF files of towns, actors and boards: finding them by name, reading their facts, labels and triangles."""
+"""The MJCF files of towns, actors and boards: finding them by name, and reading their metadata, labels and
+triangles.
+"""

@@ -24,22 +24,22 @@ PERSON_MASS_KG = 75.0
 """Mass of every person in the placement model, kg."""
 
 ACTOR_SIDE_M = (0.1, 100.0)
-"""Smallest and largest length of an actor's longest side, metres. An asset outside this range was drawn in other
-units.
+"""Smallest and largest length in metres of an actor's longest side. The file of an actor outside this range probably
+uses another unit.
 """
 
 COUNTABLE = frozenset(label.code for label in LABELS if label.coco_id is not None and not label.is_instance)
-"""Codes of labels whose objects in the town are counted one by one. Each such object needs a body of its own in
-the MJCF.
+"""Codes of the labels whose objects in a town are single instances, such as traffic lights. Each such object needs a
+body of its own in the MJCF.
 """
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ActorType:
-    """One asset that actors use, with its measured shape.
+    """One vehicle or person asset with its measured shape; several actors may be instances of the asset.
 
     Attributes:
-        facts: the facts that its MJCF file states.
+        facts: metadata in its MJCF file, such as kind and weight.
         shape: its visible triangles in the actor frame (x to the front, y to the left, z up, origin on the ground).
         half_length_m, half_width_m: half the sides of its footprint, the smallest rectangle centred on the origin that
             contains it.
@@ -52,7 +52,7 @@ class ActorType:
 
     @property
     def vehicle(self) -> VehicleKind | None:
-        """The kind of vehicle; None for people."""
+        """The kind of the vehicle; None for people."""
         return self.facts.vehicle
 
     @property
@@ -62,23 +62,24 @@ class ActorType:
 
     @property
     def label(self) -> Label:
-        """The semantic label."""
+        """The semantic label of the asset."""
         return self.facts.label
 
     @property
     def front_m(self) -> float:
-        """Distance from the origin to the front, metres."""
+        """Distance from the asset's origin to its front, metres."""
         return float(self.shape.box_centre_m[0] + self.shape.box_size_m[0] / 2)
 
     @property
     def rear_m(self) -> float:
-        """Distance from the origin to the rear, metres."""
+        """Distance from the asset's origin to its rear, metres."""
         return float(self.shape.box_size_m[0] / 2 - self.shape.box_centre_m[0])
 
     @property
     def placement_body(self) -> PlacementBody:
-        """The body in the placement model. Its four feet are where wheels are: inside the footprint by a fifth
-        of its half sides.
+        """The simplified body of the asset in the placement model, a box on four feet.
+
+        The feet are near the wheels: inside the footprint by a fifth of its half sides.
         """
         return PlacementBody(
             half_length_m=0.8 * self.half_length_m,
@@ -89,13 +90,17 @@ class ActorType:
 
 
 def body_tree(model: mujoco.MjModel, body_id: int) -> list[int]:
-    """Ids of a body and of all its descendants. They are consecutive, because MuJoCo numbers bodies depth first."""
+    """The ids of a body and of all its descendants. The ids are consecutive, because MuJoCo numbers bodies depth
+    first.
+    """
     outside = np.flatnonzero(model.body_parentid[body_id + 1 :] < body_id)
     return list(range(body_id, body_id + 1 + int(outside[0]) if len(outside) else model.nbody))
 
 
 def visible_geoms(model: mujoco.MjModel, body_id: int, label_code: npt.NDArray[np.uint8]) -> list[int]:
-    """Ids of the visible geoms of a body and of its descendants; `label_code` is (ngeom,) uint8."""
+    """The ids of the visible geoms of a body and of its descendants. `label_code` is the (ngeom,) uint8 array of label
+    codes.
+    """
     owners = np.isin(model.geom_bodyid, body_tree(model, body_id))
     return [int(geom) for geom in np.flatnonzero(owners & (label_code != HIDDEN_CODE))]
 
@@ -103,7 +108,7 @@ def visible_geoms(model: mujoco.MjModel, body_id: int, label_code: npt.NDArray[n
 def actor_types(
     model: mujoco.MjModel, data: mujoco.MjData, classes: GeomClasses, slots: Sequence[Slot]
 ) -> dict[str, ActorType]:
-    """Measures every asset of the pool, on its first instance.
+    """Measures every asset in the pool of actors, on the first instance of the asset.
 
     Args:
         model: the render model.
@@ -112,11 +117,11 @@ def actor_types(
         slots: the pool of actors.
 
     Returns:
-        The assets by name.
+        The measured assets by name.
 
     Raises:
-        TownError: an asset has no visible geom or an infinite one, has a size that no road user has, or does not stand
-            on the ground at its origin.
+        TownError: an asset has no visible geom or an infinite geom, is too small or too large for a road user, or does
+            not stand on the ground at its origin.
     """
     types: dict[str, ActorType] = {}
     for slot in slots:
@@ -155,8 +160,8 @@ class StaticObjects:
     """The countable objects of a town, such as traffic lights.
 
     Attributes:
-        objects: the objects by their ids.
-        object_id: (ngeom,) int32: id of the object to which each geom belongs; -1 for none.
+        objects: the objects by object id.
+        object_id: (ngeom,) int32: id of the object to which each geom belongs; -1 for no object.
     """
 
     objects: Mapping[int, SceneObject]
@@ -172,7 +177,7 @@ def static_objects(
         model: the render model.
         data: MuJoCo data of the model with kinematics up to date.
         classes: labels of the geoms.
-        slots: the pool of actors, whose bodies are no objects of the town.
+        slots: the pool of actors; their bodies are not objects of the town.
         path: the town's file, for error messages.
 
     Raises:

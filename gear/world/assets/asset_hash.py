@@ -1,4 +1,4 @@
-"""Finds all files that pictures of a town can show, and hashes them."""
+"""Finds all files that can affect the pictures of a town, and computes one hash of them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ASSET_SUFFIXES = (".xml", ".obj", ".msh", ".stl", ".png")
 
 
 def asset_files(library: AssetLibrary) -> dict[str, Path]:
-    """Every MJCF file, mesh and texture of a town, by a name that does not depend on where the folders are."""
+    """All MJCF files, meshes and textures of a town, by a name that does not depend on where the folders are."""
     own = data_dir("mjcf")
     roots = [library.town, library.town.with_suffix("")]
     roots += [library.folder("vehicle"), library.folder("pedestrian"), library.folder("surface")]
@@ -89,7 +89,7 @@ def _bases(path: Path, file: Path) -> list[Path]:
 
 
 def assets_digest(library: AssetLibrary) -> str:
-    """sha256 (hex) over the names and contents of all files that `asset_files` finds."""
+    """The SHA-256 hash (hex) of the names and contents of all assets of a town: MJCF files, meshes and textures."""
     files = asset_files(library)
     digest = hashlib.sha256()
     for name in sorted(files):

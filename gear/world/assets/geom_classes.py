@@ -1,4 +1,4 @@
-"""The semantic label of each geom, which follows from the name of its default class in the MJCF."""
+"""Finds the semantic label of each geom, from the name of its default class in the MJCF."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ HIDDEN_CODE = 255
 """Label code of geoms that no renderer draws."""
 
 FIRST_HIDDEN_GROUP = 3
-"""Geoms of this group and higher groups are hidden; collision geoms are among them."""
+"""First geom group that is hidden. Geoms of this group and of higher groups, such as collision geoms, are not drawn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class GeomClasses:
-    """Labels of the geoms of a compiled model, by geom id.
+    """The semantic labels of the geoms of a compiled model, by geom id.
 
     Attributes:
         label_code: (ngeom,) uint8 label codes; `HIDDEN_CODE` for hidden geoms.
-        is_paint: (ngeom,) bool: whether each sample may choose the geom's colour.
+        is_paint: (ngeom,) bool: whether the geom's colour is drawn at random for each sample.
         is_face: (ngeom,) bool: whether the geom is a face that can show a patch.
     """
 
@@ -42,7 +42,7 @@ def unprefixed_class(classname: str) -> str:
 
 
 def classify(spec: mujoco.MjSpec, path: Path) -> GeomClasses:
-    """Finds the label of each geom of a model.
+    """Finds the semantic label of each geom of a model.
 
     Args:
         spec: spec of the model; it must have been compiled, so that its geoms have ids.

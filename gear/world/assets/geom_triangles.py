@@ -15,11 +15,11 @@ Faces = npt.NDArray[np.int32]
 Triangles = tuple[Array, Faces]
 
 ROUND_SEGMENTS = 24
-"""Number of sides with which round primitives are approximated; silhouettes differ by less than 1 %."""
+"""Number of sides of the polygons that approximate round primitives; the error of silhouettes is less than 1 %."""
 
 
 def geom_triangles(model: mujoco.MjModel, geom_id: int) -> Triangles:
-    """The surface of one geom in the geom's frame.
+    """The triangles of one geom's surface, in the geom's frame.
 
     Returns:
         (N, 3) float64 vertices in metres, and (M, 3) int32 vertex indices of the triangles, counter-clockwise as seen
@@ -76,7 +76,7 @@ def _revolved(radii: Array, heights: Array, y_scale: float = 1.0) -> Triangles:
 
 
 def world_triangles(model: mujoco.MjModel, data: mujoco.MjData, geom_id: int) -> Array:
-    """(N, 3, 3) corners in world coordinates, metres, of one geom's triangles.
+    """The triangles of one geom in the world: (N, 3, 3) corners in world coordinates, metres.
 
     Args:
         model: compiled model.
@@ -91,7 +91,7 @@ def world_triangles(model: mujoco.MjModel, data: mujoco.MjData, geom_id: int) ->
 
 
 def static_geoms(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
-    """(ngeom,) bool: True for geoms of the town and its boards, False for geoms of actors."""
+    """Which geoms belong to the town and its boards: (ngeom,) bool, False for geoms of actors."""
     return np.asarray(model.body_mocapid[model.body_rootid[model.geom_bodyid]] < 0)
 
 
@@ -102,7 +102,7 @@ def body_shape(
     geom_ids: Sequence[int],
     label_code: npt.NDArray[np.uint8],
 ) -> Shape:
-    """Joins geoms to one shape in the frame of a body.
+    """Joins the triangles of several geoms to one shape, in the frame of a body.
 
     Args:
         model: compiled model.

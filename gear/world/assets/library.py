@@ -1,4 +1,6 @@
-"""Finds MJCF files by name or path, and reads the facts that an actor's file states, without compiling it."""
+"""Finds MJCF files by name or path. Reads the metadata in the files of actors, such as kind and colours, without
+compiling them.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,7 @@ PERSON = "person"
 
 
 MOST_WEIGHT = 1e6
-"""Largest weight of an asset or a colour; it keeps sums and shares of weights finite."""
+"""Largest weight of an asset or a colour; the limit keeps sums and shares of weights finite."""
 
 KEY_POINT = "key_point."
 """Start of the names of entries in an actor's `<custom>` section that describe a key point."""
@@ -55,7 +57,8 @@ def read_xml(path: Path) -> ET.Element:
 
 
 def read_numbers(path: Path) -> ET.Element:
-    """Parses an MJCF file like `read_xml`, and refuses NaN, of which MuJoCo only warns before it leaves out the geom.
+    """Parses an MJCF file, returns its root element, and rejects NaN. MuJoCo only prints a warning for NaN and leaves
+    out the geom.
 
     Raises:
         TownError: the file is not XML, cannot be read, or contains a NaN.
@@ -70,7 +73,7 @@ def read_numbers(path: Path) -> ET.Element:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActorFacts:
-    """The facts that an actor's MJCF file states.
+    """The metadata in an actor's MJCF file.
 
     Attributes:
         name: name of the asset: the file's name without suffix.
@@ -78,7 +81,7 @@ class ActorFacts:
         kind: `person`, or a name in `VEHICLES`.
         gait: `walk` or `stand` for people, "" for vehicles.
         weight: how often the asset is drawn, relative to the other assets in its folder.
-        palette: colours of its paint as linear albedo 0..1, each with its weight.
+        palette: possible colours of the paint as linear albedo 0..1, each with a weight.
         key_points: named points such as a person's joints, in the actor frame, metres.
     """
 
@@ -92,20 +95,20 @@ class ActorFacts:
 
     @property
     def label(self) -> Label:
-        """The semantic label of the kind."""
+        """The semantic label of the actor's kind."""
         return LABEL_BY_NAME[self.kind]
 
     @property
     def vehicle(self) -> VehicleKind | None:
-        """The kind of vehicle; None for people."""
+        """The kind of the vehicle; None for people."""
         return VEHICLES.get(self.kind)
 
 
 def read_actor_facts(path: Path) -> ActorFacts:
-    """Reads the facts of an actor from the `<custom>` sections of its MJCF file and of included files.
+    """Reads the metadata of an actor from the `<custom>` sections of its MJCF file and of included files.
 
     Raises:
-        TownError: a file is not XML, or a fact breaks the conventions.
+        TownError: a file is not XML, or an entry breaks gear's conventions for MJCF.
     """
     sections = (custom for root in _with_included(path) for custom in root.iter("custom"))
     entries = {item.get("name", ""): item.get("data", "") for custom in sections for item in custom}
@@ -186,7 +189,7 @@ class AssetLibrary:
     """The MJCF files of one town and of the actors and boards that it uses.
 
     A town in a folder `towns` may have its own folders `vehicles`, `pedestrians` and `surfaces` next to that folder;
-    each of them replaces the folder that comes with gear.
+    each of these folders replaces gear's own folder of that name.
 
     Attributes:
         town: path of the town's MJCF file.
@@ -196,7 +199,7 @@ class AssetLibrary:
 
     @staticmethod
     def for_town(town: str | Path) -> AssetLibrary:
-        """The library of a town.
+        """Makes the asset library of a town, which finds the town's MJCF files.
 
         Args:
             town: name of a town of gear, or path of an MJCF file with or without the suffix `.xml`.
@@ -219,18 +222,18 @@ class AssetLibrary:
 
     @property
     def town_name(self) -> str:
-        """Name of the town: its file's name without suffix."""
+        """Name of the town: the name of its file without suffix."""
         return self.town.stem
 
     def folder(self, kind: Literal["vehicle", "pedestrian", "surface"]) -> Path:
-        """Folder of the assets of a kind."""
+        """The folder with the MJCF files of all vehicles, pedestrians or surfaces."""
         own = self.town.parent.parent / FOLDERS[kind]
         if self.town.parent.name == "towns" and own.is_dir():
             return own
         return data_dir("mjcf") / FOLDERS[kind]
 
     def path(self, kind: Literal["vehicle", "pedestrian", "surface"], name: str) -> Path:
-        """Path of an asset's MJCF file.
+        """Path of the MJCF file of the asset with this kind and name.
 
         Raises:
             UnknownNameError: there is no asset with this name.
@@ -246,12 +249,12 @@ class AssetLibrary:
 
     @cached_property
     def vehicles(self) -> dict[str, ActorFacts]:
-        """Facts of all vehicles by name, in alphabetical order."""
+        """The metadata of all vehicles by name, in alphabetical order."""
         return self._actors("vehicle")
 
     @cached_property
     def pedestrians(self) -> dict[str, ActorFacts]:
-        """Facts of all people by name, in alphabetical order."""
+        """The metadata of all people by name, in alphabetical order."""
         return self._actors("pedestrian")
 
     def _actors(self, kind: Literal["vehicle", "pedestrian"]) -> dict[str, ActorFacts]:

@@ -11,7 +11,7 @@ from gear.world.assets.library import read_xml
 
 
 def read_spec(path: Path) -> mujoco.MjSpec:
-    """Reads an MJCF file with any suffix; MuJoCo itself accepts only `.xml`.
+    """Reads an MJCF file with any suffix as a spec; MuJoCo's own function accepts only `.xml`.
 
     Raises:
         ValueError: MuJoCo rejects the content.
@@ -30,7 +30,8 @@ def read_spec(path: Path) -> mujoco.MjSpec:
 
 
 def accept_flat_bodies(spec: mujoco.MjSpec) -> None:
-    """Allows a flat plate as a body of its own. Its inertia is exactly at the limit that MuJoCo accepts, so that
-    rounding would decide.
+    """Changes a spec so that MuJoCo accepts a flat plate as a body of its own.
+
+    The inertia of a plate is exactly at the limit that MuJoCo accepts, so rounding errors could make it invalid.
     """
     spec.compiler.balanceinertia = True

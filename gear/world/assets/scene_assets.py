@@ -1,4 +1,6 @@
-"""Reads what the MJCF files of one scene's assets declare (size, kind, colours), before its world is composed."""
+"""Reads the metadata of one scene's assets (size, kind, colours) from their MJCF files, before the world is
+composed.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,11 @@ EGO_ASSET = "car_saloon"
 
 @dataclass(frozen=True, slots=True)
 class AssetFile:
-    """An MJCF file as one world uses it.
+    """An MJCF file of an asset, with the size that one world gives to it.
 
     Attributes:
         path: path of the file.
-        face_size_m: width and height to which its face is scaled; None keeps the size in the file.
+        face_size_m: width and height to which the board's face is scaled; None keeps the size in the file.
     """
 
     path: Path
@@ -28,8 +30,8 @@ class AssetFile:
 
     @property
     def name(self) -> str:
-        """Name of its model in a composed world: the file's name without suffix, followed by the size if it is
-        scaled.
+        """Name of the asset's model in a composed world: the file's name without suffix, followed by the size if the
+        asset is scaled.
         """
         if self.face_size_m is None:
             return self.path.stem
@@ -38,7 +40,7 @@ class AssetFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneAssets:
-    """The assets of one scene: their paths, and the facts in their files.
+    """The assets of one scene: their paths, and the metadata in their files.
 
     Attributes:
         library: the town's MJCF file and the folders of its assets.
@@ -58,7 +60,7 @@ class SceneAssets:
 
 
 def read_scene_assets(library: AssetLibrary, scene: SceneSpec) -> SceneAssets:
-    """Finds the assets of a scene and reads their facts.
+    """Finds the assets of a scene and reads their metadata.
 
     Raises:
         UnknownNameError: the town has no such board or truck, or no ego car.

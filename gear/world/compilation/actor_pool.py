@@ -1,4 +1,7 @@
-"""The pool of actors in a scene's world: just enough instances of each asset for every sample."""
+"""The pool of actors in a scene's world, which is compiled into the world before samples are drawn.
+
+It contains just enough instances of each asset for every sample; a sample uses some of them.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +18,19 @@ PARKED_DEPTH_M = 60.0
 """Actors that a sample does not use are kept this far below the town's ground, metres."""
 
 POOL_SLACK = 2.0
-"""The pool has this many times the number of instances that an asset's share of the largest crowd would need."""
+"""Factor on the number of instances of an asset. The number without this factor is the asset's share of the largest
+crowd.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slot:
-    """One place in the pool: an instance of an actor that samples may use.
+    """One entry of the pool of actors: an instance of an asset that samples may use.
 
     Attributes:
         body: name of its body in the render model and in the placement model.
-        actor: facts of its asset.
-        carries_surface: whether it has a face with its own texture, which can show a patch.
+        actor: metadata of its asset.
+        carries_surface: whether the actor carries a face with its own texture, which can show a patch.
     """
 
     body: str
@@ -34,8 +39,8 @@ class Slot:
 
 
 def plan_slots(scene: SceneSpec, assets: SceneAssets) -> tuple[Slot, ...]:
-    """Decides which actors a world contains: the ego car, vehicles, people, and the carrier of the patch, in this
-    order.
+    """Decides which actors a world contains: the ego car, vehicles, people, and the vehicle that carries the patch, in
+    this order.
 
     Args:
         scene: the scene; its largest counts of vehicles and people determine the size of the pool.

@@ -1,8 +1,8 @@
 """Reads meshes and textures in threads while their world is still being composed.
 
-Composing is work for Python and reading is work for MuJoCo, so both run at the same time. MuJoCo keeps what was read in
-its cache, by path and modification time of the file. It reads a file again if the world uses it with other settings,
-such as a scaled mesh.
+Python composes the world while MuJoCo reads files, so composing and reading run at the same time. MuJoCo stores the
+decoded files in its cache, by path and modification time. It reads a file again if the world uses it with other
+settings, such as a scaled mesh.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import mujoco
 from gear.world.compilation.memory import disable_asset_cache
 
 _BATCH_BYTES = 2 << 20
-"""Size of the files that a thread reads at once; after each batch it frees its temporary memory."""
+"""Total size of the files that a thread reads at once; after each batch the thread frees its temporary memory."""
 
 _CACHE_BYTES = 2 << 30
 """Capacity of MuJoCo's cache, larger than any town. If it were too small, some files would be read twice."""
@@ -28,33 +28,33 @@ _INERTIA = "shell"
 
 
 class AssetPrefetcher:
-    """Reads files into MuJoCo's cache, in the threads of a pool."""
+    """Reads meshes and textures into MuJoCo's cache, in the threads of a pool."""
 
     def __init__(self, readers: ThreadPoolExecutor | None) -> None:
-        """Stores the pool; if it is None, nothing is read."""
+        """Stores the thread pool; if it is None, no file is read."""
         self._readers = readers
 
     def prefetch(self, files: Iterable[str]) -> None:
         """Starts to read files: paths that end in `.png` are textures, all others are meshes.
 
-        Files that cannot be read are ignored here; compiling the world reports them.
+        Files that cannot be read are ignored; the compilation of the world reports them.
         """
         if self._readers is not None:
             for batch in _batches(files):
                 self._readers.submit(_read, batch)
 
     def wait(self) -> None:
-        """Waits until all files are read. Afterwards no more files can be prefetched."""
+        """Waits until all files are read. Afterwards `prefetch` must not be called again."""
         if self._readers is not None:
             self._readers.shutdown()
 
 
 @contextlib.contextmanager
 def asset_prefetcher(readers: int) -> Iterator[AssetPrefetcher]:
-    """Context with a prefetcher: opens MuJoCo's cache, and empties and closes it at the end.
+    """Context with a prefetcher. It opens MuJoCo's cache at the start, and empties and closes the cache at the end.
 
     Args:
-        readers: number of threads that read; with 0 nothing is prefetched, which saves memory.
+        readers: number of threads that read; with 0 no file is prefetched, which saves memory.
     """
     disable_asset_cache()
     if not readers:

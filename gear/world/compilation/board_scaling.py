@@ -3,7 +3,7 @@
 A board faces along its +x axis and stands on the ground at its origin. Its width is therefore scaled along y and its
 height along z; its depth is not changed. MuJoCo scales the meshes; this module scales the positions of geoms, bodies
 and sites and the sizes of geoms. Posts (upright cylinders and capsules) and spheres keep their radius. A board with
-rotated geoms cannot be scaled, since they would be sheared.
+rotated geoms cannot be scaled, because scaling would shear the geoms.
 """
 
 from __future__ import annotations

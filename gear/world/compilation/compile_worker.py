@@ -36,11 +36,11 @@ _CODE_SUFFIXES = (".py", ".pyc", ".so")
 
 
 def main(folder: str) -> None:
-    """Compiles the world whose key is the first line of standard input, and saves it into the folder.
+    """Compiles a world and saves it into the folder. The world's key (a JSON text) is the first line of standard input.
 
-    When the world is saved, the worker writes `DONE` to standard output. It also creates the file `MAY_CACHE` if the
-    key covers every file that was read. It does not cover a town that refers to files outside its assets, or a file
-    that was edited in the meantime.
+    When the world is saved, the worker writes `DONE` to standard output. The worker also creates the file `MAY_CACHE`
+    if the key covers every file that was read. The key does not cover files outside the town's assets, or a file that
+    was edited in the meantime.
     """
     gc.disable()  # half a million objects live to the end; collecting garbage took a third of the time
     sys.setswitchinterval(_SWITCH_S)

@@ -1,4 +1,4 @@
-"""A compiled world, in memory and on disk."""
+"""A compiled world (two MuJoCo models and data about them), in memory and on disk."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _RENDER, _PLACEMENT, _FACTS = "render.mjb", "placement.mjb", "facts.json"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CompiledWorld:
-    """The two MuJoCo models of a world, and facts that the models do not contain.
+    """The two MuJoCo models of a world, and the data about the world that the models do not contain.
 
     Attributes:
         model: the render model: visible geoms, actors as mocap bodies.
@@ -51,9 +51,9 @@ class CompiledWorld:
     faces: tuple[FaceNames, ...]
 
     def save(self, folder: Path) -> None:
-        """Writes both models and the facts into an empty folder.
+        """Writes the world into an empty folder: its two models and the data about them.
 
-        The bounding volumes of the render model's meshes are left out; only rays would need them.
+        The bounding volumes of the render model's meshes are left out, because only rays need them.
 
         Raises:
             OSError: the disk is full.
@@ -72,11 +72,11 @@ class CompiledWorld:
 
     @staticmethod
     def load(folder: Path, slots: tuple[Slot, ...]) -> CompiledWorld:
-        """Reads a world that `save` wrote.
+        """Reads a world that `CompiledWorld.save` wrote.
 
         Args:
-            folder: folder into which it was saved.
-            slots: its pool of actors, computed again from the same plan.
+            folder: folder of the saved world.
+            slots: the pool of actors of the same plan, because the folder does not contain it.
 
         Raises:
             OSError: a file is missing or cannot be read.
@@ -107,9 +107,9 @@ def compile_world(
 
     Args:
         plan: the contents of the world.
-        lighting: as for `gear.world.compilation.compose.compose`.
-        readers: number of threads that read meshes and textures while the world is composed; 0 for none. With threads
-            it is faster, and town10 needs 2.0 GB of memory instead of 1.4 GB.
+        lighting: function that returns the light of the plan's weather; None computes the light in a thread.
+        readers: number of threads that read meshes and textures while the world is composed; 0 for none. With threads,
+            compiling is faster, and town10 needs 2.0 GB of memory instead of 1.4 GB.
 
     Raises:
         TownError: a file breaks the conventions, or MuJoCo cannot compile it.

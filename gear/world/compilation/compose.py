@@ -42,7 +42,7 @@ class Composition:
         files: paths of all MJCF files of the world, the town's first.
         slots: the pool of actors.
         faces: names of the faces that can show patches, in patch order.
-        folder: folder of the files that `write_assets` wrote; None if it was not called yet.
+        folder: folder of the files that `write_assets` wrote; None before this call.
     """
 
     tree: ET.Element
@@ -55,13 +55,13 @@ class Composition:
 
     @property
     def texture_files(self) -> list[str]:
-        """Paths of the textures that `write_assets` wrote."""
+        """Paths of the texture files that `write_assets` wrote."""
         return [str(path) for path in self.folder.glob("*.png")] if self.folder else []
 
     def write_assets(self, folder: Path) -> Composition:
-        """Writes the textures into a folder and returns the composition, which then refers only to files.
+        """Writes the textures into a folder and returns a composition that refers only to files.
 
-        MuJoCo copies all assets that it gets in memory at once, whereas it reads files one by one.
+        This saves memory: MuJoCo copies all assets in memory at once, but reads files one by one.
         """
         for name, content in self.assets.items():
             if not isinstance(content, MeshPath):
@@ -81,8 +81,8 @@ def compose(plan: WorldPlan, files: SceneMjcf, lighting: Callable[[], Lighting] 
     Args:
         plan: the contents of the world.
         files: the MJCF files of the plan.
-        lighting: function that returns the light of the plan's weather, if it is already being computed elsewhere; None
-            computes it in a thread.
+        lighting: function that returns the light of the plan's weather, if the caller already computes it; None
+            computes the light in a thread.
 
     Raises:
         TownError: a file cannot be composed with the others.

@@ -1,7 +1,7 @@
-"""Copies of an asset's first instance, made as text in the MJCF that dm_control wrote.
+"""Copies the first instance of an asset as text in the MJCF that dm_control wrote.
 
-Instances of an asset differ only in names and number plates. dm_control needs nearly two milliseconds for each, which
-is three quarters of a second for the actors of a town.
+Instances of an asset differ only in names and number plates. dm_control needs nearly two milliseconds per instance,
+three quarters of a second for the actors of a town. Copying text is faster.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Copy:
-    """One copy of an instance.
+    """One copy of an asset's first instance.
 
     Attributes:
         name: name of its body.
@@ -28,7 +28,7 @@ class Copy:
 
 
 def put_copies_into(world: ET.Element, copies: Mapping[str, Sequence[Copy]]) -> None:
-    """Inserts copies into a `<worldbody>`.
+    """Inserts copies of instances into the `<worldbody>` element of an MJCF tree.
 
     Args:
         world: the worldbody, changed in place.

@@ -1,6 +1,6 @@
 """Saves models without the bounding volume hierarchies (BVH) of their meshes.
 
-The BVH take half of a town's render model, and only rays use them.
+The BVHs take half of the memory of a town's render model, and only rays use them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 _TREES = ("bvh_aabb", "bvh_child", "bvh_depth", "bvh_nodeid")
 _NBVH, _NBVHSTATIC, _NBUFFER = 7, 8, 97
-"""Indices of three of the sizes at the start of MuJoCo's struct `mjModel`. They are checked at each use."""
+"""Indices of three of the sizes at the start of MuJoCo's struct `mjModel`. These indices are checked at each use."""
 
 _ALIGNMENT_BYTES = 64
 """Alignment of the arrays of a model."""
@@ -23,10 +23,12 @@ _ALIGNMENT_BYTES = 64
 
 @contextlib.contextmanager
 def without_mesh_bvh(model: mujoco.MjModel) -> Iterator[None]:
-    """Context in which a model has only the BVH of its bodies; when it is saved, the file has no BVH of meshes.
+    """Context in which a model has only the BVHs of its bodies. A model that is saved in this context has no BVHs of
+    meshes in its file.
 
-    In the loaded model all meshes share one empty box as BVH, so rays miss them. A model with flexes is not changed,
-    nor is one whose memory layout differs from that of the MuJoCo release that this module knows.
+    In the loaded model all meshes share one empty box as BVH, so rays miss them. A model with flexes is not changed. A
+    model is also not changed if its memory layout differs from that of the MuJoCo release for which this module was
+    written.
     """
     sizes, count = _sizes(model), int(np.max(model.body_bvhadr + model.body_bvhnum, initial=0))
     if sizes is None or count >= model.nbvh or model.nflex or not model.nmesh:

@@ -18,15 +18,15 @@ from gear.world.compilation.static_parts import UNNAMED, MeshPath, SplitAsset
 from gear.world.surfaces.face_texture import FACE_SIZE_PX
 
 _UNREAD = ("frame", "replicate", "attach")
-"""Elements of a body that MuJoCo supports and dm_control does not."""
+"""Child elements of a body that MuJoCo can read and dm_control cannot."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaceNames:
-    """A face that can show a patch, described by the names of its elements in the composed MJCF.
+    """The names, in the composed MJCF, of the elements of one face that can show a patch.
 
     Attributes:
-        asset: name of its MJCF file, without suffix.
+        asset: name of the MJCF file that contains the face, without suffix.
         owner: name of the body of the board, or of the actor that carries the face.
         is_carried: whether the owner is an actor.
         geom, site: names of the geom of the face and of the site that defines its frame.
@@ -48,7 +48,7 @@ def load_mjcf(
 
     Args:
         path: path of the file.
-        text: MJCF text that is read instead of the file's content; None for the content.
+        text: MJCF text that is read instead of the file; None reads the file.
         mesh_paths: path of each mesh file, by its name in `text`.
         name: name of the model; None for the file's name without suffix.
 
@@ -83,16 +83,18 @@ def load_mjcf(
 
 
 def class_name(dclass: Any) -> str:
-    """Name of an element's default class; "" if it has none.
+    """The name of an element's default class; "" if the element has no class.
 
     Args:
-        dclass: dm_control's value: the class, its name if dm_control does not know the class, or None.
+        dclass: dm_control's attribute `dclass`: the class, the name of a class that dm_control does not know, or None.
     """
     return dclass if isinstance(dclass, str) else "" if dclass is None else str(dclass.dclass)
 
 
 def free_name(root: mjcf.RootElement, kind: str, name: str) -> str:
-    """A name that no element of this kind has in the tree: `name`, with as many underscores added as necessary."""
+    """A name that no element of this kind has in the tree: `name`, followed by underscores if the name is
+    already used.
+    """
     while root.find(kind, name) is not None:
         name += "_"
     return name
@@ -121,13 +123,14 @@ class AssetInstances:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Paths of the attached files, in the order in which they were attached."""
+        """Paths of the attached MJCF files, in the order in which they were attached."""
         return tuple(file.path for file in self._models)
 
     def add_instance(self, file: AssetFile, body: Any) -> None:
-        """Adds an instance of an asset to a body. It shares meshes and materials with the asset's other instances.
+        """Adds an instance of an asset to a body. The instance shares meshes and materials with all other instances of
+        the asset.
 
-        The number plates in the asset's file are used in turn by its instances.
+        The instances of an asset use the number plates in its file in turn.
 
         Raises:
             TownError: the file cannot be attached, or another element already has the name of the instance.
@@ -136,12 +139,12 @@ class AssetInstances:
         self._originals.setdefault(file, body.name)
 
     def has_instance(self, file: AssetFile) -> bool:
-        """Whether `add_instance` has made an instance of the asset that `copy_instance` can copy."""
+        """Whether the asset has an instance that `copy_instance` can copy, made by `add_instance`."""
         return file in self._originals
 
     def copy_instance(self, file: AssetFile, name: str) -> None:
-        """Requests another instance, in a body with this name; `put_copies_into` writes it later, without
-        dm_control.
+        """Requests a copy of an asset's first instance, in a body with the given name. `put_copies_into` writes the
+        copy later, without dm_control.
         """
         plates = {geom: plate.full_identifier for geom, plate in self._next_plates(file).items()}
         frame = self._model(file).full_identifier  # names the empty body that dm_control puts after the first instance
@@ -165,7 +168,7 @@ class AssetInstances:
         return {geom: plates[number % len(plates)] for geom, plates in self._plates[file]}
 
     def add_surface_instance(self, file: AssetFile, body: Any, *, is_carried: bool) -> FaceNames:
-        """Adds an instance to a body whose face has its own texture, so that it can show a patch.
+        """Adds an instance of an asset to a body. Its face gets a texture of its own, so that it can show a patch.
 
         Raises:
             TownError: the asset does not have exactly one face, or the face has no material or no site `surface`.
@@ -194,19 +197,21 @@ class AssetInstances:
         )
 
     def drop_templates(self) -> None:
-        """Removes the bodies of the attached files themselves; their meshes, textures and materials are kept."""
+        """Removes the original bodies of the attached files from the tree. Their meshes, textures and materials remain
+        for the instances.
+        """
         for model in self._models.values():
             for child in list(model.worldbody.all_children()):
                 child.remove()
 
     def put_copies_into(self, tree: ET.Element) -> None:
-        """Adds the instances that `copy_instance` requested to the MJCF that dm_control wrote."""
+        """Inserts the copies that `copy_instance` requested into the MJCF tree that dm_control wrote."""
         for worldbody in tree.iterfind("worldbody"):
             put_copies_into(worldbody, self._copies)
 
     def put_defaults_into(self, xml: str) -> str:
-        """The MJCF that dm_control wrote, completed with the default classes that were not passed through
-        dm_control.
+        """Inserts the default classes that dm_control did not read into the MJCF text that dm_control wrote. Returns
+        the complete text.
         """
         for name, defaults in self._defaults.items():
             before, empty, after = xml.partition(f'<default class="{name}/"/>')

@@ -1,4 +1,6 @@
-"""Materials of a compiled model: colours of geoms, and a check for textures that would crash a renderer."""
+"""Reads the materials of a compiled model: colours of geoms, and a check for textures with which a renderer would
+crash.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ LARGEST_SIDE_PX = 16384
 
 
 def effective_rgba(model: mujoco.MjModel) -> Array:
-    """(ngeom, 4) float64 colour of each geom, 0..1: its own colour if it has one, otherwise that of its material."""
+    """The (ngeom, 4) float64 RGBA colours of geoms, 0..1: the geom's own colour if it has one, otherwise the colour of
+    its material.
+    """
     rgba: Array = model.geom_rgba.astype(np.float64)
     plain = ~has_own_colour(model)
     rgba[plain] = model.mat_rgba[model.geom_matid[plain]]
@@ -32,7 +36,7 @@ def effective_rgba(model: mujoco.MjModel) -> Array:
 
 
 def visible_materials(model: mujoco.MjModel) -> dict[int, int]:
-    """For each material in use, by material id: the id of the first visible geom that uses it."""
+    """The materials that visible geoms use: the id of the first visible geom with the material, by material id."""
     first_geoms: dict[int, int] = {}
     for geom in np.flatnonzero((model.geom_group < FIRST_HIDDEN_GROUP) & (model.geom_matid >= 0)).tolist():
         first_geoms.setdefault(int(model.geom_matid[geom]), geom)
@@ -40,12 +44,12 @@ def visible_materials(model: mujoco.MjModel) -> dict[int, int]:
 
 
 def textures_of(model: mujoco.MjModel, material: int) -> list[tuple[int, int]]:
-    """(role, texture id) for each texture of a material; roles are those of `mujoco.mjtTextureRole`."""
+    """The textures of a material as pairs (role, texture id); roles are values of `mujoco.mjtTextureRole`."""
     return [(role, int(texture)) for role, texture in enumerate(model.mat_texid[material]) if texture >= 0]
 
 
 def reject_fatal_textures(model: mujoco.MjModel, path: Path) -> None:
-    """Rejects textures with which Filament would end the process without a message.
+    """Checks that a model has no textures with which Filament would end the process without a message.
 
     Args:
         model: compiled model.

@@ -38,12 +38,13 @@ def disable_asset_cache() -> None:
 
 
 def map_large_buffers() -> None:
-    """Makes glibc allocate large buffers (from the size of a linear frame) separately, so that freeing them returns
-    them to the system.
+    """Makes glibc allocate each large buffer (at least a linear frame) as a separate memory mapping.
 
-    By default glibc takes such buffers from its heap, where they leave holes: 130 MB with quality `film`. The trim
-    threshold is raised as well. Otherwise glibc would return the end of its heap and fetch it again all the time, which
-    took a third of the time of measuring and encoding.
+    Freed buffers then return to the operating system at once. By default, glibc takes large buffers from its heap,
+    where they leave holes: 130 MB with quality `film`.
+
+    The trim threshold is raised as well. Otherwise glibc would return the end of its heap and request it again many
+    times, which took a third of the time of measuring and encoding.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
@@ -52,7 +53,7 @@ def map_large_buffers() -> None:
 
 
 def release_memory() -> None:
-    """Collects garbage and, with glibc, returns freed pages to the operating system."""
+    """Runs Python's garbage collection and, with glibc, returns freed memory to the operating system."""
     gc.collect()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
@@ -62,7 +63,7 @@ def release_memory() -> None:
 def release_render_arrays(model: mujoco.MjModel) -> None:
     """Releases the texels and triangles of a model after a renderer has copied them.
 
-    Afterwards no other renderer can be opened for the model.
+    Afterwards no further renderer can be opened for the model.
     """
     _give_back(getattr(model, name) for name in _SHOWN)
 

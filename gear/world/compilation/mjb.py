@@ -1,6 +1,6 @@
 """Writes and reads compiled models through memory-mapped files.
 
-MuJoCo's own functions make another copy of the whole model, which takes half of the time for a large model.
+MuJoCo's own functions copy the whole model once more; for a large model, this takes half of their time.
 """
 
 from __future__ import annotations

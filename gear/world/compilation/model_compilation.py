@@ -22,7 +22,7 @@ COLLISION_CLASS = "collision"
 GROUND_PREFIX = "ground"
 
 GROUND_GROUP, OBSTACLE_GROUP, ACTOR_GROUP, FOOT_GROUP = 0, 1, 2, 3
-"""Geom groups of the placement model; a ray can be limited to some of them."""
+"""Geom groups of the placement model, by which a ray can be limited to some kinds of geoms."""
 
 _BODIES, _FEET = "1", "2"
 """Contact bits: bodies of actors collide with each other and with obstacles, feet of actors with the ground."""
@@ -45,9 +45,9 @@ class PlacementBody:
     """The body of an actor in the placement model.
 
     Attributes:
-        half_length_m, half_width_m: distances of its four feet from its middle.
-        height_m: height.
-        mass_kg: mass.
+        half_length_m, half_width_m: distances of the four feet from the middle of the body.
+        height_m: height of the body.
+        mass_kg: mass of the body.
     """
 
     half_length_m: float
@@ -57,13 +57,13 @@ class PlacementBody:
 
 
 def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]:
-    """Compiles the render model, which has no collision geoms; actors are mocap bodies.
+    """Compiles the render model of a world, which has no collision geoms; actors are mocap bodies.
 
     Returns:
         The model, and the labels of its geoms.
 
     Raises:
-        TownError: MuJoCo cannot compile it, a visible geom has no label, or a texture would crash Filament.
+        TownError: MuJoCo cannot compile the model, a visible geom has no label, or a texture would crash Filament.
     """
     tree = copy.deepcopy(composition.tree)
     for parent, geom in _geoms(tree, collision=True):
@@ -78,11 +78,11 @@ def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]
 def placement_spec(composition: Composition) -> mujoco.MjSpec:
     """Reads the spec of the placement model, which has only collision geoms; every actor is a free body on four feet.
 
-    Sizes and masses of the actors are still missing, since they are measured on the render model. `placement_model`
-    sets them; this function can therefore run while the render model is being compiled.
+    Sizes and masses of the actors are missing, because they are measured on the render model; `placement_model` sets
+    them later. This function can therefore run while the render model is compiled.
 
     Raises:
-        TownError: MuJoCo cannot read it, a collision geom is not a primitive, or an actor has no collision geom.
+        TownError: MuJoCo cannot read the MJCF, a collision geom is not a primitive, or an actor has no collision geom.
     """
     tree = copy.deepcopy(composition.tree)
     for section in list(tree):
@@ -122,7 +122,7 @@ def placement_spec(composition: Composition) -> mujoco.MjSpec:
 def placement_model(
     composition: Composition, spec: mujoco.MjSpec, placement_bodies: Mapping[str, PlacementBody]
 ) -> mujoco.MjModel:
-    """Compiles the placement model.
+    """Compiles the placement model of a world, in which only collisions and rays are computed.
 
     Args:
         composition: the composed world.
@@ -130,7 +130,7 @@ def placement_model(
         placement_bodies: sizes and masses of the actors, by body name.
 
     Raises:
-        TownError: MuJoCo cannot compile it.
+        TownError: MuJoCo cannot compile the model.
     """
     for name, placement_body in placement_bodies.items():
         _set_placement_body(spec, name, placement_body)

@@ -16,12 +16,12 @@ _LINE = re.compile(r",? line \d+\b")
 
 
 def without_breaks(error: BaseException) -> str:
-    """The message of an error on one line."""
+    """The message of an error as one line, without line breaks."""
     return " ".join(str(error).split())
 
 
 def compile_problem(path: Path) -> str:
-    """MuJoCo's error for a single file; "" if the file compiles."""
+    """MuJoCo's error message for a single MJCF file; "" if the file compiles."""
     try:
         read_spec(path).compile()
     except ValueError as error:
@@ -30,11 +30,11 @@ def compile_problem(path: Path) -> str:
 
 
 def compile_error(error: ValueError, files: Sequence[Path]) -> TownError:
-    """The error for a world that MuJoCo cannot compile.
+    """Makes the error for a world that MuJoCo cannot compile; it names the faulty MJCF file.
 
     Args:
         error: MuJoCo's error for the world.
-        files: the files of the world. The error names the faulty one, or the first one if each file compiles alone.
+        files: the files of the world. The error names the faulty file, or the first file if each file compiles alone.
     """
     for path in files:
         if problem := compile_problem(path):

@@ -8,8 +8,8 @@ rotates the mesh for its inertia. For a unit normal (x, y, z) in that frame, red
 
 which is Frisvad's basis about y, left-handed ("Building an Orthonormal Basis from a Unit Vector", 2012). On every
 upright wall red therefore points up and green to the viewer's right. On level ground and on slopes the directions
-depend on the yaw of the mesh's frame. A usual normal map has red to the right and green up. It is shown correctly if
-its two channels are exchanged and the frame of the mesh is upright with a suitable yaw.
+depend on the yaw of the mesh's frame. A usual normal map has red to the right and green up. Filament shows it correctly
+if its two channels are exchanged and the frame of the mesh is upright with a suitable yaw.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy.typing as npt
 from gear.values.geometry import Array
 
 _YAWS = 16
-"""Number of evenly spaced yaws that are tried for a mesh."""
+"""Number of evenly spaced yaws that are tested for a mesh."""
 
 _SAMPLED_TRIANGLES = 192
 """Number of triangles by which the yaw of a mesh is chosen, evenly spaced among all its triangles."""

@@ -1,4 +1,4 @@
-"""Reads the MJCF files of a planned world, each once, before dm_control composes them."""
+"""Reads each MJCF file of a planned world once, before dm_control composes the world."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Splits MJCF files into the part that dm_control must read and parts that are copied into the world unchanged.
 
-dm_control changes nothing in the copied parts, and it is slow: half a millisecond for each geom and body of a town, and
-five for each default class of an asset. It would also read, hash and rewrite every mesh, so it gets the path of a mesh
-file instead of the file's content.
+dm_control would not change the copied parts, and it is slow: half a millisecond for each geom and body of a town, and
+five for each default class of an asset. dm_control would also read, hash and rewrite every mesh. It therefore gets the
+path of a mesh file instead of the content.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _PLAIN_DEFAULTS = ("default", "geom", "mesh")
 _REFERENCES = frozenset({"material", "mesh", "hfield", "fluidshape"})
 _PLAIN_STEM = re.compile(r"[\w.-]+", re.ASCII)
 _MAIN = "main"
-"""Name that MuJoCo gives to the class of all defaults in the files that it writes."""
+"""Name of the root default class in MJCF files that MuJoCo writes."""
 
 _WORLD = "<worldbody>"
 
@@ -43,7 +43,7 @@ class StaticParts:
 
     Attributes:
         xml: the elements as MJCF; every geom has a name.
-        body_names: names of all bodies among them.
+        body_names: names of all bodies in these elements.
         geom_materials: distinct pairs of default class and own material (None for none) of the geoms, in the order of
             the file.
     """
@@ -53,14 +53,14 @@ class StaticParts:
     geom_materials: tuple[tuple[str, str | None], ...] = ()
 
     def insert_into(self, xml: str) -> str:
-        """An MJCF text with these elements inserted at the start of its worldbody."""
+        """Inserts these elements at the start of the worldbody of an MJCF text. Returns the new text."""
         before, world, after = xml.partition(_WORLD)
         return before + world + self.xml + after if self.xml else xml
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplitTown:
-    """A town's MJCF in two parts.
+    """A town's MJCF in two parts: the part for dm_control, and the part that is copied as text.
 
     Attributes:
         path: path of its file.
@@ -78,9 +78,9 @@ class SplitTown:
 def split_town(path: Path) -> SplitTown:
     """Separates the plain geoms and bodies of a town from the rest of its MJCF.
 
-    Nothing is taken out of a town that includes other files or has anything else in its worldbody (joints, cameras,
-    sites, geoms without a class); dm_control then reads the file itself. One exception: if such a file names the class
-    of all defaults `main`, dm_control would make a second class of it, so dm_control gets a text without that name.
+    A town is not split if it includes other files, or if its worldbody has other elements (joints, cameras, sites,
+    geoms without a class). dm_control then reads the file itself. There is one exception: if such a file calls its root
+    default class `main`, dm_control gets a text without that name, because it would make a second class.
 
     Raises:
         TownError: the file is not XML, cannot be read, or contains a NaN.
@@ -111,7 +111,7 @@ def split_town(path: Path) -> SplitTown:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplitAsset:
-    """An asset's MJCF in two parts.
+    """An asset's MJCF in two parts: the part for dm_control, and the default classes.
 
     Attributes:
         text: the MJCF without its default classes; None if dm_control must read the file itself.
@@ -127,7 +127,7 @@ class SplitAsset:
 def split_asset(file: AssetFile) -> SplitAsset:
     """Separates the default classes of an asset from the rest of its MJCF.
 
-    An asset that has the size of its face in metres (`face_size_m`) is scaled to it first.
+    If `file.face_size_m` is set, the asset is first scaled to this size of its face in metres.
 
     A file is not split if it includes other files, or if its default classes refer to other elements (such as a
     material) or apply to elements other than geoms and meshes.

@@ -1,8 +1,9 @@
-"""A cache of compiled worlds on disk. Loading a cached world takes about a second and less memory than compiling it.
+"""A cache of compiled worlds on disk. Loading a cached world takes about a second, and less memory than compiling the
+world.
 
-A world that is not in the cache is compiled in a subprocess, so that the memory for compiling is freed when it ends.
-The world is stored under a hash of everything that determines it: gear's code, versions of packages, the content of
-every MJCF file, mesh and texture, scene and weather. A change to any of them gives a new entry.
+A world that is not in the cache is compiled in a subprocess, so the memory for compiling is freed when the subprocess
+ends. The world is stored under a hash of everything that determines it: gear's code, versions of packages, the content
+of every MJCF file, mesh and texture, scene and weather. A change to any of them gives a new entry.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ _ABANDONED_S = 3600.0
 def load_or_compile(
     *, town: str | Path, scene_name: str, scene: SceneSpec, weather: Weather, cache_dir: Path | None = None
 ) -> World:
-    """Returns the same world as `World.build`, from the cache if it is there.
+    """Loads a world from the cache. If the cache does not contain the world, it is compiled and added.
 
     Args:
         town, scene_name, scene, weather: as for `World.build`.
@@ -114,7 +115,7 @@ def _from_cache(cache_dir: Path, plan: WorldPlan) -> CompiledWorld:
 
 
 def world_key(plan: WorldPlan) -> dict[str, Json]:
-    """Everything that determines a compiled world, as JSON."""
+    """The key of a compiled world in the cache: everything that determines the world, as JSON."""
     return {
         "town": str(plan.town.resolve()),
         "scene": to_json(plan.scene),

@@ -1,4 +1,4 @@
-"""The plan of a world: everything that determines it, decided before anything is composed or compiled.
+"""The plan of a world: all data that determine the world, before MJCF files are composed and compiled.
 
 A world is made in three steps: its assets are read, its pool of actors is decided (both in this module), and the world
 is composed and compiled from this plan alone.
@@ -18,7 +18,7 @@ from gear.world.scene_spec import SceneSpec
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldPlan:
-    """The contents of a world.
+    """The plan of a world: all data that determine the compiled world.
 
     Attributes:
         assets: the assets of the scene.
@@ -34,12 +34,12 @@ class WorldPlan:
 
     @property
     def town(self) -> Path:
-        """Path of the town's MJCF."""
+        """Path of the town's MJCF file."""
         return self.assets.library.town
 
 
 def plan_world(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> WorldPlan:
-    """Reads the assets of a scene and decides its pool of actors.
+    """Plans a world: reads the assets of a scene and decides its pool of actors.
 
     Raises:
         UnknownNameError: the town has no such board or truck, or no ego car.
