@@ -1,4 +1,4 @@
-"""Checks that no camera is inside the ego car, where it would see only the car."""
+"""Checks that no camera is inside the ego car, where its view would be only the car."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def check_outside(rig: Rig, car: Shape, scene_name: str) -> None:
         scene_name: name of the scene, for error messages.
 
     Raises:
-        PlacementError: a camera is inside; the message names it and its position.
+        PlacementError: a camera is inside the car; the message names the camera and its position.
     """
     for mount in rig.cameras:
         x, y, z = mount.position_m
@@ -33,7 +33,7 @@ def check_outside(rig: Rig, car: Shape, scene_name: str) -> None:
 
 
 def enclosed_share(shape: Shape, point_m: Array) -> float:
-    """Share of directions, 0..1, in which a ray from a point hits a shape (Möller and Trumbore 1997).
+    """The share of directions, 0..1, in which a ray from a point hits a shape (method: Möller and Trumbore 1997).
 
     Args:
         shape: the triangles.

@@ -1,8 +1,8 @@
-"""Questions about geometry that the placement model answers: where the ground is, what overlaps, what hides a face, and
-how actors come to rest.
+"""Geometric queries to the placement model: height of the ground, overlaps, lines of sight, and resting poses of
+actors.
 
-MuJoCo computes the answers: by rays for the ground and for lines of sight, by its collision detection for overlaps, and
-by a short simulation from a reset state for actors on uneven ground.
+MuJoCo computes the answers. It uses rays for the ground and for lines of sight, its collision detection for overlaps,
+and a short simulation from a reset state for actors on uneven ground.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ EVEN_M = 0.005
 """Ground is even, and needs no simulation, if the four feet are at most this far from their common plane, metres."""
 
 STEP_UP_M = 1.2
-"""Height above the lane at which rays to the ground start, metres; low enough that a bridge above a road is not
-taken for its ground.
+"""Height above the lane at which rays to the ground start, metres; low enough that the rays do not start above a bridge
+over the lane.
 """
 
 SETTLE_DROP_M = 0.01
@@ -60,8 +60,8 @@ _ACTORS = _groups(ACTOR_GROUP)
 
 
 class PlacementSpace:
-    """Answers questions with the placement model of a world. Every answer starts from the reset state, so
-    answers do not depend on earlier ones.
+    """Answers geometric queries with the placement model of a world. Every query starts from the reset state, so
+    results do not depend on earlier queries.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class PlacementSpace:
         Args:
             model: the placement model.
             bodies: the assets of its actors, by body name.
-            parked_m: height to which actors that a query does not name are moved.
+            parked_m: height in metres at which actors are kept that do not take part in a query.
         """
         self._model = model
         self._parked_m = parked_m
@@ -86,7 +86,9 @@ class PlacementSpace:
         self._pose({})
 
     def ground_m(self, x_m: float, y_m: float, near_z_m: float) -> float | None:
-        """Height of the ground at (x_m, y_m); None if there is no ground near the height `near_z_m`."""
+        """The height in metres of the ground at (x_m, y_m), world coordinates; None if there is no ground near the
+        height `near_z_m`.
+        """
         start_m = np.array([x_m, y_m, near_z_m + STEP_UP_M])
         geom = np.zeros(1, np.int32)
         down = np.array([0.0, 0.0, -1.0])
@@ -98,10 +100,10 @@ class PlacementSpace:
     def ground_pose(
         self, actor_type: ActorType, x_m: float, y_m: float, near_z_m: float, yaw_rad: float
     ) -> GroundPose | None:
-        """Places an actor on the ground.
+        """Computes the pose of an actor that stands on the ground.
 
-        A person stands upright on the ground below its middle. A vehicle stands on the plane that fits the ground below
-        its four feet best (least squares).
+        A person stands upright on the ground below the person's middle. A vehicle stands on the plane that fits the
+        ground below its four feet best (least squares).
 
         Args:
             actor_type: asset of the actor.
@@ -142,8 +144,8 @@ class PlacementSpace:
         return GroundPose(pose, bool(uneven_m <= EVEN_M))
 
     def overlaps(self, poses: Mapping[str, RigidTransform]) -> list[tuple[str, str]]:
-        """Pairs of bodies that overlap at the given poses; the second name is "" if an actor overlaps the town
-        or a board.
+        """The pairs of actors' bodies that overlap at the given poses, by name. The second name is "" if an actor
+        overlaps the town or a board.
         """
         self._pose(poses)
         mujoco.mj_collision(self._model, self._data)
@@ -183,14 +185,14 @@ class PlacementSpace:
         return settled
 
     def visible(self, eye_m: Array, targets_m: Array) -> npt.NDArray[np.bool_]:
-        """(N,) bool: which of (N, 3) points can be seen from the point `eye_m`; the town, its boards and its
-        ground may hide them.
+        """Tests which of (N, 3) points are visible from the point `eye_m`, (3,): (N,) bool. Only the town, its boards
+        and its ground can hide a point.
         """
         return self._rays(eye_m, targets_m, _STATIC)[0] < 0
 
     def occluders(self, eye_m: Array, targets_m: Array, poses: Mapping[str, RigidTransform]) -> list[str | None]:
-        """For each of (N, 3) points: name of the actor's body that hides it from the point `eye_m`; None if no
-        actor does.
+        """The names of the actors' bodies that hide points from `eye_m`, (3,): one name for each of (N, 3) points; None
+        for a point that no actor hides.
         """
         self._pose(poses)
         geoms = self._rays(eye_m, targets_m, _ACTORS)[0]

@@ -21,14 +21,16 @@ from gear.world.traffic.spawn import Spawn, Spawner
 from gear.world.world import World
 
 SEQUENCES_CACHED = 4
-"""Number of planned sequences that are kept, because frames are usually requested in order."""
+"""Number of planned sequences in the cache. A few are enough, because frames are usually requested in order."""
 
 
 class ScenePlanner:
-    """Plans the scene records of one split."""
+    """Plans the samples of one split: draws the scene record of each sample (actors, poses, weather, cameras) from the
+    seed.
+    """
 
     def __init__(self, world: World, rig: Rig, split: SplitConfig, *, split_name: str) -> None:
-        """Prepares everything that the samples share.
+        """Prepares the data that all samples of the split share.
 
         Args:
             world: compiled world; the planner uses its placement model.
@@ -65,7 +67,7 @@ class ScenePlanner:
         )
 
     def plan(self, index: int) -> SceneRecord:
-        """Plans one sample.
+        """Plans one sample and returns its scene record.
 
         Args:
             index: number of the sample, counted over all frames of the split.

@@ -1,4 +1,4 @@
-"""Reads a scene library in such a way that a faulty scene does not prevent the use of the others."""
+"""Reads the file of a scene library. A faulty scene does not prevent the use of the correct scenes in the file."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from gear.world.scene_spec import SceneLibrary, SceneSpec
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SceneFile:
-    """The scenes of one file: those that could be read, and the errors of the others.
+    """The scenes of one file: the valid scenes, and the errors of the faulty scenes.
 
     Attributes:
-        library: the scenes that could be read; at least one.
+        library: the valid scenes; at least one.
         faulty: the error of each faulty scene, by the scene's name.
     """
 
@@ -27,7 +27,7 @@ class SceneFile:
 
     @property
     def scenes(self) -> MappingType[str, SceneSpec]:
-        """The scenes that could be read, by name."""
+        """The valid scenes of the file, by name."""
         return self.library.scenes
 
     @property
@@ -36,7 +36,7 @@ class SceneFile:
         return (*self.library.scenes, *self.faulty)
 
     def scene(self, name: str) -> SceneSpec:
-        """The scene with this name.
+        """Returns the scene with this name.
 
         Raises:
             ConfigError: that scene is faulty.

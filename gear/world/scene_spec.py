@@ -1,4 +1,4 @@
-"""The format of a scene library: where boards stand, and which traffic may surround them."""
+"""The format of a scene library, which defines where boards stand and which traffic may surround them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ CountRange = tuple[int, int]
 
 
 FACE_SIDE_M = (0.1, 100.0)
-"""Smallest and largest side of a face, metres. A smaller face cannot show a patch; a larger one was given in
-other units.
+"""Smallest and largest side of a face, metres. A smaller face cannot show a patch; a larger face was probably specified
+in another unit.
 """
 
 FARTHEST_M = 10_000.0
@@ -41,15 +41,15 @@ def _check_range(name: str, value: Range | None, *, least: float = -FARTHEST_M) 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardSpec:
-    """One billboard.
+    """The position, direction, asset and size of one billboard in a scene.
 
     Attributes:
-        position_m: ground point under the middle of its face, world coordinates.
-        facing_deg: direction in which its face looks, counter-clockwise from east.
+        position_m: ground point under the middle of its face, world coordinates, metres.
+        facing_deg: direction of the face's outward normal, degrees counter-clockwise from east.
         asset: name of its MJCF file in `mjcf/surfaces`.
         size_m: width and height of its face; None for the size in the asset's file. The whole board is scaled about its
             foot, so a taller face also hangs higher.
-        places: position in the file of each key that the file gives, for error messages.
+        places: line and column in the YAML file of each key that occurs there, for error messages.
     """
 
     position_m: Vec3
@@ -74,14 +74,14 @@ class BoardSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EgoLimits:
-    """Where the ego car may be, in the frame of the first board.
+    """Limits of the ego car's position, in the frame of the first board.
 
     Attributes:
         ahead_m: smallest and largest distance in front of the face.
-        lateral_m: smallest and largest distance to the left of the direction in which the face looks.
+        lateral_m: smallest and largest distance to the left of the face's outward normal; negative to the right.
         max_incidence_deg: largest angle between the face's normal and the direction to the reference camera; 0 is
             frontal.
-        min_free: share of each face that the reference camera must see.
+        min_free: smallest share of each face that must be visible to the reference camera.
     """
 
     ahead_m: Range
@@ -99,7 +99,9 @@ class EgoLimits:
 
 
 ONE_PLACE_M, ONE_WAY_DEG = 0.05, 5.0
-"""Two boards that differ by less than this in position and direction are the same board, written twice by mistake."""
+"""Two boards that differ by less than this in position (metres) and direction (degrees) count as one board that was
+written twice by mistake.
+"""
 
 
 def _is_one_way(board: BoardSpec, other: BoardSpec) -> bool:
@@ -111,13 +113,14 @@ MOST_NPCS = 1000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NpcLimits:
-    """How many other road users there are, and where they may be.
+    """Limits on the number and positions of other vehicles or of people.
 
     Attributes:
         count: smallest and largest number; each number between them is equally likely.
         ahead_m, lateral_m: smallest and largest distances in the frame of the first board, as in `EgoLimits`; None for
             no limit.
-        radius_m: smallest and largest distance from the ego car; None for no limit. All given limits must hold.
+        radius_m: smallest and largest distance from the ego car; None for no limit. All limits that are not None must
+            hold.
     """
 
     count: CountRange
@@ -135,13 +138,13 @@ class NpcLimits:
 
     @property
     def needs_board(self) -> bool:
-        """Whether the limits are given relative to a board."""
+        """Whether the limits are relative to a board: `ahead_m` or `lateral_m` is set."""
         return self.ahead_m is not None or self.lateral_m is not None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleLimits(NpcLimits):
-    """The limits of other vehicles.
+    """Limits on the number, positions and kinds of other vehicles.
 
     Attributes:
         parked_share: share of the vehicles that are parked, as far as there are free parking bays.
@@ -160,12 +163,12 @@ class VehicleLimits(NpcLimits):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TruckSpec:
-    """A vehicle with the patch on its rear; it drives ahead of the ego car in the same lane.
+    """A vehicle that carries the patch on its rear and drives ahead of the ego car in the same lane.
 
     Attributes:
         asset: name of its MJCF file in `mjcf/vehicles`.
         gap_m: smallest and largest distance between the front of the ego car and the rear of the vehicle.
-        places: position in the file of each key that the file gives, for error messages.
+        places: line and column in the YAML file of each key that occurs there, for error messages.
     """
 
     asset: str = "truck_box"
@@ -178,7 +181,7 @@ class TruckSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneSpec:
-    """One scene: either boards, or a truck, or neither, and limits for the traffic around them.
+    """One scene: boards, a truck, or no surface for patches, and limits for the ego car and the traffic.
 
     Attributes:
         boards: the boards, which show `patch_0`, `patch_1`, … in this order.
@@ -229,7 +232,7 @@ class SceneSpec:
         )
 
     def mixed(self, mix: Mapping[str, float]) -> SceneSpec:
-        """The same scene with the factors of its vehicle mix multiplied by those of another mix."""
+        """The same scene, in which the factors of the vehicle mix are multiplied by the factors in `mix`."""
         if not mix:
             return self
         return replace(self, npc_vehicles=replace(self.npc_vehicles, mix=product_of(self.npc_vehicles.mix, mix)))
@@ -255,7 +258,7 @@ class SceneLibrary:
     Attributes:
         town: name of the town in which the scenes take place.
         scenes: scenes by name.
-        places: position in the file of each key that the file gives, for error messages.
+        places: line and column in the YAML file of each key that occurs there, for error messages.
     """
 
     town: str

@@ -35,7 +35,7 @@ if that is more. In one sample a face may show a patch, its neutral texture, whi
 """
 
 _OUT_OF_SIGHT_M = -1e5
-"""Height to which geoms are moved that no camera shall see, metres."""
+"""Height in metres to which geoms are moved that must not be visible to any camera."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -43,7 +43,8 @@ class PlacedStage:
     """One sample, ready to be rendered and measured.
 
     Attributes:
-        stage: what a renderer needs. Its `data` belongs to the world and is valid until the next call of `place`.
+        stage: the posed world, the input of a renderer. Its `data` belongs to the world and is valid until the next
+            call of `place`.
         geoms: label, object and surface of each geom of the render model.
         objects: countable objects by object id.
     """
@@ -69,7 +70,7 @@ class World:
 
     Attributes:
         library: the town's MJCF file and the folders of its assets.
-        scene_name, scene, weather: what the world was built for.
+        scene_name, scene, weather: the scene with its name, and the weather, for which the world was compiled.
         model: the render model: visible geoms, actors as mocap bodies.
         placement_model: the placement model: collision geoms, actors as free bodies with the same names.
         classes: labels of the render model's geoms.
@@ -119,7 +120,7 @@ class World:
 
     @staticmethod
     def of(plan: WorldPlan, scene_name: str, compiled: CompiledWorld) -> World:
-        """Makes a world from compiled models: measures its actors and faces, and reads its lanes.
+        """Makes a world from compiled models: measures actors and faces, and reads the lanes.
 
         Args:
             plan: the plan from which the models were compiled.
@@ -151,7 +152,7 @@ class World:
 
     @property
     def shapes(self) -> dict[str, Shape]:
-        """Visible triangles of the pool's assets, by the asset's name."""
+        """The visible triangles of each asset in the pool of actors, by the asset's name."""
         return {name: actor_type.shape for name, actor_type in self.types.items()}
 
     @property
@@ -161,11 +162,13 @@ class World:
 
     @property
     def town_name(self) -> str:
-        """Name of the town, as in records."""
+        """Name of the town, as it is written into scene records."""
         return self.library.town_name
 
     def surface_records(self, carrier_id: int | None = None) -> tuple[SurfaceRecord, ...]:
-        """The faces as records; `carrier_id` is the id of the actor that carries them in a scene with a truck."""
+        """The records of all faces that can show patches. `carrier_id` is the id of the actor that carries the faces in
+        a scene with a truck, otherwise None.
+        """
         return tuple(face.record(carrier_id) for face in self.faces)
 
     def place(self, record: SceneRecord, surfaces: SurfaceAlbedos | None = None) -> PlacedStage:
@@ -173,7 +176,8 @@ class World:
 
         Args:
             record: a sample of this world's town and scene.
-            surfaces: what each surface shows, by its name; surfaces that are missing show their neutral texture.
+            surfaces: patch or colour of each surface, by the surface's name; surfaces that are missing get their
+                neutral texture.
 
         Raises:
             PlacementError: the record has more actors of an asset than this world.
@@ -207,11 +211,13 @@ class World:
         )
 
     def with_surfaces(self, placed: PlacedStage, surfaces: SurfaceAlbedos) -> Stage:
-        """The sample that was placed last, with other textures on its faces; no actor is moved.
+        """Replaces the textures on the faces of the sample that was placed last, without moving actors. Returns the
+        stage, the input of a renderer.
 
         Args:
             placed: result of the last `place`.
-            surfaces: as for `place`.
+            surfaces: patch or colour of each surface, by the surface's name; surfaces that are missing get their
+                neutral texture.
 
         Raises:
             ValueError: `surfaces` contains a name that no surface has.
@@ -220,8 +226,8 @@ class World:
 
     @contextmanager
     def without_ground(self, placed: PlacedStage) -> Iterator[Stage]:
-        """Context with the sample that was placed last, with neutral faces and without its ground, so that it can be
-        seen from below.
+        """Context with a stage of the sample that was placed last, without its ground and with neutral faces. A camera
+        below the ground then sees the scene.
 
         Args:
             placed: result of the last `place`.

@@ -55,10 +55,12 @@ _ABANDONED_S = 3600.0
 def load_or_compile(
     *, town: str | Path, scene_name: str, scene: SceneSpec, weather: Weather, cache_dir: Path | None = None
 ) -> World:
-    """Loads a world from the cache. If the cache does not contain the world, it is compiled and added.
+    """Loads a world from the cache. If the cache does not contain the world, it is compiled and, unless the town is
+    small, added.
 
     Args:
-        town, scene_name, scene, weather: as for `World.build`.
+        town, scene_name, scene, weather: name or MJCF path of the town, name of the scene in records, the scene, and
+            the weather.
         cache_dir: folder of the cache; None for `gear/worlds` in the user's cache folder.
 
     Raises:

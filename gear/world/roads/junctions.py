@@ -9,12 +9,12 @@ from gear.world.roads.lanes import LaneGraph
 from gear.world.roads.routes import Route
 
 CLEARANCE_M = 2.4
-"""Lanes are in conflict if their centre lines come nearer to each other than this, metres."""
+"""Two lanes are in conflict if the distance between their centre lines falls below this value, metres."""
 
 
 class Junctions:
-    """Conflicts between the junction lanes of a town. Each pair of lanes is measured at the first query and then
-    remembered.
+    """Conflicts between the junction lanes of a town. Each pair of lanes is measured at its first query; the result is
+    cached.
     """
 
     def __init__(self, graph: LaneGraph) -> None:
@@ -24,8 +24,8 @@ class Junctions:
         self._points: dict[str, Array] = {}
 
     def crossings(self, route: Route) -> list[tuple[str, float, float]]:
-        """The junction lanes of a route: the name of each lane, and the arc lengths on the route where it starts
-        and ends.
+        """The junction lanes of a route, each as (name, start, end). Start and end are arc lengths on the route in
+        metres.
         """
         ends_m = (*route.starts_m[1:], route.line.length_m)
         return [
@@ -35,7 +35,7 @@ class Junctions:
         ]
 
     def conflict(self, first: str, second: str) -> bool:
-        """Whether two lanes come nearer than `CLEARANCE_M` to each other.
+        """Whether two lanes, given by name, are in conflict: they come nearer to each other than `CLEARANCE_M`.
 
         Lanes that branch off the same lane are never in conflict, because their vehicles follow each other.
         """

@@ -24,15 +24,15 @@ _KINDS = ("lane", "sidewalk", "crosswalk", "parking", "town")
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Lane:
-    """One lane.
+    """One lane of a town's road network.
 
     Attributes:
         name: name of its custom field, `lane.…`.
-        width_m: width.
+        width_m: width of the lane.
         speed_mps: usual speed.
         line: centre line in the direction of travel.
         next: names of the lanes that continue it; empty at the end of a road.
-        left, right: name of the neighbouring lane in the same direction, or "".
+        left, right: names of the neighbouring lanes in the same direction; "" for no such lane.
         is_junction: whether the lane lies inside a junction.
     """
 
@@ -52,7 +52,7 @@ class Walk:
 
     Attributes:
         name: name of its custom field, `sidewalk.…` or `crosswalk.…`.
-        width_m: width.
+        width_m: width of the walk.
         line: centre line.
         is_crossing: whether it is a crosswalk.
     """
@@ -69,8 +69,8 @@ class ParkingBay:
 
     Attributes:
         name: name of its row of bays, and its number in the row.
-        length_m, width_m: size.
-        position_m: its middle on the ground, world coordinates.
+        length_m, width_m: size of the bay.
+        position_m: middle of the bay on the ground, world coordinates.
         yaw_rad: heading of a parked car, counter-clockwise from east.
     """
 
@@ -169,7 +169,7 @@ class LaneGraph:
         return min(heights_m + [bay.position_m[2] for bay in self.bays])
 
     def project(self, position_m: Array) -> LanePoint:
-        """The point on any lane that is nearest to a position (3,) in world coordinates.
+        """Finds the point on the lanes that is nearest to a position (3,) in world coordinates.
 
         The distance is measured in 3D, so a lane on a bridge is far from a car below it.
         """

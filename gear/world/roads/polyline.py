@@ -1,4 +1,4 @@
-"""Polylines in world coordinates on which positions are given by arc length."""
+"""Polylines in world coordinates, with positions on them by arc length."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Polyline:
 
     @staticmethod
     def through(points_m: Array) -> Polyline:
-        """The polyline through (N, 3) points in metres."""
+        """Makes the polyline through (N, 3) points in metres."""
         steps_m = np.linalg.norm(np.diff(points_m[:, :2], axis=0), axis=1)
         return Polyline(frozen(points_m), frozen(np.concatenate([[0.0], np.cumsum(steps_m)])))
 
@@ -57,7 +57,7 @@ class Polyline:
     def heading(self, s_m: float, reach_m: float) -> float:
         """Mean heading in radians from `reach_m` metres before an arc length to `reach_m` metres after it.
 
-        It changes steadily around a corner, unlike the heading of a segment.
+        The mean heading changes steadily around a corner, unlike the heading of a segment.
         """
         steps = np.diff(self.points_m[:, :2], axis=0)
         headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
@@ -66,7 +66,9 @@ class Polyline:
         return float(headings @ np.clip(within_m, 0.0, None) / (2 * reach_m))
 
     def sample(self, s_m: Array, lateral_m: float = 0.0) -> tuple[Array, Array]:
-        """The same as `at` for several arc lengths (N,): (N, 3) points in metres and (N,) headings in radians."""
+        """The points beside the line at several arc lengths (N,), and the headings there: (N, 3) points in metres and
+        (N,) headings in radians.
+        """
         index = np.clip(np.searchsorted(self.s_m, s_m, side="right") - 1, 0, len(self.s_m) - 2)
         steps = self.points_m[index + 1] - self.points_m[index]
         lengths_m = np.hypot(steps[:, 0], steps[:, 1])
@@ -75,7 +77,7 @@ class Polyline:
         return points, np.arctan2(steps[:, 1], steps[:, 0])
 
     def project(self, position_m: Array) -> tuple[float, float, float]:
-        """The position on the line that is nearest to a point (3,) in world coordinates.
+        """Finds the position on the line that is nearest to a point (3,) in world coordinates.
 
         Returns:
             Arc length, distance of the point to the left of the line, and 3D distance; all in metres.

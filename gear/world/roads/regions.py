@@ -1,4 +1,6 @@
-"""The limits of a scene as regions of the ground, and the pieces of lanes and walks inside them."""
+"""Regions of the ground that represent the limits of a scene, and the pieces of lanes and walks inside such a
+region.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,7 @@ TABLE_STEP_M = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Region:
-    """A region relative to a board, relative to the ego car, or the intersection of both.
+    """A region of the ground: relative to a board, relative to the ego car, or the intersection of two such regions.
 
     Attributes:
         board: the board in whose frame `ahead_m` and `lateral_m` are given; None for no such limits.
@@ -36,7 +38,7 @@ class Region:
     centre_m: tuple[float, float] = (0.0, 0.0)
 
     def holds(self, xy_m: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """(N,) bool: which of (N, 2) points in world coordinates lie inside."""
+        """Tests which of (N, 2) points in world coordinates lie inside the region: (N,) bool."""
         places = np.atleast_2d(np.asarray(xy_m, dtype=np.float64))
         inside = np.ones(len(places), bool)
         if self.board is not None:
@@ -54,7 +56,7 @@ class Region:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineTable:
-    """Lines that are cut into pieces of about a metre, from which positions are drawn.
+    """Lanes or walks that are cut into N pieces of about a metre; positions are drawn at random from the pieces.
 
     Attributes:
         names: (N,) name of the line to which each piece belongs.
@@ -87,18 +89,19 @@ class LineTable:
         return LineTable(tuple(names), table[:, 0], table[:, 1], table[:, 2:5], table[:, 5])
 
     def inside(self, region: Region) -> npt.NDArray[np.intp]:
-        """(M,) indices of the pieces whose middle lies inside a region."""
+        """The (M,) indices of the pieces whose middle lies inside a region."""
         return np.flatnonzero(region.holds(self.points_m[:, :2])) if self.names else np.zeros(0, np.intp)
 
     def draw(self, pieces: npt.NDArray[np.intp], rng: np.random.Generator) -> tuple[str, float]:
-        """Draws a position on the given pieces; probabilities follow from their weights and lengths.
+        """Draws a random position on the given pieces. The probability of a piece is proportional to its weight times
+        its length.
 
         Args:
             pieces: (M,) indices of pieces; at least one.
             rng: random generator.
 
         Returns:
-            Name of the line, and arc length on it.
+            Name of the line, and arc length on this line.
         """
         shares = np.cumsum(self.weight[pieces] * self.length_m[pieces])
         piece = int(pieces[min(int(np.searchsorted(shares, rng.random() * shares[-1])), len(pieces) - 1)])

@@ -12,12 +12,12 @@ from gear.world.roads.lanes import LaneGraph
 from gear.world.roads.polyline import Polyline
 
 HALF_WHEELBASE_SHARE = 0.6
-"""Distance from a vehicle's middle to an axle, as a share of half its length. The heading is the direction from
-its rear axle to its front axle, which both lie on the line.
+"""Distance from a vehicle's middle to an axle, as a share of half its length. The heading of a vehicle is the direction
+from the rear axle to the front axle; the two axles lie on the line.
 """
 
 PACE_M = 0.25
-"""Distance before and after a position over which the speed at that position is measured, metres."""
+"""Distance before and after a position, metres, over which `moving_pose` measures how far the vehicle moves."""
 
 BRAKING_WAY_M = 15.0
 """Distance ahead up to which drivers obey the speed limits of lanes, metres."""
@@ -32,7 +32,7 @@ class Route:
         starts_m: arc length on the route at which each lane starts.
         speeds_mps: usual speed on each lane.
         line: joint centre line of all lanes.
-        is_dead_end: whether no lane continues the last one.
+        is_dead_end: whether no lane continues the last lane.
     """
 
     lanes: tuple[str, ...]
@@ -43,7 +43,7 @@ class Route:
 
     @staticmethod
     def along(graph: LaneGraph, lanes: tuple[str, ...]) -> Route:
-        """The route along the given lanes; each lane must continue the previous one."""
+        """Makes the route along the given lanes; each lane must continue the previous lane."""
         points: list[Array] = []
         firsts: list[int] = []
         for name in lanes:
@@ -70,8 +70,8 @@ class Route:
 
 
 def extend_route(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Generator) -> tuple[str, ...]:
-    """Names of the lanes of a route that starts with `lane`; it is at least `length_m` long unless the road ends
-    before.
+    """Draws a random route that starts with `lane`, and returns the names of its lanes. The route is at least
+    `length_m` long unless the road ends before.
 
     At each branch the next lane is drawn at random.
     """
@@ -97,8 +97,8 @@ def trace_back(
         rng: random generator.
 
     Returns:
-        Names of the lanes from the new position to the old one, and the arc length of the new position on the first of
-        them; None if the road starts less than `distance_m` before the position.
+        Names of the lanes from the new position to the old position, and the arc length of the new position on the
+        first lane; None if the road starts less than `distance_m` before the position.
     """
     names = [lane]
     s_m -= distance_m
@@ -112,7 +112,7 @@ def trace_back(
 
 
 def vehicle_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: float = 0.0) -> tuple[Array, float]:
-    """Pose of a vehicle on a line.
+    """The position and heading of a vehicle on a line.
 
     Args:
         line: centre line of its lane or route.
@@ -139,14 +139,15 @@ def offset_left(point_m: Array, yaw_rad: float, lateral_m: float) -> Array:
 
 
 def moving_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: float = 0.0) -> tuple[Array, float, float]:
-    """Pose of a vehicle that moves along a line.
+    """The position and heading of a vehicle that moves along a line, and its motion per metre of the line.
 
     Args:
-        line, s_m, half_length_m, lateral_m: as for `vehicle_pose`.
+        line, s_m, half_length_m, lateral_m: centre line, arc length of the vehicle's middle, half of its length, and
+            distance to the left of the line.
 
     Returns:
-        Point and heading as `vehicle_pose` returns them, and the distance that the vehicle's middle moves per metre of
-        the line: less than 1 on the inside of a turn.
+        (3,) point under the vehicle's middle in metres, heading in radians counter-clockwise from east, and the
+        distance that the middle moves per metre of the line. This distance is less than 1 on the inside of a turn.
     """
 
     def at(place_m: float) -> tuple[Array, float]:

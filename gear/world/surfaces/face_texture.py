@@ -1,4 +1,4 @@
-"""Resamples a patch of any size to the one size that all face textures have.
+"""Resamples a patch of any size to the size that the textures of all faces have.
 
 Resampling averages areas in linear light. It is linear and treats rows and columns separately, so two small matrices
 suffice: `face = rows @ patch @ columns.T` for each channel, with `rows = box_matrix(h, 600)` and `columns =
@@ -22,10 +22,14 @@ FACE_SIZE_PX = (1200, 600)
 """Width and height of the texture of every face."""
 
 SurfaceAlbedo = Literal["none", "white", "black"] | UInt8Image
-"""What a surface shows: "none" for its neutral texture, albedo 1, albedo 0, or a patch as (h, w, 3) uint8 sRGB."""
+"""The picture on a surface: "none" (its neutral texture), "white" (albedo 1), "black" (albedo 0), or a patch as (h, w,
+3) uint8 sRGB.
+"""
 
 SurfaceAlbedos = Mapping[str, SurfaceAlbedo]
-"""What each surface shows, by the surface's name. Surfaces that are missing here show their neutral texture."""
+"""The picture on each surface, by the surface's name. Surfaces that are missing in the mapping have their neutral
+texture.
+"""
 
 
 @lru_cache(maxsize=64)
@@ -40,7 +44,7 @@ def box_matrix(source_px: int, target_px: int) -> Array:
         target_px: number of pixels after resampling.
 
     Returns:
-        (target_px, source_px) float64, rows sum to 1, read-only.
+        (target_px, source_px) float64 matrix, read-only; each row sums to 1.
     """
     edges = np.arange(target_px + 1, dtype=np.float64) * source_px / target_px
     source = np.arange(source_px, dtype=np.float64)
@@ -74,7 +78,7 @@ def resample_linear(linear: npt.ArrayLike, size_px: tuple[int, int] = FACE_SIZE_
         size_px: width and height of the result.
 
     Returns:
-        (size_px[1], size_px[0], 3) float64; a linear function of the input.
+        (size_px[1], size_px[0], 3) float64 linear light, a linear function of the input.
     """
     image = np.asarray(linear, dtype=np.float64)
     rows, columns = box_matrix(image.shape[0], size_px[1]), box_matrix(image.shape[1], size_px[0])
@@ -107,7 +111,7 @@ def face_from_patch(patch: UInt8Image, size_px: tuple[int, int] = FACE_SIZE_PX) 
 
 
 def uniform_face(value: int, size_px: tuple[int, int] = FACE_SIZE_PX) -> UInt8Image:
-    """A texture of one grey: (size_px[1], size_px[0], 3) uint8, all equal to the sRGB byte `value`, read-only."""
+    """A texture of one grey: (size_px[1], size_px[0], 3) uint8, read-only; all values equal the sRGB byte `value`."""
     face = np.full((size_px[1], size_px[0], 3), value, np.uint8)
     face.setflags(write=False)
     return face

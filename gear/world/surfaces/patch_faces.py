@@ -29,14 +29,14 @@ class Face:
 
     Attributes:
         name: `surface_0`, `surface_1`, …, in patch order.
-        asset: name of the MJCF file from which it comes, without suffix.
-        is_carried: whether an actor carries it.
-        geom_id: its geom in the render model.
+        asset: name of the MJCF file that contains the face, without suffix.
+        is_carried: whether an actor carries the face.
+        geom_id: id of the face's geom in the render model.
         parent_from_surface: pose of its surface frame in world coordinates, or in the frame of the actor that carries
-            it. The frame's origin is the middle of the face; as a viewer sees it, x points right, y down and z into the
-            board.
-        width_m, height_m: size.
-        neutral: (H, W, 3) uint8 sRGB texture without a patch.
+            it. The frame's origin is the middle of the face; for a viewer in front of the face, x points right, y down
+            and z into the board.
+        width_m, height_m: size of the face.
+        neutral: (H, W, 3) uint8 sRGB texture of the face without a patch.
     """
 
     name: str
@@ -49,7 +49,9 @@ class Face:
     neutral: UInt8Image
 
     def record(self, carrier_id: int | None) -> SurfaceRecord:
-        """The face as a record; `carrier_id` is the id of the actor that carries it, None for a board."""
+        """The record of the face for the sample's JSON file. `carrier_id` is the id of the actor that carries the face,
+        None for a board.
+        """
         return SurfaceRecord(
             name=self.name,
             asset=self.asset,
@@ -60,7 +62,9 @@ class Face:
         )
 
     def texture(self, albedo: SurfaceAlbedo) -> UInt8Image:
-        """The (H, W, 3) uint8 sRGB texture with which the face shows `albedo`."""
+        """The (H, W, 3) uint8 sRGB texture of the face for `albedo`: its neutral texture, white, black, or a resampled
+        patch.
+        """
         if not isinstance(albedo, str):
             return face_from_patch(albedo)
         if albedo == "none":

@@ -17,7 +17,7 @@ def check_scene_assets(library: AssetLibrary, scene: SceneSpec, key: str) -> Non
 
     Raises:
         UnknownNameError: the town has no such board or truck.
-        ConfigError: the same; raised if the place in the file that names the asset is known.
+        ConfigError: the town has no such board or truck, and the line of the scene file that names it is known.
     """
     for number, board in enumerate(scene.boards):
         with located_errors(board.places, "asset", f"{key}.boards[{number}]"):

@@ -12,9 +12,8 @@ UV_TOLERANCE = 0.01
 """Largest difference between a corner's texture coordinates and the expected ones, as a share of the face's sides."""
 
 _BOX_TEXTURE = ((1, -2), (0, -2), (0, -1))
-"""Axes of the box along which u and v increase, on the sides that face along x, y and z; a minus sign means
-against the axis. All renderers use the same axes on opposite sides, so one side of each pair shows a mirrored
-texture.
+"""Axes of the box along which u and v increase, on the sides that face along x, y and z; a minus sign reverses the
+axis. All renderers use the same axes on opposite sides, so one side of each pair shows a mirrored texture.
 """
 
 

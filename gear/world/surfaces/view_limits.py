@@ -1,4 +1,4 @@
-"""Checks that the reference camera sees the faces well enough."""
+"""Checks that the faces, which show patches, are well visible to the reference camera (the first camera of the rig)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PICTURE_MARGIN = 0.06
 """Smallest distance of a face's middle from the border of the picture, as a share of the picture's width and height."""
 
 GRID = (5, 3)
-"""Numbers of columns and rows of points on a face to which lines of sight are tested."""
+"""Numbers of columns and rows of points on a face for which lines of sight are tested."""
 STAND_OFF_M = 0.2
 """Lines of sight end this far in front of a face, metres, so that they do not hit its own board."""
 
@@ -44,7 +44,7 @@ class FaceInWorld:
 
     @staticmethod
     def of(face: Face, world_from_surface: RigidTransform) -> FaceInWorld:
-        """The face in world coordinates for a pose of its surface frame."""
+        """Converts a face to world coordinates, for a given pose of its surface frame."""
         u, v = np.meshgrid((np.arange(GRID[0]) + 0.5) / GRID[0] - 0.5, (np.arange(GRID[1]) + 0.5) / GRID[1] - 0.5)
         local_m = np.stack([u * face.width_m, v * face.height_m, np.full(u.shape, -STAND_OFF_M)], axis=-1)
         return FaceInWorld(
@@ -56,11 +56,11 @@ class FaceInWorld:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ViewLimits:
-    """How the reference camera must see each face.
+    """Limits for the visibility of each face to the reference camera.
 
     Attributes:
         max_incidence_deg: largest angle between the face's normal and the direction to the camera.
-        min_free: share of the face that the town and its boards must not hide.
+        min_free: smallest share of the face that the town and its boards must leave visible.
     """
 
     max_incidence_deg: float = TRUCK_MAX_INCIDENCE_DEG
@@ -69,7 +69,7 @@ class ViewLimits:
     def judge(
         self, space: PlacementSpace, faces: Sequence[FaceInWorld], mount: CameraMount, camera: CameraRecord
     ) -> Verdict:
-        """Tests the limits, cheap ones first.
+        """Tests whether all faces are well visible to a camera; cheap tests come first.
 
         Args:
             space: the placement model, for lines of sight.
@@ -78,7 +78,7 @@ class ViewLimits:
             camera: the camera's pose in world coordinates.
 
         Returns:
-            The first limit that a face breaks, or `seen`.
+            The first limit that a face breaks (`out of the picture`, `too oblique` or `hidden`), or `seen`.
         """
         world_from_camera = camera.world_from_camera_transform
         eye_m = world_from_camera.translation_m
@@ -102,5 +102,5 @@ class ViewLimits:
 
 
 def reference_camera(rig: Rig, world_from_ego: RigidTransform) -> tuple[CameraMount, CameraRecord]:
-    """The first camera of a rig, and its world pose for a pose of the ego car."""
+    """The reference camera (the first camera of a rig), and its record for a world pose of the ego car."""
     return rig.cameras[0], rig.place(world_from_ego)[0]

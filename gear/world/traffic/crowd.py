@@ -18,7 +18,7 @@ from gear.world.traffic.footprints import Footprint
 from gear.world.traffic.spawn import FreeSlots, Spawn, Spawner
 
 TRIES = 40
-"""Number of places that are drawn for one road user in a round before it is left out."""
+"""Number of random positions that are tested for one road user in a round, before the road user is left out."""
 
 ROUNDS = 5
 """Number of rounds of drawing. After each round, road users that overlap are removed; the next round replaces them."""
@@ -28,12 +28,14 @@ PERSON_GAP_M = (0.35, 0.35)
 """Smallest gaps between a person and all other road users, metres: in front and behind, and to the sides."""
 
 UPRIGHT = 0.9
-"""Smallest z component of an actor's z axis. If it is smaller, the actor has fallen over, or its wheels are on
+"""Smallest z component of an actor's z axis. With a smaller value, the actor has fallen over, or its wheels are on
 different levels.
 """
 
 SLIP_M = 0.5
-"""An actor that moves farther than this while it settles has slid off its place, metres."""
+"""Largest distance in metres that an actor may move while it settles on the ground; beyond it, the actor has
+slid away.
+"""
 
 
 @dataclass(eq=False, kw_only=True)
@@ -41,14 +43,15 @@ class RoadUsers:
     """The road users of one sample while it is being drawn, by the names of their bodies in the placement model.
 
     Attributes:
-        spawns: the road users by body: the ego car first, then the carrier if there is one, then the others in the
+        spawns: the road users by body: the ego car, the carrier of the patch if there is one, then all others in the
             order in which they were drawn.
         poses: their poses in world coordinates, by body.
         keep_out: areas in which no other road user may be.
-        free: the slots of the pool that are still free.
+        free: the slots of the pool of actors that are not used yet.
         protected: bodies of the ego car and the carrier, which are never removed.
-        required_lanes: lanes that the ego car must follow from its start, by its body.
-        drive_m: distance from the ego car's start to the end of its limits; 0 if it stands or has no limits.
+        required_lanes: lanes that the ego car must follow from its start, by the name of its body.
+        drive_m: distance in metres from the ego car's start to the end of its limits; 0 if the ego car stands or has no
+            limits.
     """
 
     spawns: dict[str, Spawn]
@@ -60,13 +63,13 @@ class RoadUsers:
     drive_m: float = 0.0
 
     def drop(self, body: str) -> None:
-        """Removes a road user and frees its slot."""
+        """Removes a road user, so that its entry in the pool of actors is free again."""
         spawn = self.spawns.pop(body)
         self.poses.pop(body, None)
         self.free.release(spawn.actor_type.facts.name, body)
 
     def count(self, *, people: bool) -> int:
-        """Number of people, or of vehicles, not counting the ego car and the carrier."""
+        """The number of people (`people` true) or of vehicles, without the ego car and the carrier of the patch."""
         return sum(
             (spawn.walk is not None) == people for body, spawn in self.spawns.items() if body not in self.protected
         )
@@ -83,12 +86,12 @@ class _Draw:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Crowd:
-    """Draws the road users around the ego car.
+    """Draws the other road users around the ego car at random.
 
     Attributes:
         scene_name, scene: the scene, which sets the limits, and its name.
         types: the assets of the pool by name.
-        spawner: draws places.
+        spawner: draws positions.
         space: the placement model, for overlaps.
     """
 
@@ -239,7 +242,9 @@ def _distance_m(first: RigidTransform, second: RigidTransform) -> float:
 
 
 def region_of(limits: NpcLimits, boards: Sequence[BoardSpec], centre_m: tuple[float, float]) -> Region:
-    """The region that limits describe, relative to the first board and to a centre (x, y) in world coordinates."""
+    """The region of the ground in which limits allow road users, relative to the first board and to `centre_m` (x, y in
+    world coordinates).
+    """
     return Region(
         board=boards[0] if boards and limits.needs_board else None,
         ahead_m=limits.ahead_m,
@@ -264,7 +269,9 @@ class OcclusionTest:
     min_free: float
 
     def occluders(self, space: PlacementSpace, poses: Mapping[str, RigidTransform]) -> set[str]:
-        """Bodies of the actors that hide a face, if together they hide more of it than allowed."""
+        """The names of the actors' bodies that hide a face, for faces of which actors together hide more than
+        allowed.
+        """
         found: set[str] = set()
         for grid_m in self.grids_m:
             occluders = space.occluders(self.eye_m, grid_m, poses)

@@ -1,6 +1,6 @@
-"""Draws the ego car of a sample, and the truck in front of it if the scene has one.
+"""Draws the ego car of a sample at random, and the truck in front of it if the scene has one.
 
-All other road users are placed around them afterwards (`gear.world.traffic.crowd`).
+All other road users are placed around the ego car afterwards (`gear.world.traffic.crowd`).
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ from gear.world.traffic.spawn import FreeSlots, Spawn, Spawner
 EGO_TRIES = 60
 LONGEST_WAY_M = 40.0
 USUAL_MPS = 5.0
-"""Speed that limits how far before its limits a driving ego car starts: at most the distance that it drives at
-this speed, and at most `LONGEST_WAY_M`. m/s.
+"""Speed in m/s from which the start of a driving ego car is computed. The car starts before its limits by at most the
+distance that it drives at this speed, and by at most `LONGEST_WAY_M`.
 """
 
 CAMERA_ADVICE = (
     "a level camera with a field of view of 90 degrees would have it in view: change options.pitch_deg,"
     " options.roll_deg, options.hfov_deg, options.focal_px, options.principal_px or options.position_m"
 )
-"""End of an error message: what to do if the camera's options, and not the scene's limits, keep the faces out of
-the picture.
+"""End of an error message: the advice for the case that the camera's options, and not the scene's limits, keep the
+faces out of the picture.
 """
 
 CORRIDOR_M = 1.3
@@ -52,7 +52,7 @@ CORRIDOR_M = 1.3
 
 @dataclass(eq=False, kw_only=True)
 class EgoSampler:
-    """Draws ego cars and carriers for one scene.
+    """Draws ego cars, and trucks that carry the patch, for one scene.
 
     Attributes:
         scene_name, scene: the scene, which sets the limits, and its name.
@@ -60,7 +60,7 @@ class EgoSampler:
         types: the assets of the pool by name.
         slots: the pool of actors.
         faces: the faces that show patches.
-        spawner: draws places.
+        spawner: draws positions.
         space: the placement model, for overlaps and lines of sight.
     """
 
@@ -74,15 +74,16 @@ class EgoSampler:
     space: PlacementSpace
 
     def draw(self, seed: int, sequence: int, duration_s: float = 0.0) -> RoadUsers:
-        """Draws the ego car, and the carrier if the scene has one.
+        """Draws the ego car, and the truck that carries the patch if the scene has one.
 
         Args:
             seed, sequence: numbers from which the random generators are seeded.
-            duration_s: length of the sequence in seconds, 0 for a single picture. In a sequence the ego car starts at
-                or before the start of its limits, sees the boards from there, and drives to the end of its limits.
+            duration_s: length of the sequence in seconds, 0 for a single picture. In a sequence, the ego car starts at
+                or before the start of its limits, from where the boards are visible, and drives to the end of its
+                limits.
 
         Raises:
-            PlacementError: no drawn place keeps the limits; the message names the limit that is too tight.
+            PlacementError: no drawn position is within the limits; the message names the limit that is too tight.
         """
         problems: Counter[str] = Counter()
         camera_is_cause = 0
@@ -101,14 +102,14 @@ class EgoSampler:
         raise PlacementError(self.scene_name, f"no place for the ego car in {EGO_TRIES} tries ({found}); {advice}")
 
     def empty(self) -> RoadUsers:
-        """An object without road users, in which the whole pool is free."""
+        """An object without road users, in which all entries of the pool of actors are free."""
         return RoadUsers(spawns={}, poses={}, keep_out=[], free=FreeSlots.of(self.slots))
 
     def enter(self, road_users: RoadUsers, spawns: Sequence[Spawn]) -> str | None:
-        """Places the ego car and the carrier on the ground.
+        """Places the ego car and the carrier of the patch on the ground, and adds them to `road_users`.
 
         Returns:
-            What is wrong with their places; None if nothing is.
+            The reason why a position is not valid; None if all positions are valid.
         """
         for spawn in spawns:
             grounded = self.space.ground_pose(spawn.actor_type, spawn.x_m, spawn.y_m, spawn.near_z_m, spawn.yaw_rad)
@@ -127,11 +128,12 @@ class EgoSampler:
         return None
 
     def judge(self, road_users: RoadUsers, rig: Rig | None = None) -> Verdict:
-        """The verdict of `ViewLimits.judge` for the reference camera of the ego car.
+        """Tests whether the faces are well visible to the reference camera of the ego car: `seen`, or the first limit
+        that a face breaks.
 
         Args:
             road_users: contains the ego car, and the carrier if there is one.
-            rig: cameras to use instead of the sampler's own; None for its own.
+            rig: cameras that replace the sampler's rig in this test; None for the sampler's rig.
         """
         ego = next(iter(road_users.spawns))
         mount, camera = reference_camera(
@@ -140,7 +142,7 @@ class EgoSampler:
         return self.limits.judge(self.space, self.faces_in_world(road_users), mount, camera)
 
     def faces_in_world(self, road_users: RoadUsers) -> list[FaceInWorld]:
-        """Every face in world coordinates: on its board, or on the carrier at its pose."""
+        """The faces in world coordinates, on boards or on the carrier at its pose."""
         placed = []
         for face in self.faces:
             frame = face.parent_from_surface
@@ -157,7 +159,7 @@ class EgoSampler:
 
     @cached_property
     def limits(self) -> ViewLimits:
-        """The limits within which the reference camera must see the faces."""
+        """The limits for the visibility of the faces to the reference camera."""
         if self.scene.ego is None:
             return ViewLimits()
         return ViewLimits(max_incidence_deg=self.scene.ego.max_incidence_deg, min_free=self.scene.ego.min_free)
@@ -213,7 +215,7 @@ class EgoSampler:
         return float(table.s_m[first]), float(table.s_m[last])
 
     def ego_on_lane(self, road_users: RoadUsers, lane: str, s_m: float, rng: np.random.Generator) -> Spawn:
-        """The ego car at arc length `s_m` on a lane, with a slot of the pool."""
+        """Draws the ego car at arc length `s_m` on a lane, and takes its entry from the pool of actors."""
         return self.spawner.on_lane(self.ego_type, road_users.free.take(EGO_ASSET), "ego", lane, s_m, rng)
 
     def _draw_behind_truck(self, road_users: RoadUsers, rng: np.random.Generator) -> list[Spawn] | str:
@@ -237,7 +239,8 @@ class EgoSampler:
         """(N,) indices of the pieces of lanes on which the ego car, or the truck, may be.
 
         Raises:
-            PlacementError: there are no such pieces; the message says why the pieces within the limits are excluded.
+            PlacementError: there are no such pieces; the message gives the reason why the pieces within the limits are
+                excluded.
         """
         table = self.spawner.lane_table
         ego = self.scene.ego

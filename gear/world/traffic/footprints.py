@@ -6,19 +6,19 @@ import math
 from dataclasses import dataclass
 
 LEVEL_M = 3.0
-"""Objects whose heights differ by more than this are on different levels of the town (a bridge and the road
-below it), metres.
+"""Height difference in metres above which two objects are on different levels of the town, such as a bridge and the
+road below.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """An oriented rectangle on the ground.
+    """The footprint of a road user: an oriented rectangle on the ground.
 
     Attributes:
-        x_m, y_m, z_m: its middle, world coordinates.
+        x_m, y_m, z_m: middle of the rectangle, world coordinates.
         yaw_rad: direction of its length, counter-clockwise from east.
-        half_length_m, half_width_m: half of its sides.
+        half_length_m, half_width_m: half of the rectangle's sides.
     """
 
     x_m: float
@@ -36,11 +36,13 @@ class Footprint:
 
     @property
     def radius_m(self) -> float:
-        """Radius of the smallest circle around its middle that contains it."""
+        """Radius in metres of the smallest circle around the rectangle's middle that contains the rectangle."""
         return math.hypot(self.half_length_m, self.half_width_m)
 
     def overlaps(self, other: Footprint) -> bool:
-        """Whether two rectangles on the same level have a common point (separating axis theorem)."""
+        """Whether this rectangle and `other` are on the same level and have a common point (separating axis
+        theorem).
+        """
         dx, dy = other.x_m - self.x_m, other.y_m - self.y_m
         if math.hypot(dx, dy) > self.radius_m + other.radius_m or abs(other.z_m - self.z_m) > LEVEL_M:
             return False

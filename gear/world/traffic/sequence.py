@@ -19,23 +19,25 @@ from gear.world.traffic.simulation import MovingPedestrian, MovingVehicle, Traff
 from gear.world.traffic.spawn import Spawn
 
 ROOM_M = 80.0
-"""Length of a vehicle's route beyond the longest distance that it can drive in the sequence, metres."""
+"""Extra length of a vehicle's route in metres, in addition to the longest distance that the vehicle can drive in the
+sequence.
+"""
 
 SLOWEST_MPS = 1.5
 """Smallest cruising speed of the ego car while it is within its limits, m/s."""
 
 OFF_THE_ROAD_M = 1.2
-"""People who leave a crosswalk walk this far onto the sidewalk; on a sidewalk they stop this far before its end.
-Metres.
+"""Distance in metres that people walk beyond the end of a crosswalk, onto the sidewalk. On a sidewalk, they stop this
+distance before its end.
 """
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FrameState:
-    """The road users in one frame.
+    """The road users in one frame of a sequence.
 
     Attributes:
-        spawns: the road users by body, with their places and speeds in this frame.
+        spawns: the road users by body, with their positions and speeds in this frame.
         poses: their poses in world coordinates, by body.
     """
 
@@ -62,11 +64,11 @@ class SequenceSimulator:
     def drive(
         self, road_users: RoadUsers, seed: int, sequence: int, frames: int, interval_s: float
     ) -> list[FrameState]:
-        """Simulates all frames of a sequence.
+        """Simulates all frames of a sequence and returns the state of the road users in each frame.
 
         If an actor overlaps another one during the simulation, it is removed and the sequence is simulated again, until
-        there is no overlap. The frames may therefore show fewer road users than the scene's smallest count, which only
-        holds for the start.
+        there is no overlap. The frames may therefore contain fewer road users than the scene's smallest count, which is
+        only guaranteed before the simulation.
 
         Args:
             road_users: the road users at the start; removed actors are removed from this object as well.

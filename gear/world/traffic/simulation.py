@@ -2,8 +2,8 @@
 
 The model is that of Treiber, Hennecke and Helbing, "Congested traffic states in empirical observations and microscopic
 simulations" (2000). Vehicles keep their distance to everything in the strip of road in front of them, give way where
-lanes of a junction are in conflict, and stop at the end of a road. Nothing is random: the same start gives the same
-traffic.
+lanes of a junction are in conflict, and stop at the end of a road. The simulation is deterministic: the same start
+gives the same traffic.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ STRIP_STEP_M = 1.0
 SIDE_MARGIN_M = 0.25
 PERSON_RADIUS_M = 0.35
 PERSON_REACH_M = 0.9
-"""A person takes a step if nothing is within this distance in front, metres."""
+"""A person takes a step if there is no obstacle within this distance in front, metres."""
 
 TURNING_M = 1.5
 """People turn at a corner of their line over this distance before and after it, multiplied by their distance
@@ -37,12 +37,14 @@ PERSON_FORESIGHT_S = (0.0, 0.7, 1.4)
 """Vehicles stay clear of people's current positions and of their positions after these times, seconds."""
 
 HARDEST_SLOWING = 2.5
-"""Upper bound of the model's speed term, so that a vehicle that is only too fast does not brake hard."""
+"""Upper bound of the speed term of the intelligent driver model. A vehicle above its cruising speed on a free road
+therefore brakes gently.
+"""
 
 ACCELERATION_MPS2, BRAKING_MPS2, HARDEST_MPS2 = 1.6, 2.0, 8.0
 STANDSTILL_GAP_M, HEADWAY_S = 2.0, 1.2
 GIVE_WAY_M = 25.0
-"""A vehicle that is nearer to a junction than this reserves its lane through it, metres."""
+"""Distance to a junction, metres, below which a vehicle reserves its lane through the junction."""
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
@@ -50,10 +52,10 @@ class MovingVehicle:
     """A vehicle in motion.
 
     Attributes:
-        route: the lanes that it follows.
+        route: the lanes that the vehicle follows.
         s_m, lateral_m: arc length of its middle on the route, and its distance to the left of the route.
         speed_mps: current speed.
-        cruise_mps: speed on a free road.
+        cruise_mps: desired speed on a free road.
         front_m, rear_m, half_width_m: distances of its front, rear and sides from its middle.
     """
 
@@ -75,7 +77,7 @@ class MovingPedestrian:
         line: centre line of the sidewalk or crosswalk.
         s_m, lateral_m: arc length on the line, and distance to the left of it.
         direction: 1 for walking along the line, -1 for walking against it.
-        pace_mps: walking speed if nothing is in the way.
+        pace_mps: walking speed without obstacles.
         speed_mps: current speed.
         beyond_m: how far the person walks past the end of the line; negative to stop before the end.
     """
@@ -95,14 +97,16 @@ class MovingPedestrian:
         return left_m < -self.beyond_m
 
     def place(self) -> tuple[Array, float]:
-        """(3,) point on the ground and heading in radians, for a person in motion."""
+        """The position of a person in motion: (3,) point on the ground and heading in radians, which changes steadily
+        around corners.
+        """
         heading_rad = self.line.heading(self.s_m, TURNING_M * max(1.0, abs(self.lateral_m)))
         point = offset_left(self.line.at(self.s_m)[0], heading_rad, self.lateral_m)
         return point, heading_rad if self.direction > 0 else heading_rad + math.pi
 
     def first_place(self) -> tuple[Array, float]:
-        """(3,) point on the ground and heading in radians, for a single picture: the heading is that of the
-        line's segment.
+        """The position of a person in a single picture: (3,) point on the ground and heading in radians. The heading is
+        that of the line's segment.
         """
         point, heading_rad = self.line.at(self.s_m, self.lateral_m)
         return point, heading_rad if self.direction > 0 else heading_rad + math.pi
@@ -116,7 +120,7 @@ class Discs:
         centres_m: (N, 3) middles of the discs, world coordinates.
         radii_m: (N,) radii.
         velocities_mps: (N, 2) velocities, m/s.
-        owners: (N,) index of the vehicle to which a disc belongs; -1 for objects that stand still, -2 for people.
+        owners: (N,) index of the vehicle to which a disc belongs; -1 for static objects, -2 for people.
     """
 
     centres_m: Array
@@ -128,7 +132,7 @@ class Discs:
 def vehicle_discs(
     point_m: Array, heading_rad: float, front_m: float, rear_m: float, half_width_m: float
 ) -> list[tuple[float, float, float, float]]:
-    """Discs that together cover a vehicle.
+    """Discs on the ground that together cover a vehicle.
 
     Args:
         point_m: (3,) point under its middle.
@@ -150,7 +154,7 @@ def vehicle_discs(
 
 
 class TrafficSimulation:
-    """The traffic of a sample: vehicles and people that move among obstacles which stand still."""
+    """Simulates the traffic of a sample: vehicles and people that move among static obstacles."""
 
     def __init__(
         self,
@@ -159,11 +163,11 @@ class TrafficSimulation:
         obstacles: Sequence[tuple[float, float, float, float]],
         junctions: Junctions,
     ) -> None:
-        """Prepares a simulation. Vehicles that are too fast to brake for what is in front of them are slowed down.
+        """Prepares a simulation. Vehicles that are too fast to brake in time for an obstacle in front are slowed down.
 
         Args:
             vehicles, people: the road users, changed in place.
-            obstacles: discs (x, y, z, radius) in metres that stand still.
+            obstacles: static obstacles as discs (x, y, z, radius) in metres.
             junctions: conflicts between the junction lanes of the town.
         """
         self.vehicles = list(vehicles)

@@ -1,6 +1,6 @@
 """Draws road users at random: asset, position on a lane, walk or parking bay, speed and colour.
 
-`gear.world.placement` puts them on the ground afterwards.
+`gear.world.placement` computes their poses on the ground afterwards.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ STANDING_SHARE = 0.2
 """Share of the vehicles on lanes outside junctions that stand still, as in a queue."""
 
 MOTORWAY_MPS = 20.0
-"""Vehicles that cannot drive this fast are not placed on lanes whose speed is at least this, m/s."""
+"""Speed of a lane in m/s from which the lane counts as a motorway. Vehicles that cannot reach this speed are not placed
+on a motorway.
+"""
 
 SIDE_CLEARANCE_M = 0.35
 """Smallest distance of people from the edge of a sidewalk, metres."""
@@ -42,8 +44,8 @@ class WalkPlace:
 
     Attributes:
         walk: name of the sidewalk or crosswalk.
-        s_m: arc length on its line.
-        lateral_m: distance to the left of its line.
+        s_m: arc length on the line of the walk.
+        lateral_m: distance to the left of the line.
         direction: 1 for walking along the line, -1 for walking against it.
     """
 
@@ -55,10 +57,10 @@ class WalkPlace:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Spawn:
-    """A road user as it was drawn.
+    """A road user that was drawn at random: asset, position, speed and colour.
 
     Attributes:
-        role: its role in the record.
+        role: role in the scene record, such as `ego` or `npc`.
         actor_type: its measured asset.
         body: name of its body in the placement model.
         x_m, y_m: position in world coordinates.
@@ -68,7 +70,7 @@ class Spawn:
         paint_rgb: linear albedo of its paint, 0..1; None for an asset without a palette.
         lane: name of the lane on which it drives; "" for people and parked vehicles.
         s_m, lateral_m: arc length on that lane, and distance to the left of it.
-        walk: its position on a sidewalk or crosswalk; None for vehicles.
+        walk: position on a sidewalk or crosswalk; None for vehicles.
     """
 
     role: Role
@@ -87,7 +89,7 @@ class Spawn:
 
     @property
     def footprint(self) -> Footprint:
-        """The rectangle on the ground that it covers."""
+        """The footprint of the road user: the rectangle on the ground that it covers."""
         actor_type = self.actor_type
         return Footprint(
             self.x_m, self.y_m, self.near_z_m, self.yaw_rad, actor_type.half_length_m, actor_type.half_width_m
@@ -96,7 +98,7 @@ class Spawn:
 
 @dataclass(slots=True, eq=False)
 class FreeSlots:
-    """The slots of the pool that are still free while a sample is being drawn.
+    """The free slots (unused entries) of the pool of actors while a sample is drawn.
 
     Attributes:
         bodies: bodies of the free slots, by the name of their asset.
@@ -106,7 +108,7 @@ class FreeSlots:
 
     @staticmethod
     def of(slots: Sequence[Slot]) -> FreeSlots:
-        """All slots of the pool except that of the carrier."""
+        """Makes an object in which all slots of the pool are free, except the slot of the carrier of the patch."""
         free = FreeSlots()
         for slot in slots:
             if not slot.carries_surface:
@@ -114,7 +116,7 @@ class FreeSlots:
         return free
 
     def take(self, asset: str) -> str:
-        """Takes a free slot of an asset and returns its body."""
+        """Takes a free slot of an asset, so that the slot is used, and returns the name of its body."""
         return self.bodies[asset].pop(0)
 
     def release(self, asset: str, body: str) -> None:
@@ -122,7 +124,9 @@ class FreeSlots:
         self.bodies[asset].append(body)
 
     def draw(self, types: Mapping[str, ActorType], rng: np.random.Generator, *, people: bool) -> ActorType | None:
-        """Draws an asset that has a free slot, by the weights of the assets; None if no slot is free."""
+        """Draws a random asset that has a free slot; probabilities are proportional to the weights of the assets. None
+        if no slot is free.
+        """
         kinds = [
             actor_type
             for name, actor_type in types.items()
@@ -135,7 +139,7 @@ class FreeSlots:
 
 
 def draw_paint(actor_type: ActorType, rng: np.random.Generator) -> Vec3 | None:
-    """Draws a colour from an asset's palette by its weights, as linear albedo; None for an asset without a palette."""
+    """Draws a random colour from an asset's palette, as linear albedo 0..1; None for an asset without a palette."""
     palette = actor_type.facts.palette
     total = sum(weight for _, weight in palette)
     if total <= 0:
@@ -145,7 +149,7 @@ def draw_paint(actor_type: ActorType, rng: np.random.Generator) -> Vec3 | None:
 
 
 class Spawner:
-    """Draws positions on the lanes, walks and parking bays of one town."""
+    """Draws road users at random positions on the lanes, walks and parking bays of one town."""
 
     def __init__(self, lanes: LaneGraph) -> None:
         """Cuts the lanes and walks of a town into pieces, from which positions are drawn."""
@@ -165,7 +169,7 @@ class Spawner:
         )
 
     def is_allowed_on(self, actor_type: ActorType, lane: str) -> bool:
-        """Whether a vehicle may use a lane: slow vehicles may not use lanes with the speed of a motorway."""
+        """Whether a vehicle may use a lane: vehicles slower than `MOTORWAY_MPS` may not use lanes of a motorway."""
         vehicle = actor_type.vehicle
         is_slow = vehicle is not None and vehicle.max_speed_mps < MOTORWAY_MPS
         return not is_slow or self.lanes.lanes[lane].speed_mps < MOTORWAY_MPS
@@ -181,12 +185,13 @@ class Spawner:
     ) -> Spawn:
         """Draws a vehicle at a position on a lane.
 
-        It is shifted a little from the centre line and turned a little, at random; two-wheelers keep to the right edge.
+        The vehicle is shifted from the centre line and turned by small random amounts; two-wheelers keep to the right
+        edge.
 
         Args:
             actor_type: asset of the vehicle.
             body: name of its body in the placement model.
-            role: its role in the record.
+            role: role in the scene record, such as `ego` or `npc`.
             lane, s_m: name of the lane, and arc length on it.
             rng: random generator.
         """
@@ -217,7 +222,7 @@ class Spawner:
         )
 
     def in_bay(self, actor_type: ActorType, body: str, bay: ParkingBay, rng: np.random.Generator) -> Spawn | None:
-        """Draws a parked vehicle in a bay; None if the bay is too small for it."""
+        """Draws a parked vehicle in a parking bay; None if the bay is too small for the vehicle."""
         spare_m = bay.length_m / 2 - actor_type.half_length_m, bay.width_m / 2 - actor_type.half_width_m
         if min(spare_m) < 0:
             return None

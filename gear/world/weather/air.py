@@ -36,7 +36,7 @@ RAIN_PER_M = 0.0035
 """Extinction coefficient of the veil of rain (the haze of distant drops) for 100 percent precipitation, 1/m."""
 
 RAIN_FROM_M, RAIN_FALLOFF = 0.75, 0.1
-"""Start distance (metres) and falloff of the veil of rain, as in the fog of CARLA's presets for rain."""
+"""Start distance (metres) and falloff of the veil of rain. They equal those of the fog in CARLA's presets for rain."""
 
 AEROSOL_PER_M = 1.6e-4
 """Extinction coefficient of clear air by aerosol, 1/m: a visibility of 24 km."""
@@ -45,7 +45,7 @@ MOLECULES_PER_M = (7.6e-6, 1.16e-5, 2.3e-5)
 """Extinction coefficients by Rayleigh scattering at 610, 550 and 465 nm (red, green, blue), at sea level, 1/m."""
 
 FALLOFF_PER_M = 0.0693
-"""Rate at which fog gets thinner with height for a falloff of 1, 1/m: it halves every ten metres, as in Unreal
+"""Rate at which fog gets thinner with height for a falloff of 1, 1/m: the density halves every ten metres, as in Unreal
 Engine.
 """
 
@@ -54,12 +54,12 @@ FULL_PUDDLES = 0.32
 """Share of open ground under water for `precipitation_deposits` of 100 percent."""
 
 DROP_LIGHT = 1.25
-"""Radiance of a rain drop relative to the horizon; it is brighter, because it refracts light of a large part of
-the sky.
+"""Radiance of a rain drop relative to the horizon; a drop is brighter, because it refracts light of a large part of the
+sky.
 """
 
 SHADE_SKY_FACE_PX = 8
-"""Side of the sky's cube faces in pixels if only the light is needed and not the picture of the sky."""
+"""Side in pixels of the sky's cube faces when only the light of the sky is computed, without a picture of the sky."""
 
 _MIRROR_ROWS, _MIRROR_COLUMNS = 128, 512
 
@@ -72,7 +72,7 @@ def camera_pipeline(
     night: Night | None = None,
     shapes: Mapping[str, Shape] | None = None,
 ) -> CameraPipeline:
-    """The camera pipeline for a renderer's frames of a town in one weather.
+    """Builds the camera pipeline, which converts a renderer's frames of a town in one weather to pictures.
 
     Args:
         weather: light and air.
@@ -80,7 +80,7 @@ def camera_pipeline(
         town: name of the town, which determines where its puddles are.
         effects: camera effects; None for none.
         night: lamps of the town at night; None by day.
-        shapes: triangles of the assets, which cast contact shadows; None for no contact shadows.
+        shapes: triangles of the assets, by name; they cast contact shadows; None for no contact shadows.
     """
     left = night.sky_level if night else 1.0
     mirrored = left * mirrored_radiance(weather, _MIRROR_ROWS, _MIRROR_COLUMNS)
@@ -114,7 +114,7 @@ def contact_shadows_of(weather: Weather, renderer_name: str, shapes: Mapping[str
 
 
 def even_share(weather: Weather, light: Lighting) -> float:
-    """Share of the light on open level ground that does not come from the sun directly, 0..1."""
+    """The share, 0..1, of the light on open level ground that does not come directly from the sun."""
     even = ambient_radiance(weather)[0].mean()
     sun = light.sun.mean() * max(light.towards_sun[2], 0) / math.pi
     return float(even / (even + sun))
@@ -126,8 +126,8 @@ def _shown(light: Floats, renderer_name: str) -> Floats:
 
 
 def air_of(weather: Weather, renderer_name: str, left: float = 1.0) -> Air:
-    """The air of a weather, in the units of a renderer's frames; `left` is the share of its light that is left
-    at night.
+    """The air of a weather (fog, haze and clear air), in the units of a renderer's frames. `left` is the share of the
+    air's light that remains at night; 1 by day.
     """
     aerosol = AEROSOL_PER_M * weather.mie_scattering_scale / 0.03
     molecules = np.array(MOLECULES_PER_M) * weather.rayleigh_scattering_scale / 0.0331
@@ -141,9 +141,9 @@ def air_of(weather: Weather, renderer_name: str, left: float = 1.0) -> Air:
 def fogs_of(weather: Weather) -> tuple[Fog, ...]:
     """The fog and the veil of rain of a weather; empty for clear air.
 
-    CARLA's fog density in percent runs from clear air to a thick fog. Start distance and falloff of the fog are those
-    of the weather; those of the veil of rain are as in CARLA's presets. If both have the same start and falloff, they
-    become one fog.
+    CARLA's fog density ranges from 0 percent (clear air) to 100 percent (thick fog). The fog has the start distance and
+    falloff of the weather, the veil of rain those of CARLA's presets. If these values are equal, the fog and the veil
+    are joined to one fog.
     """
     fog = DENSEST_FOG_PER_M * (weather.fog_density / 100) ** 1.5
     rain = RAIN_PER_M * math.pow(weather.precipitation / 100, 1.5)

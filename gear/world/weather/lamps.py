@@ -27,25 +27,25 @@ STREET_INTENSITY, GLOBE_INTENSITY = 24.0, 2.2
 STREET_COLOUR, GLOBE_COLOUR = (1.0, 0.80, 0.55), (1.0, 0.70, 0.38)
 STREET_REACH_M, GLOBE_REACH_M = 32.0, 18.0
 ONE_LAMP_M = 0.9
-"""Triangles of glass that are nearer to each other than this belong to one lamp, metres."""
+"""Distance in metres below which two triangles of glass belong to the same lamp."""
 
 DOWNWARD = 0.7
 """If the mean normal of a lamp's glass is longer than this, the lamp shines in one direction, as street lamps do."""
 
 STANDARD_AREA_M2 = 0.15
-"""Area of glass of a street lamp with the usual intensity, m². Intensity grows with the area, up to twice the
-usual one.
+"""Area of glass of a street lamp with the usual intensity, m². The intensity of a lamp is proportional to its area, up
+to twice the usual intensity.
 """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Glazing:
-    """The window panes in the texture of a material, and how they look when they are lit.
+    """The window panes in the texture of a material, and their appearance when they are lit.
 
     Attributes:
-        columns: number of panes in one unit of u; None for one pane in each quad.
+        columns: number of panes per unit of the texture coordinate u; None for one pane per quad.
         u, v: smallest and largest texture coordinates of the glass within a pane's cell, with v from the top.
-        lit: share of the panes that are lit.
+        lit: share of the panes that are lit at night.
         gain: factor on the frame's own light on a lit pane.
         light: light that a lit pane adds, as a share of full scale.
     """
@@ -67,7 +67,7 @@ GLAZINGS = {
         for name in ("far_facades", "far_facades_warm", "far_facades_dark")
     },
 }
-"""Window panes by the name of the material."""
+"""The window panes in textures, by the name of the material."""
 
 WARM, COOL = np.array([1.0, 0.78, 0.50]), np.array([0.80, 0.92, 1.0])
 

@@ -1,7 +1,7 @@
 """The light of a weather in the units of a linear frame. The exposure is fixed for each weather.
 
-It is chosen so that a white wall (albedo `WHITE_ALBEDO`) that faces the brightest direction gets `WHITE_LEVEL` of the
-frame's full scale.
+The exposure is chosen such that a white wall (albedo `WHITE_ALBEDO`) that faces the brightest direction gets
+`WHITE_LEVEL` of the frame's full scale.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ SKY_FACE_PX = 512
 STREET_FACE_PX = 128
 STREET_ALBEDO = np.array([0.30, 0.27, 0.23])
 STREET_TOP = 0.72
-"""Sine of the elevation up to which houses along a street reach."""
+"""Sine of the elevation angle of the tops of the houses along a street."""
 
 STREET_SHARE = 0.65
-"""Share of the sky below that elevation that houses hide."""
+"""Share of the sky below the tops of the houses (`STREET_TOP`) that houses hide."""
 
 STREET_SUNLIT = 0.45
 """Share of the visible surfaces in a street that the sun reaches."""
 
 BOUNCE_GAIN = 1.25
-"""Factor that stands for the light that streets and houses reflect to each other, which the renderers do not
-compute.
+"""Factor that represents the light that streets and houses reflect to each other; the renderers do not compute this
+light.
 """
 
 NIGHT_SKY_SHARE = 0.2
@@ -53,14 +53,14 @@ _INTEGRATION_PX = 16
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Lighting:
-    """Sun and sky in units of the frame, where a radiance of 1.0 is full scale.
+    """The light of sun and sky in units of the frame, where a radiance of 1.0 is full scale.
 
     Attributes:
         towards_sun: (3,) unit vector towards the sun, world axes.
         sun: (3,) irradiance of a surface that faces the sun, for each linear sRGB channel.
         ambient: (3,) irradiance of a level surface by the sky, divided by pi.
         sky_faces: (6 * size, size, 3) uint8 sRGB picture of the sky: the faces of a cube in `FACE_ORDER`.
-        street_faces: a smaller picture in the same form: the light that reaches a street from the sky and from its
+        street_faces: a smaller picture in the same form, of the light that reaches a street from the sky and from the
             houses.
     """
 
@@ -76,7 +76,9 @@ HORIZON_AZIMUTHS = 64
 
 
 def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting:
-    """Computes the light of a weather; `sky_face_px` is the size of a face of `Lighting.sky_faces`."""
+    """Computes the light of a weather; `sky_face_px` is the side in pixels of each cube face of
+    `Lighting.sky_faces`.
+    """
     sky = Sky.of(weather)
     exposure, from_above = _exposure(sky)
     shown = exposure * _looks(sky)
@@ -113,10 +115,10 @@ def mirrored_radiance(weather: Weather, rows: int, columns: int) -> Floats:
 
 
 def lamplit_houses(rows: int) -> Floats:
-    """(rows, 1, 3) radiance, in units of the frame, of houses in the light of lamps at night, as still water reflects
-    it.
+    """The radiance of houses in the light of lamps at night, which still water reflects: (rows, 1, 3), in units of the
+    frame.
 
-    Rows are those of `mirrored_radiance`.
+    Rows are elevations, whose sines are evenly spaced from the horizon to the zenith.
     """
     return np.asarray(_house_share(np.linspace(0, 1, rows))[:, None, None] * LAMPLIT_HOUSES)
 
@@ -139,7 +141,7 @@ def _house_share(height: Floats) -> Floats:
 
 
 def ambient_radiance(weather: Weather) -> Floats:
-    """(3, 3) radiance, in units of the frame, of a white surface that gets all light except the sun's.
+    """The radiance of a white surface that gets all light except that of the sun: (3, 3), in units of the frame.
 
     The rows are for surfaces that face up, sideways (mean over all azimuths) and down; the columns are red, green and
     blue.
@@ -154,7 +156,8 @@ def ambient_radiance(weather: Weather) -> Floats:
 
 
 def airlight(weather: Weather) -> Floats:
-    """(`HORIZON_AZIMUTHS`, 3) radiance of distant air by azimuth, counter-clockwise from east, in units of the frame.
+    """The radiance of distant air by azimuth, counter-clockwise from east: (`HORIZON_AZIMUTHS`, 3), in units of the
+    frame.
 
     After sunset the sun no longer reaches the air in a street. The air then has the colour of the light from the whole
     sky, so that the glow in the west does not colour a fog.
@@ -189,7 +192,8 @@ def _exposure(sky: Sky) -> tuple[float, Floats]:
 
 
 def face_directions(size: int) -> Floats:
-    """(6, size, size, 3) world unit vectors through the texels of MuJoCo's skybox, with faces in `FACE_ORDER`.
+    """The directions of the texels of MuJoCo's skybox: (6, size, size, 3) world unit vectors, with faces in
+    `FACE_ORDER`.
 
     The cube is that of OpenGL, rotated so that its y axis points up in the world: the face `right` is east, `back` is
     north.
@@ -229,7 +233,7 @@ def _irradiance(radiance: Floats, directions: Floats, solid_angle: Floats, norma
 
 
 def encode_srgb(light: Floats) -> UInt8Image:
-    """Converts linear light, of which 1.0 is full scale, to sRGB bytes."""
+    """Converts linear light, in which 1.0 is full scale, to sRGB bytes 0..255, elementwise."""
     steps = (np.clip(light, 0.0, 1.0) * (len(_SRGB_BYTES) - 1) + 0.5).astype(np.uint16)
     return _SRGB_BYTES[steps]
 
@@ -241,4 +245,4 @@ def _srgb_bytes() -> UInt8Image:
 
 
 _SRGB_BYTES = _srgb_bytes()
-"""(65536,) sRGB bytes of linear light from 0 to 1, evenly spaced."""
+"""(65536,) sRGB bytes for evenly spaced linear light from 0 to 1."""

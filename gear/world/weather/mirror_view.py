@@ -1,4 +1,6 @@
-"""Renders what wet ground reflects: the placed scene seen from below, without the ground and with neutral surfaces."""
+"""Renders the mirror image in wet ground: a view of the scene from below, without the ground and with neutral
+surfaces.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A town at night: its lamps and lit windows, and the share of the ambient light that is left."""
+"""A town at night: its lamps and lit windows, and the share of the ambient light that remains."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from gear.world.weather.shadow_casters import find_shadow_casters
 from gear.world.world import World
 
 LEVEL, SKY_LEVEL = 0.03, 0.14
-"""Shares of the ambient light that are left on the ground and in the sky when the sun's light is gone."""
+"""Shares of the ambient light that remain at night, on the ground and in the sky."""
 
 GAUGE_SHARE = 0.72
 """Distance between the two headlamps as a share of the vehicle's width."""
 
 
 def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None:
-    """The light sources of a world at night; None while the sun is up.
+    """The lamps, lit windows and shadow casters of a world at night; None while the sun is up.
 
     Args:
         world: the world; its meshes must not have been released.
@@ -76,12 +76,12 @@ def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None
 
 
 def materials_of(model: mujoco.MjModel) -> list[str]:
-    """The name of each geom's material, as in the file from which it comes; "" if the geom has none."""
+    """The name of each geom's material, as in the geom's own MJCF file; "" for a geom without a material."""
     return [model.mat(index).name.rsplit("/", 1)[-1] if index >= 0 else "" for index in model.geom_matid]
 
 
 def lit_panes(material: list[str], label_code: npt.NDArray[np.uint8]) -> npt.NDArray[np.bool_]:
-    """(ngeom,) bool: which geoms are windows of vehicles with a lit interior, such as buses.
+    """Finds the windows of vehicles with a lit interior, such as buses: (ngeom,) bool.
 
     Args:
         material: name of each geom's material, from `materials_of`.

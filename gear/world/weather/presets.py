@@ -49,17 +49,18 @@ def apply_weather(
     lighting: Lighting | None = None,
     geom_materials: Sequence[GeomMaterial] = (),
 ) -> None:
-    """Replaces the light of a composed world by that of a weather, and makes its ground wet.
+    """Replaces the light of a composed world by the light of a weather, and makes the ground wet.
 
     The world gets a light `sun`, a skybox texture `sky`, and a cube texture as image-based light for Filament. The
-    wetter the weather is, the darker and smoother are the materials of open ground. A custom field makes Filament
+    wetter the weather is, the darker and smoother are the materials of open ground. A custom text field makes Filament
     interpret colours of materials and geoms as linear albedo.
 
     Args:
         root: MJCF of the world, changed in place.
         weather: the weather.
-        lighting: its light; None computes it.
-        geom_materials: default class and own material (None for none) of geoms that are not in the tree.
+        lighting: the light of the weather; None computes the light.
+        geom_materials: default class and own material (or None) of geoms that are copied as text and are not in the
+            tree.
     """
     lighting = lighting or lighting_of(weather)
     _remove_old_light(root)

@@ -16,7 +16,8 @@ _ENDLESS = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
 def find_shadow_casters(
     model: mujoco.MjModel, data: mujoco.MjData, label_code: npt.NDArray[np.uint8]
 ) -> npt.NDArray[np.float32]:
-    """The visible triangles of a town and its boards, without the ground.
+    """Finds the triangles that cast shadows in the light of lamps: the visible geoms of a town and its boards, without
+    the ground.
 
     Args:
         model: compiled model; its meshes must not have been released.

@@ -81,7 +81,7 @@ class Sky:
 
     @staticmethod
     def of(weather: Weather) -> Sky:
-        """The sky for CARLA's weather parameters."""
+        """Makes the sky for a weather, which has CARLA's parameters."""
         altitude = math.radians(weather.sun_altitude_deg)
         azimuth = math.radians(weather.sun_azimuth_deg)
         shown_altitude = max(altitude, _MIN_ALTITUDE_RAD)
@@ -107,13 +107,13 @@ class Sky:
         )
 
     def radiance(self, directions: Floats, *, with_disc: bool = True) -> Floats:
-        """Radiance by direction: sky and clouds above the horizon, sunlit ground below it.
+        """The radiance by direction: sky and clouds above the horizon, sunlit ground below the horizon.
 
         Args:
             directions: (..., 3) unit vectors, world axes.
-            with_disc: whether the disc of the sun is included, as for a picture of the sky. It must be left out when
-                light is integrated over a few directions: a direction that hits the small disc would count for thirty
-                suns.
+            with_disc: whether the disc of the sun is included, as for a picture of the sky. The disc must be left out
+                when light is integrated over a few directions, because one direction that hits the small disc would
+                have the weight of thirty suns.
 
         Returns:
             (..., 3) kcd/m² for each linear sRGB channel.
@@ -133,14 +133,14 @@ class Sky:
     def horizon_radiance(self, azimuths: int) -> Floats:
         """Radiance of distant air around the horizon.
 
-        That light has been scattered several times. It is therefore the mean of the radiance in that direction and of
-        the mean over all directions, and the glare around the sun is bounded.
+        The light of distant air has been scattered several times. The result is therefore the average of the radiance
+        in the direction and of the mean over all directions, and the glare around the sun is limited.
 
         Args:
             azimuths: number of directions, evenly spaced counter-clockwise from east.
 
         Returns:
-            (azimuths, 3) kcd/m².
+            (azimuths, 3) radiance in kcd/m².
         """
         angles = np.linspace(0, 2 * math.pi, azimuths, endpoint=False)
         ring = np.column_stack([np.cos(angles), np.sin(angles), np.full_like(angles, 0.04)])

@@ -1,6 +1,7 @@
 """Makes open ground wet: its materials become darker and smoother.
 
-Water fills the pores, so that the material reflects less light from its inside and its surface reflects more sharply.
+Water fills the pores of the material. The material therefore reflects less diffuse light, and its surface reflects more
+sharply.
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"}
 """Labels of the ground that rain makes wet."""
 
 GeomMaterial = tuple[str, str | None]
-"""The default class of a geom, and the material that the geom itself names, or None."""
+"""The default class of a geom, and the material that the geom itself specifies; None for no such material."""
 
 _DARKENING = 0.45
 _SMOOTHING = 0.7
 
 
 def wet_materials(root: mjcf.RootElement, amount: float, geom_materials: Sequence[GeomMaterial] = ()) -> None:
-    """Makes the materials of open ground wet.
+    """Makes the materials of open ground wet: darker and smoother.
 
     Args:
         root: MJCF of a world, changed in place.
         amount: wetness, 0 for dry to 1 for as wet as possible.
-        geom_materials: default class and own material of geoms that are not in the tree.
+        geom_materials: default class and own material of geoms that are copied as text and are not in the tree.
     """
     for material in _open_materials(root, geom_materials):
         rgba = np.array(material.rgba if material.rgba is not None else (1.0, 1.0, 1.0, 1.0))
