@@ -208,7 +208,7 @@ class ContactShadows:
     ) -> FloatImage | None:
         """The (H, W) float32 factors 0..1 by which contact shadows darken a frame; None if no pixel is darkened.
 
-        The arguments are those of `apply`.
+        `ContactShadows.apply` explains the arguments.
         """
         left: FloatImage | None = None
         for actor in record.actors:

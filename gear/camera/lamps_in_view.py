@@ -1,4 +1,4 @@
-"""The light that lamps give to the surfaces of a view."""
+"""Computes the light that lamps give to the surfaces in a view."""
 
 from __future__ import annotations
 

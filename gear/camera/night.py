@@ -3,7 +3,7 @@
     L' = L (k + E / A) + G
 
 L is the frame under even light: a surface appears as its albedo times A, where A is the irradiance for its normal. k is
-the share of that even light that is left at night, E the irradiance by lamps, and G emitted light. k, E, A and G do not
+the share of the even light that remains at night, E the irradiance by lamps, and G emitted light. k, E, A and G do not
 depend on any albedo. Frames therefore stay linear, and a patch changes only the pixels that show the patch.
 
 Normals are computed from depth. Static objects of the town and the scene's road users cast shadows.

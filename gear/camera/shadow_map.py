@@ -25,7 +25,7 @@ OWN_GLASS_M = 0.8
 """Surfaces nearer to a lamp than this belong to the lamp and cast no shadows, metres."""
 
 BORDER = 2
-"""Width in cells of the border of a map, in which nothing stops light."""
+"""Width in cells of the border of a shadow map; no object stops light in the border."""
 
 _LEVEL, _EDGE_ON = 0.9, 1e-6
 _SLACK_M, _MOST_TILT, _STEEP = 0.15, 6.0, 2.5

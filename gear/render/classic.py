@@ -5,7 +5,8 @@ of the model with display colours: textures marked sRGB are not decoded, and lin
 encoded. Its frames are linear in the 8-bit values of a patch; Filament's frames are linear in the albedo that these
 values encode.
 
-A patch's texture is filtered as in `gear.render.filament`, but as bytes, without decoding.
+A patch's texture is filtered trilinearly over mip levels, as in `gear.render.filament`, but on sRGB bytes that are not
+decoded.
 """
 
 from __future__ import annotations

@@ -34,7 +34,8 @@ def four_times(samples: UInt8Image) -> UInt16Image:
 
 
 def smooth_edges(linear_rgb: UInt16Image, geom_id: IdImage, depth_m: FloatImage) -> UInt16Image:
-    """The edge filter of quality `fast`: a 3 x 3 Gaussian (sigma 0.8 pixels) where ids change or depth bends.
+    """The edge filter of quality `fast`: a 3 x 3 Gaussian (sigma 0.8 pixels) on edges, where geom ids change or the
+    surface has a crease.
 
     Other pixels are unchanged.
 

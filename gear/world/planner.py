@@ -25,8 +25,8 @@ SEQUENCES_CACHED = 4
 
 
 class ScenePlanner:
-    """Plans the samples of one split: draws the scene record of each sample (actors, poses, weather, cameras) from the
-    seed.
+    """Plans the samples of one split. Each sample becomes a scene record: all actors with their poses, drawn from the
+    split's seed, and the cameras.
     """
 
     def __init__(self, world: World, rig: Rig, split: SplitConfig, *, split_name: str) -> None:
@@ -34,7 +34,7 @@ class ScenePlanner:
 
         Args:
             world: compiled world; the planner uses its placement model.
-            rig: cameras on the ego car. The first one must see the boards.
+            rig: cameras on the ego car. The first camera is the reference camera, to which the boards must be visible.
             split: seed, and length of the sequences.
             split_name: name of the split in records. Random draws do not depend on it, so `test_night` has the same
                 scenes as `test`.

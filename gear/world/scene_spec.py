@@ -117,8 +117,8 @@ class NpcLimits:
 
     Attributes:
         count: smallest and largest number; each number between them is equally likely.
-        ahead_m, lateral_m: smallest and largest distances in the frame of the first board, as in `EgoLimits`; None for
-            no limit.
+        ahead_m, lateral_m: smallest and largest distances in front of the first board and to its left; None for no
+            limit.
         radius_m: smallest and largest distance from the ego car; None for no limit. All limits that are not None must
             hold.
     """
@@ -184,7 +184,7 @@ class SceneSpec:
     """One scene: boards, a truck, or no surface for patches, and limits for the ego car and the traffic.
 
     Attributes:
-        boards: the boards, which show `patch_0`, `patch_1`, … in this order.
+        boards: the boards, which show the patches `patch_0`, `patch_1`, … in this order.
         truck: the vehicle that carries the patch; a scene cannot have both boards and a truck.
         ego: limits of the ego car; required if there are boards. Without boards the ego car may be on any lane.
         npc_vehicles, pedestrians: limits of the other vehicles and of the people.

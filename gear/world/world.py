@@ -157,7 +157,7 @@ class World:
 
     @property
     def parked_m(self) -> float:
-        """Height in metres at which unused actors are kept, below every lane of the town."""
+        """Height in metres at which unused actors are placed, below every lane of the town."""
         return min(0.0, self.lanes.lowest_m) - PARKED_DEPTH_M
 
     @property

@@ -38,7 +38,7 @@ def _find_effects() -> tuple[type[Effect], ...]:
 
 
 EFFECTS: tuple[type[Effect], ...] = _find_effects()
-"""All effects, in the order in which light passes them."""
+"""The classes of all camera effects, in the order in which the effects are applied, from the scene to the sensor."""
 
 
 def _parameters() -> Iterator[DerivedField]:

@@ -15,7 +15,7 @@ from gear.world.assets.scene_assets import SceneAssets
 from gear.world.scene_spec import SceneSpec
 
 PARKED_DEPTH_M = 60.0
-"""Actors that a sample does not use are kept this far below the town's ground, metres."""
+"""Depth in metres below the town's ground at which actors are placed that a sample does not use."""
 
 POOL_SLACK = 2.0
 """Factor on the number of instances of an asset. The number without this factor is the asset's share of the largest

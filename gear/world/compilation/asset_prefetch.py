@@ -24,7 +24,9 @@ _CACHE_BYTES = 2 << 30
 """Capacity of MuJoCo's cache, larger than any town. If it were too small, some files would be read twice."""
 
 _INERTIA = "shell"
-"""How gear's files compute the inertia of a mesh; MuJoCo's default would reject open surfaces."""
+"""Method by which gear's MJCF files compute the inertia of a mesh. MuJoCo's default method would reject open
+surfaces.
+"""
 
 
 class AssetPrefetcher:

@@ -85,7 +85,7 @@ def compose(plan: WorldPlan, files: SceneMjcf, lighting: Callable[[], Lighting] 
             computes the light in a thread.
 
     Raises:
-        TownError: a file cannot be composed with the others.
+        TownError: a file cannot be composed with the other files.
     """
     with ThreadPoolExecutor(1) as thread:
         light = thread.submit(lighting or partial(lighting_of, plan.weather))

@@ -17,9 +17,9 @@ class Copy:
     """One copy of an asset's first instance.
 
     Attributes:
-        name: name of its body.
+        name: name of the copy's body.
         original: name of the copied body; the names of all elements in that body start with it.
-        plates: meshes of its number plates, by the names of their geoms in the asset's file.
+        plates: meshes of the copy's number plates, by the names of the plates' geoms in the asset's file.
     """
 
     name: str

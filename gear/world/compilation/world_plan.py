@@ -1,7 +1,7 @@
 """The plan of a world: all data that determine the world, before MJCF files are composed and compiled.
 
-A world is made in three steps: its assets are read, its pool of actors is decided (both in this module), and the world
-is composed and compiled from this plan alone.
+A world is made in three steps: its assets are read, its pool of actors is decided, and the world is composed and
+compiled from this plan alone.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Checks that a town has the boards and the truck that a scene names."""
+"""Checks that a town has the boards and the truck that a scene uses."""
 
 from __future__ import annotations
 

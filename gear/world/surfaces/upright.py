@@ -9,7 +9,9 @@ from gear.values.geometry import Array, RigidTransform
 from gear.world.assets.geom_triangles import geom_triangles
 
 UV_TOLERANCE = 0.01
-"""Largest difference between a corner's texture coordinates and the expected ones, as a share of the face's sides."""
+"""Largest difference between a corner's texture coordinates and the expected coordinates, as a share of the face's
+sides.
+"""
 
 _BOX_TEXTURE = ((1, -2), (0, -2), (0, -1))
 """Axes of the box along which u and v increase, on the sides that face along x, y and z; a minus sign reverses the

@@ -261,7 +261,7 @@ class OcclusionTest:
     Attributes:
         eye_m: (3,) position of the camera, world coordinates.
         grids_m: for each face, (N, 3) points spread over it.
-        min_free: share of each face that road users must not hide.
+        min_free: smallest share of each face that road users must leave visible.
     """
 
     eye_m: Array

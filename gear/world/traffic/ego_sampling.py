@@ -236,7 +236,7 @@ class EgoSampler:
 
     @cached_property
     def places(self) -> npt.NDArray[np.intp]:
-        """(N,) indices of the pieces of lanes on which the ego car, or the truck, may be.
+        """The (N,) indices of the pieces of lanes on which the ego car, or the truck, may be.
 
         Raises:
             PlacementError: there are no such pieces; the message gives the reason why the pieces within the limits are

@@ -66,9 +66,9 @@ class SequenceSimulator:
     ) -> list[FrameState]:
         """Simulates all frames of a sequence and returns the state of the road users in each frame.
 
-        If an actor overlaps another one during the simulation, it is removed and the sequence is simulated again, until
-        there is no overlap. The frames may therefore contain fewer road users than the scene's smallest count, which is
-        only guaranteed before the simulation.
+        If two actors overlap during the simulation, one of the two is removed and the sequence is simulated again,
+        until there is no overlap. The frames may therefore contain fewer road users than the scene's smallest count,
+        which is only guaranteed before the simulation.
 
         Args:
             road_users: the road users at the start; removed actors are removed from this object as well.

@@ -1,7 +1,7 @@
 """Simulates traffic: vehicles follow their routes by the intelligent driver model, people walk.
 
 The model is that of Treiber, Hennecke and Helbing, "Congested traffic states in empirical observations and microscopic
-simulations" (2000). Vehicles keep their distance to everything in the strip of road in front of them, give way where
+simulations" (2000). Vehicles keep their distance to all objects in the strip of road in front of them, give way where
 lanes of a junction are in conflict, and stop at the end of a road. The simulation is deterministic: the same start
 gives the same traffic.
 """
@@ -75,7 +75,7 @@ class MovingPedestrian:
 
     Attributes:
         line: centre line of the sidewalk or crosswalk.
-        s_m, lateral_m: arc length on the line, and distance to the left of it.
+        s_m, lateral_m: arc length on the line, and distance to the left of the line.
         direction: 1 for walking along the line, -1 for walking against it.
         pace_mps: walking speed without obstacles.
         speed_mps: current speed.

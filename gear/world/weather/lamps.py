@@ -33,8 +33,8 @@ DOWNWARD = 0.7
 """If the mean normal of a lamp's glass is longer than this, the lamp shines in one direction, as street lamps do."""
 
 STANDARD_AREA_M2 = 0.15
-"""Area of glass of a street lamp with the usual intensity, m². The intensity of a lamp is proportional to its area, up
-to twice the usual intensity.
+"""Area of glass of a street lamp with the usual intensity, m². The intensity of a street lamp is proportional to this
+area, up to twice the usual intensity.
 """
 
 

@@ -160,7 +160,7 @@ def airlight(weather: Weather) -> Floats:
     frame.
 
     After sunset the sun no longer reaches the air in a street. The air then has the colour of the light from the whole
-    sky, so that the glow in the west does not colour a fog.
+    sky, so the glow in the west does not colour a fog.
     """
     sky = Sky.of(weather)
     exposure, roof_klx = _exposure(sky)

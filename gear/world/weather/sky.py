@@ -20,7 +20,9 @@ from gear.values.scene import Weather
 Floats = npt.NDArray[np.float64]
 
 _MIN_ALTITUDE_RAD = math.radians(1.5)
-"""The formulas hold for a sun above the horizon. A lower sun gives the sky of a sun at this altitude, but darker."""
+"""Lowest altitude of the sun, in radians, for which the formulas of the sky are used. A lower sun gives the sky of a
+sun at this altitude, but darker.
+"""
 
 _NIGHT_TINT = np.array([0.72, 0.84, 1.0])
 _NIGHT_CLOUDS = np.array([1.25, 1.12, 1.0])
