@@ -34,8 +34,8 @@ class WebdatasetOptions:
 
 
 def webdataset_tree(splits: Sequence[ExportSplit], read: Read, options: WebdatasetOptions) -> Tree:
-    """The tar archives `<split>-000000.tar`, … of a dataset, and for each split an index `<split>.json` (wids, version
-    1).
+    """The tar archives `<split>-000000.tar`, … of a dataset, and for each split an index `<split>.json` in wids format
+    1.
 
     Each file of a sample is called `000000.<part>.<suffix>`. `000000.json` is the sample's sidecar: scene, ground truth
     and hashes. The same dataset gives the same bytes, because members have a fixed order and neither time nor owner.

@@ -22,8 +22,9 @@ FACE_SIZE_PX = (1200, 600)
 """Width and height of the texture of every face."""
 
 SurfaceAlbedo = Literal["none", "white", "black"] | UInt8Image
-"""The picture on a surface: "none" (its neutral texture), "white" (albedo 1), "black" (albedo 0), or a patch as (h, w,
-3) uint8 sRGB.
+"""The picture on a surface: "none" (its neutral texture), "white" (albedo 1), "black" (albedo 0), or a patch.
+
+A patch is a (h, w, 3) uint8 sRGB picture.
 """
 
 SurfaceAlbedos = Mapping[str, SurfaceAlbedo]
