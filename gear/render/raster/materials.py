@@ -14,7 +14,7 @@ from gear.render.display_colours import has_linear_colours
 from gear.values.geometry import Array
 
 TEXTURE_ROLES = {"HAS_BASE": "RGB", "HAS_NORMAL": "NORMAL", "HAS_ORM": "ORM", "HAS_EMISSIVE": "EMISSIVE"}
-"""MuJoCo's texture roles by the preprocessor flag of the shaders, in the order of the shaders' samplers."""
+"""MuJoCo's texture role for each preprocessor flag of the shaders, in the order of the shaders' samplers."""
 
 DIELECTRIC = 0.04
 """Reflectance at normal incidence (f0) of all materials except metal."""

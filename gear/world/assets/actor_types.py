@@ -29,7 +29,7 @@ uses another unit.
 """
 
 COUNTABLE = frozenset(label.code for label in LABELS if label.coco_id is not None and not label.is_instance)
-"""Codes of the labels whose objects in a town are single instances, such as traffic lights. Each such object needs a
+"""Codes of the labels whose objects in a town are counted one by one, such as traffic lights. Each such object needs a
 body of its own in the MJCF.
 """
 

@@ -45,7 +45,8 @@ class SceneAssets:
     Attributes:
         library: the town's MJCF file and the folders of its assets.
         boards: the file of each board, in patch order.
-        vehicles: vehicles by name, in alphabetical order; their weights are multiplied by the scene's mix.
+        vehicles: vehicles by name, in alphabetical order; their weights are multiplied by the factors of the scene's
+            mix.
         pedestrians: people by name, in alphabetical order.
         ego: the ego car.
         carrier: the vehicle that carries the patch; None in a scene without a truck.

@@ -25,8 +25,8 @@ from gear.world.scene_spec import SceneSpec
 from gear.world.weather.light import Lighting, lighting_of
 
 _SWITCH_S = 0.0005
-"""Longest time that one thread keeps the interpreter, seconds; short, so that the threads which feed MuJoCo are
-not delayed.
+"""Longest time in seconds for which one thread holds Python's interpreter lock. It is short, so that the threads that
+read files for MuJoCo are not delayed.
 """
 
 _READERS = 8

@@ -215,7 +215,7 @@ class EgoSampler:
         return float(table.s_m[first]), float(table.s_m[last])
 
     def ego_on_lane(self, road_users: RoadUsers, lane: str, s_m: float, rng: np.random.Generator) -> Spawn:
-        """Draws the ego car at arc length `s_m` on a lane, and takes its entry from the pool of actors."""
+        """Draws the ego car at arc length `s_m` on a lane, and marks its entry in the pool of actors as used."""
         return self.spawner.on_lane(self.ego_type, road_users.free.take(EGO_ASSET), "ego", lane, s_m, rng)
 
     def _draw_behind_truck(self, road_users: RoadUsers, rng: np.random.Generator) -> list[Spawn] | str:

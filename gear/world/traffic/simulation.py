@@ -29,8 +29,9 @@ PERSON_REACH_M = 0.9
 """A person takes a step if there is no obstacle within this distance in front, metres."""
 
 TURNING_M = 1.5
-"""People turn at a corner of their line over this distance before and after it, multiplied by their distance
-from the line (at least 1 m). Over a shorter distance, people on the inside of the corner would move backwards.
+"""Distance before and after a corner of a walk over which people turn, metres. It is multiplied by the distance of a
+person from the line in metres, if this is above 1. Over a shorter distance, people on the inside of the corner would
+move backwards.
 """
 
 PERSON_FORESIGHT_S = (0.0, 0.7, 1.4)
