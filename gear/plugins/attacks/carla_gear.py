@@ -30,7 +30,7 @@ STEREO_LOSSES_LEFT_OUT = ("rpn_class", "class")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CarlaGearConfig:
-    """Options: only the size of the patches; all other settings are the paper's.
+    """Options of the attack `carla_gear`: only the size of the patches; all other settings are the paper's.
 
     Attributes:
         height_px, width_px: size of every patch, pixels.
@@ -44,9 +44,11 @@ class CarlaGearConfig:
 
 
 class CarlaGear:
-    """The attack: the gradient of each term is scaled to length 1, and the learning rate is constant.
+    """The attack `carla_gear`: the gradient of each loss term is scaled to length 1, and the learning rate is
+    constant.
 
-    The weight gamma is 1 for segmentation and 0.8 for depth; `gear.plugins.attacks.optimisation.objectives` defines it.
+    The weight gamma of the first loss term is 1 for segmentation and 0.8 for depth
+    (`gear.plugins.attacks.optimisation.objectives` defines the terms).
     """
 
     def __init__(self, config: CarlaGearConfig) -> None:
@@ -62,7 +64,7 @@ class CarlaGear:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each surface.
+        """Optimises one patch for each patch surface of the scene, within the budget.
 
         The paper's budget is 51 epochs of 100 samples: 2550 steps for segmentation (two samples per step), and 5100 for
         the other tasks.
@@ -76,7 +78,7 @@ class CarlaGear:
         )
 
     def settings(self, sample: Any) -> Settings:
-        """The paper's settings for the task of a sample."""
+        """The paper's settings of the optimisation, chosen by the task to which the sample belongs."""
         task = task_of(sample)
         return Settings(
             height_px=self._config.height_px,
@@ -89,7 +91,7 @@ class CarlaGear:
         )
 
     def objective(self, sample: Any) -> Objective:
-        """The paper's objective for the task of a sample."""
+        """The paper's objective (what the attack maximises), chosen by the task to which the sample belongs."""
         from gear.plugins.attacks.optimisation.objectives import DepthObjective, LossObjective, SemsegObjective
 
         task = task_of(sample)
@@ -110,7 +112,7 @@ BRIGHTNESS: dict[PaperTask, float] = {"semseg": 0.02 / 0.224, "depth": 0.02, "de
 
 
 def task_of(sample: Any) -> PaperTask:
-    """The task of the paper to which a sample belongs."""
+    """The name of the task to which a sample belongs, found by its ground truth and its number of cameras."""
     from gear.plugins.attacks.optimisation.objectives import kind_of
 
     kind = kind_of(sample)

@@ -1,4 +1,4 @@
-"""Checks of Cityscapes classes in the options of targeted attacks."""
+"""Checks of the class names that targeted attacks on semantic segmentation take as options."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if labe
 
 
 def check_classes(attacked: str, target: str) -> None:
-    """Checks the options `attacked` and `target`: each is empty or a class that Cityscapes evaluates, and `attacked` is
-    only allowed together with `target`.
+    """Checks the options `attacked` and `target` of a targeted attack on semantic segmentation.
+
+    Each option is empty or the name of a class that Cityscapes evaluates, and `attacked` is allowed only with `target`.
 
     Raises:
         FieldError: an option is wrong; the message names it.
@@ -26,10 +27,10 @@ def check_classes(attacked: str, target: str) -> None:
 
 
 def check_seen(attacked: str, dataset: Sequence[Any]) -> None:
-    """Checks that at least one sample of the dataset shows the attacked class; "" passes.
+    """Checks that the ground truth of at least one sample contains the attacked class; an empty name passes.
 
     Raises:
-        GearError: no sample shows the class, so there is nothing to attack.
+        GearError: no sample contains the class, so there is nothing to attack.
     """
     if attacked and not any(bool((sample.label_ids == LABEL_IDS[attacked]).any()) for sample in dataset):
         raise GearError(

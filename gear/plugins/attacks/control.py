@@ -25,15 +25,15 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControlConfig:
-    """Options.
+    """Options of the attack `control`, which makes patches without optimisation.
 
     Attributes:
         kind: `noise` draws every value uniformly; `solid` is one colour; `matched` is noise with the mean colour, the
-            covariance of colours and the power spectrum of the patches in `like`: as smooth and as colourful, but not
-            optimised.
+            covariance of colours and the power spectrum of the patches in `like`, therefore as smooth and as colourful
+            as these, but not optimised.
         height_px, width_px: size of every patch, pixels; `matched` takes the size of the patches in `like`.
         rgb: colour for `solid`, sRGB in 0..1.
-        like: patch folder for `matched`.
+        like: folder of the patches that `matched` imitates, written by `gear attack`.
     """
 
     kind: Literal["noise", "solid", "matched"] = "noise"
@@ -53,16 +53,16 @@ class ControlConfig:
 
 
 class Control:
-    """An "attack" that never runs the model and does not optimise."""
+    """The attack `control`: makes patches without optimisation and never runs the model."""
 
     def __init__(self, config: ControlConfig) -> None:
         self._config = config
 
     def read_sha256(self) -> str | None:
-        """Hash of the exact patches in `like`; None if the option is not used.
+        """The SHA-256 hash of the unrounded patches in the folder `like`; None if the option is not used.
 
         Raises:
-            GearError: the folder has no exact patches.
+            GearError: the folder has no file with unrounded patches.
         """
         if not self._config.like:
             return None
@@ -78,10 +78,10 @@ class Control:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Makes one patch for each surface.
+        """Makes one patch for each patch surface of the scene; the model and the budget are not used.
 
         Raises:
-            GearError: the folder `like` has too few patches.
+            GearError: the folder `like` has fewer patches than the scene has surfaces, or no unrounded patches.
         """
         config, count = self._config, len(dataset[0].record.surfaces)
         size = (config.height_px, config.width_px, 3)
@@ -98,18 +98,18 @@ class Control:
 
 
 def matched(original: Floats, rng: np.random.Generator) -> Floats:
-    """Random phase noise with the statistics of a picture (Galerne et al., 2011).
+    """Random noise with the Fourier magnitudes, the mean and the standard deviation of a picture (Galerne et al.,
+    2011).
 
-    The noise has the picture's Fourier magnitudes with random phases. The phases are the same for all channels, so that
-    colours vary together as in the picture. Values outside 0..1 are clipped; mean and standard deviation are then
-    restored.
+    The random phases are the same for all channels, so colours vary together as in the picture. Values outside 0..1 are
+    clipped, and mean and standard deviation are restored; this is repeated ten times.
 
     Args:
-        original: (H, W, 3) in 0..1.
+        original: (H, W, 3) picture in 0..1.
         rng: random generator of the phases.
 
     Returns:
-        (H, W, 3) in 0..1.
+        (H, W, 3) noise in 0..1.
     """
     phases = np.angle(np.fft.fft2(rng.standard_normal(original.shape[:2])))
     mean, spread = original.mean(axis=(0, 1)), original.std(axis=(0, 1))
@@ -122,11 +122,11 @@ def matched(original: Floats, rng: np.random.Generator) -> Floats:
 
 
 def read_exact(folder: Path) -> list[Floats]:
-    """The exact (not rounded) patches in a folder that `gear attack` wrote, in the order of the surfaces: (H, W, 3) in
-    0..1.
+    """The unrounded patches in a folder that `gear attack` wrote: (H, W, 3) in 0..1 each, in the order of the
+    surfaces.
 
     Raises:
-        GearError: the folder has no exact patches.
+        GearError: the folder has no file with unrounded patches, or the file is damaged.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load_file

@@ -1,7 +1,7 @@
 """Targeted attacks on detectors: all objects vanish, or an object appears on the patch.
 
-For both goals the labels are replaced by the wanted ones, and the detector's own training losses against them are
-minimised, as in Lee and Kolter (2019) and in DPatch (Liu et al., 2019).
+The ground truth is replaced by the labels that the detector shall predict, and the detector's own training losses
+against these labels are minimised, as in Lee and Kolter (2019) and in DPatch (Liu et al., 2019).
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ Goal = Literal["vanish", "appear"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectionGoal:
-    """An objective for samples with labelled objects: both goals for `detect2d`, vanishing for `stereo3d`.
+    """The objective of targeted attacks on detectors; `vanish` works for `detect2d` and `stereo3d`, `appear` for
+    `detect2d`.
 
     Attributes:
-        goal: whether all objects vanish or one appears on the patch.
-        category_id: COCO category of the object that appears.
-        left_out: names of losses that are not used.
+        goal: `vanish`: the detector shall predict no object; `appear`: it shall predict an object on each patch.
+        category_id: COCO category of the object that shall appear.
+        left_out: names of the detector's losses that are not used.
     """
 
     goal: Goal
@@ -39,13 +40,17 @@ class DetectionGoal:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """The detector's losses against the wanted labels, one term for each; the attack minimises all of them."""
+        """One term for each loss of the detector: the negative loss against the labels that the detector shall
+        predict.
+        """
         wanted = [self.rewritten(sample) for sample in samples]
         losses = model.forward(views, wanted)
         return {name: Term(value=-loss) for name, loss in losses.items() if name not in self.left_out}
 
     def rewritten(self, sample: Any) -> Any:
-        """The sample with the labels that the detector shall predict: none, or one object on each visible surface."""
+        """A copy of the sample with the labels that the detector shall predict: none, or one object on each
+        visible surface.
+        """
         objects = self._on_surfaces(sample) if self.goal == "appear" else ()
         return dataclasses.replace(sample, objects=objects)
 

@@ -1,8 +1,8 @@
-"""An attack that does not use the scene: patches are pasted upright at random sizes and places (EOT).
+"""The attack `eot`, which does not use the scene: patches are pasted upright at random sizes and positions.
 
-It is expectation over transformation (Athalye et al., ICML 2018) with the transforms of Nesti et al. (WACV 2022), who
-compare their scene-specific attack with it: scale, shift, noise, brightness and contrast. The position of the board,
-its light and its occluders are not used.
+It is expectation over transformation (EOT; Athalye et al., ICML 2018) with the transforms of Nesti et al. (WACV 2022),
+who compare their scene-specific attack with it: scale, shift, noise, brightness and contrast. The position of the
+billboard in the scene, its light and its occluders are not used.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EotAppearance(Appearance):
-    """The appearance changes of Nesti et al. (WACV 2022). It is a class of its own so that a user can change one
-    field and keep the others.
+    """The random appearance changes of Nesti et al. (WACV 2022) as defaults.
+
+    It is a class of its own so that a user can set one field in a config and keep the other defaults.
     """
 
     noise: float = 0.1
@@ -32,12 +33,13 @@ class EotAppearance(Appearance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EotConfig(Settings):
-    """Options.
+    """Options of the attack `eot`.
 
     Attributes:
         share: width of a pasted patch before scaling, as a share of the picture's width.
         least_scale, most_scale: range of the random factor on that width.
-        shift: largest distance of the patch's centre from the picture's centre, as a share of the patch's size.
+        shift: largest shift of a patch from its regular position along each axis, as a share of the patch's size. The
+            regular position of a single patch is the middle of the picture.
     """
 
     share: float = 0.15
@@ -55,7 +57,7 @@ class EotConfig(Settings):
 
 
 class Eot:
-    """Optimises patches that are pasted at random places; it does not use the scene's compositor."""
+    """The attack `eot`: optimises patches that are pasted at random positions, without the scene's compositor."""
 
     def __init__(self, config: EotConfig) -> None:
         self._config = config
@@ -70,7 +72,7 @@ class Eot:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each surface; all of them are pasted into every picture."""
+        """Optimises one patch for each patch surface of the scene; all of the patches are pasted into every picture."""
         from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
         from gear.plugins.attacks.optimisation.objectives import default_objective
         from gear.plugins.attacks.optimisation.upright_pasting import Upright

@@ -1,7 +1,8 @@
-"""A black-box attack that estimates gradients from differences of the objective: NES (Ilyas et al., ICML 2018) or SPSA.
+"""A black-box attack that estimates gradients from differences of the objective: NES (Ilyas et al., ICML 2018) or
+SPSA.
 
-The gradient is estimated on a coarse grid and enlarged to the patch, so that fewer values must be estimated from the
-same number of queries.
+The gradient is estimated on a coarse grid, of which each cell becomes a square of the patch. The same number of queries
+therefore estimates fewer values.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from gear.values.rng import derive_rng
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NesConfig:
-    """Options.
+    """Options of the attack `nes`.
 
     Attributes:
         height_px, width_px: size of every patch, pixels.
@@ -54,7 +55,7 @@ class NesConfig:
 
 
 class Nes:
-    """The attack: steps along the sign of the estimated gradient."""
+    """The attack `nes`: in each step every value changes by `step` along the sign of its estimated gradient."""
 
     def __init__(self, config: NesConfig) -> None:
         self._config = config
@@ -69,7 +70,7 @@ class Nes:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each surface."""
+        """Optimises one patch for each patch surface of the scene, within the budget."""
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
         from gear.plugins.attacks.optimisation.loop import batch_of
         from gear.plugins.attacks.optimisation.objectives import default_objective

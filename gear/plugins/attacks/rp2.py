@@ -1,7 +1,8 @@
 """Robust physical perturbations (RP2; Eykholt et al., CVPR 2018) on a billboard: all terms are added to one loss.
 
-A perturbation of a base colour is kept small in the 2-norm and printable, while the mean loss over varied pictures is
-optimised: towards `target` if one is given (segmentation only), away from the ground truth otherwise.
+The patch is a base colour plus a perturbation, which is kept printable and small in the 2-norm. The mean loss over
+varied pictures is optimised: towards the class `target` if the option is set (segmentation only), otherwise away from
+the ground truth.
 """
 
 from __future__ import annotations
@@ -29,8 +30,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rp2Appearance(Appearance):
-    """Stronger changes of light and no blur. It is a class of its own so that a user can change one field and
-    keep the others.
+    """Random appearance changes with stronger changes of light and without blur, as defaults.
+
+    It is a class of its own so that a user can set one field in a config and keep the other defaults.
     """
 
     brightness: float = 0.1
@@ -40,15 +42,17 @@ class Rp2Appearance(Appearance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rp2Config(TextureSettings):
-    """Options. Learning rate, height and `norm_weight` are those of the published GTSRB experiment; the others are
-    gear's choice.
+    """Options of the attack `rp2`.
+
+    Learning rate, height and `norm_weight` are those of the published GTSRB experiment; the others are gear's choice.
 
     Attributes:
         base: grey value, 0 to 1, to which the perturbation is added.
         norm_weight: weight of the perturbation's 2-norm.
         printability_weight: weight of the non-printability score, a mean over pixels.
         smoothness_weight: weight of the smoothness term, a mean over pixels.
-        attacked, target: for semantic segmentation: classes, as in the attack `scene_specific`.
+        attacked, target: for semantic segmentation: Cityscapes classes. Pixels of `attacked` (all pixels if empty) are
+            pushed to `target`. If `target` is empty, the attack is untargeted.
     """
 
     height_px: int = 32
@@ -71,7 +75,7 @@ class Rp2Config(TextureSettings):
 
 
 class Rp2:
-    """The attack: Adam on the sum of all terms."""
+    """The attack `rp2`: Adam on the sum of all terms."""
 
     def __init__(self, config: Rp2Config) -> None:
         self._config = config
@@ -86,7 +90,7 @@ class Rp2:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each surface."""
+        """Optimises one patch for each patch surface of the scene, within the budget."""
         from gear.plugins.attacks.optimisation.loop import Problem, one_gradient, optimise_textures
 
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
@@ -99,7 +103,11 @@ class Rp2:
         return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
 
     def objective(self, sample: Any) -> Objective:
-        """The loss towards the target class if there is one, otherwise the untargeted loss."""
+        """The objective for a sample: towards the class `target` if the option is set, otherwise untargeted.
+
+        Raises:
+            GearError: `target` or `attacked` is set, but the sample has no semantic labels.
+        """
         from gear.plugins.attacks.optimisation.objectives import SemsegObjective, default_objective, kind_of
 
         config = self._config

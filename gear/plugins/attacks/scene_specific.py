@@ -31,7 +31,7 @@ APPEARS = "person"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneSpecificConfig(Settings):
-    """Options.
+    """Options of the attack `scene_specific`.
 
     Attributes:
         learning_rate: peak learning rate of Adam, one number or one for each channel. null takes 0.25 against depth
@@ -80,7 +80,7 @@ SIGNS = {"+": 1.0, "-": -1.0, "0": 0.0}
 
 
 class SceneSpecific:
-    """The attack: Adam on the textures of all surfaces together."""
+    """The attack `scene_specific`: Adam on the textures of all surfaces together."""
 
     def __init__(self, config: SceneSpecificConfig) -> None:
         self._config = config
@@ -95,7 +95,7 @@ class SceneSpecific:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each surface."""
+        """Optimises one patch for each patch surface of the scene, within the budget."""
         from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
 
         objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
@@ -107,7 +107,7 @@ class SceneSpecific:
         )
 
     def settings(self, sample: Any) -> SceneSpecificConfig:
-        """The settings, with the learning rate for the task of a sample."""
+        """The attack's options with the learning rate that fits the task of a sample."""
         from gear.plugins.attacks.optimisation.objectives import kind_of
 
         if self._config.learning_rate is not None:
@@ -115,7 +115,7 @@ class SceneSpecific:
         return replace(self._config, learning_rate=LEARNING_RATES.get(kind_of(sample), USUAL_RATE))
 
     def objective(self, sample: Any) -> Objective:
-        """The objective for the task of a sample.
+        """The objective (what the attack maximises) that fits the task of a sample and the options.
 
         Raises:
             GearError: an option is set that belongs to another task.

@@ -1,4 +1,4 @@
-"""A black-box attack by random search: squares of one colour, kept if they increase the harm.
+"""A black-box attack by random search: squares of one colour, which stay in the patch if they increase the harm.
 
 It is the Square attack (Andriushchenko et al., ECCV 2020) in the form of Sparse-RS for universal patches (Croce et al.,
 AAAI 2022): every colour is a corner of the colour cube, and the squares shrink as queries are used up.
@@ -27,7 +27,7 @@ SCHEDULE = ((0.001, 1), (0.005, 2), (0.02, 4), (0.05, 8), (0.1, 16), (0.2, 32), 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SquareConfig:
-    """Options.
+    """Options of the attack `square`.
 
     Attributes:
         height_px, width_px: size of every patch, pixels.
@@ -51,7 +51,7 @@ class SquareConfig:
 
 
 class Square:
-    """The attack: random search that changes one square of one colour at a time."""
+    """The attack `square`: random search that changes one square of one colour at a time."""
 
     def __init__(self, config: SquareConfig) -> None:
         self._config = config
@@ -66,7 +66,7 @@ class Square:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each surface."""
+        """Optimises one patch for each patch surface of the scene, within the budget."""
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
         from gear.plugins.attacks.optimisation.loop import batch_of
         from gear.plugins.attacks.optimisation.objectives import default_objective
@@ -109,7 +109,7 @@ class Square:
         return as_patches(textures)
 
     def _first(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """The initial patch: vertical stripes of random corners of the colour cube."""
+        """The (S, 3, h, w) initial textures: vertical stripes, each in a random corner of the colour cube."""
         config = self._config
         stripes = rng.integers(0, 2, (count, 3, 1, config.width_px)).astype(np.float32)
         return np.ascontiguousarray(np.broadcast_to(stripes, (count, 3, config.height_px, config.width_px)))

@@ -31,8 +31,9 @@ SCORES = ("objectness", "cls_logits")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThysAppearance(Appearance):
-    """The published uniform ranges, as standard deviations. It is a class of its own so that a user can change
-    one field and keep the others.
+    """The uniform ranges of appearance changes that Thys et al. published, as standard deviations.
+
+    It is a class of its own so that a user can set one field in a config and keep the other defaults.
     """
 
     noise: float = 0.06
@@ -42,7 +43,7 @@ class ThysAppearance(Appearance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThysConfig(TextureSettings):
-    """Options; the defaults are the published constants.
+    """Options of the attack `thys`; the defaults are the published constants.
 
     Attributes:
         printability_weight: weight of the non-printability score, a sum over pixels divided by the number of values.
@@ -58,7 +59,7 @@ class ThysConfig(TextureSettings):
 
 
 class Thys:
-    """The attack: minimises the score of the most confident detection in every picture."""
+    """The attack `thys`: minimises the score of the most confident detection in every picture."""
 
     def __init__(self, config: ThysConfig) -> None:
         self._config = config
@@ -73,10 +74,10 @@ class Thys:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each surface.
+        """Optimises one patch for each patch surface of the scene, within the budget.
 
         Raises:
-            GearError: the model has no output of objectness.
+            GearError: the detector has no raw output of objectness or class scores.
         """
         from gear.plugins.attacks.optimisation.loop import Problem, one_gradient, optimise_textures
 
@@ -89,7 +90,7 @@ class Thys:
         return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
 
     def objective(self, sample: Any) -> Objective:
-        """The objective that lowers the most confident detection."""
+        """The objective of the attack: it grows as the score of the most confident detection falls."""
         return SurestObjective()
 
     def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:
@@ -118,22 +119,22 @@ class Thys:
 
 
 class SurestObjective:
-    """An objective that grows as the score of the most confident detection falls."""
+    """An objective that grows as the score of the most confident detection in each picture falls."""
 
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One term, `objectness`: it grows as the highest score in each picture falls."""
+        """One term, `objectness`: the negative mean over the pictures of the highest detection score."""
         from gear.contracts.attacks import Term
 
         return {"objectness": Term(value=-surest(model.forward(views)).mean())}
 
 
 def surest(outputs: Mapping[str, Tensor]) -> Tensor:
-    """(B,) highest score in each picture, 0 to 1.
+    """The (B,) highest detection score in each picture, 0 to 1, from a detector's raw outputs.
 
     Raises:
-        GearError: the model has no output of objectness.
+        GearError: the detector has no raw output of objectness or class scores.
     """
     for name in SCORES:
         if name in outputs:

@@ -11,8 +11,16 @@ from gear.plugins.attacks.optimisation.settings import Appearance
 
 
 def vary(appearance: Appearance, patch: Tensor, rng: np.random.Generator) -> Tensor:
-    """Changes the appearance of a (3, h, w) patch in 0..1 at random: noise, brightness, contrast, blur;
+    """A random change of a patch's appearance: noise, brightness, contrast and box blur, in this order;
     differentiable.
+
+    Args:
+        appearance: strengths of the changes.
+        patch: (3, h, w) in 0..1.
+        rng: random generator of the changes.
+
+    Returns:
+        (3, h, w) in 0..1.
     """
     brightness, contrast, seed = rng.normal(), rng.normal(), int(rng.integers(2**63))
     side = int(rng.integers(3, max(appearance.blur_px, 3) + 1))

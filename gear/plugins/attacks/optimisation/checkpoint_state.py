@@ -1,4 +1,4 @@
-"""Checks the saved state of an attack before the attack is resumed from it."""
+"""Checks the saved state of an attack (a checkpoint) before the attack is resumed from the state."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ TEXTURE_AXES = 4
 
 
 def check_saved(saved: State, fresh: State) -> None:
-    """Checks that a saved state has the same arrays as an initial state: equal names, shapes and types.
+    """Checks that a saved state has every array of an initial state, with the same shape and dtype and without
+    NaN.
 
     Raises:
-        GearError: the saved state differs; the message names the array.
+        GearError: the saved state is incomplete or damaged, or its patches have another size; the message names the
+            array.
     """
     if missing := fresh.keys() - saved.keys():
         raise GearError(f"the saved attack is of an older gear, it lacks {', '.join(sorted(missing))}; start it afresh")

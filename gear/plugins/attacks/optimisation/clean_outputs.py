@@ -1,4 +1,4 @@
-"""A cache of what networks output on pictures without a patch; these outputs stay the same during an attack."""
+"""A cache of network outputs on pictures without a patch; these outputs stay the same during an attack."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from gear.contracts.models import Model
 
 
 class CleanOutputs:
-    """Cache of outputs, or of values that an objective computes from them, by network and sample."""
+    """A cache of values that an objective computes on pictures without a patch, by network and sample."""
 
     def __init__(self) -> None:
         self._kept: dict[tuple[int, int], Tensor] = {}
 
     def of(self, model: Model, samples: Sequence[Any], indexes: Sequence[int], ask: Callable[[Any], Tensor]) -> Tensor:
-        """The values for a batch, (B, ...) in main memory; missing ones are computed and stored.
+        """The cached values of a batch, (B, ...) in main memory; missing values are computed and stored.
 
         Args:
-            model: model whose outputs are cached.
+            model: network on whose outputs the values depend.
             samples: samples of the batch.
             indexes: indices of the samples in the dataset.
             ask: function that computes the value of one sample; it runs without gradients.

@@ -1,4 +1,4 @@
-"""Freezes the parameters of an attacked model."""
+"""Switches off the gradients of an attacked model's parameters during an attack."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from torch import nn
 
 
 def networks_of(model: Any) -> Iterator[tuple[str, nn.Module]]:
-    """The torch modules of a model, with their names: the model itself or those of its attributes that are
-    modules, and its taps.
+    """Yields the torch modules of a model with their names.
+
+    A model that is a module itself yields only itself. Otherwise its attributes that are modules and its taps (layers
+    with feature maps) follow, sorted by name.
     """
     if isinstance(model, nn.Module):
         yield "model", model
@@ -25,8 +27,9 @@ def networks_of(model: Any) -> Iterator[tuple[str, nn.Module]]:
 
 @contextlib.contextmanager
 def frozen(model: Any) -> Iterator[None]:
-    """Context in which no parameter requires a gradient, so that backward passes compute only gradients of the
-    pictures.
+    """A context in which no parameter of a model requires a gradient; `requires_grad` is restored at the end.
+
+    Backward passes then compute only the gradients of the pictures.
     """
     parameters = {id(p): p for _, network in networks_of(model) for p in network.parameters() if p.requires_grad}
     for parameter in parameters.values():

@@ -12,17 +12,18 @@ STEP = 0.02
 
 
 def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequence[Tensor]) -> tuple[float, float]:
-    """The change of an objective along its gradient, as the gradient predicts it and as it is measured.
+    """The change of an objective by a small step along its gradient: as the gradient predicts it, and as it is
+    measured.
 
     If the measured change is far below the predicted one, the gradient is masked: by a defense, by saturation, or by
     arithmetic that is not differentiable.
 
     Args:
-        value: deterministic objective of patches, (3, h, w) each in 0..1.
-        patches: patches at which the gradient is checked.
+        value: deterministic objective, a function of the patches.
+        patches: (3, h, w) each in 0..1: patches at which the gradient is checked.
 
     Returns:
-        The predicted and the measured change between both ends of the step.
+        The predicted and the measured change of the objective between both ends of the step.
     """
     asked = [patch.detach().clone().requires_grad_(True) for patch in patches]
     total = value(asked)
@@ -43,5 +44,5 @@ def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequ
 
 
 def _room(patch: Tensor, gradient: Tensor) -> Tensor:
-    """1 for values at which both ends of the step stay inside 0..1, otherwise 0."""
+    """A tensor like the patch: 1 for values at which both ends of the step stay inside 0..1, otherwise 0."""
     return ((patch > STEP) & (patch < 1 - STEP)).to(gradient)

@@ -38,11 +38,11 @@ ARRAYS, NUMBERS = ("textures", "mean", "square"), ("done", "seed", "has_gradient
 class TextureOptimiser:
     """The state of a texture optimisation: textures, Adam's moments, and the number of completed steps.
 
-    `state` returns all of it, so that an interrupted optimisation can be resumed.
+    `state` returns all arrays and numbers from which an interrupted optimisation can be resumed.
 
     Attributes:
         has_gradient: whether any gradient other than zero has reached the textures.
-        steps_without: number of steps since the last such gradient.
+        steps_without: number of successive steps whose gradient was zero, up to now.
     """
 
     def __init__(self, surfaces: int, settings: TextureSettings, rng: np.random.Generator, saved: State | None) -> None:
@@ -61,16 +61,18 @@ class TextureOptimiser:
         self.has_gradient, self.steps_without = bool(saved["has_gradient"]), int(saved["steps_without"])
 
     def note_gradient(self, gradient: float | None) -> None:
-        """Records the length of a step's gradient; None if nothing in the batch can be harmed any more."""
+        """Records the length of the objective's gradient in a step; None for a step in which nothing could be
+        harmed.
+        """
         self.steps_without = self.steps_without + 1 if gradient == 0 else 0
         self.has_gradient |= (gradient or 0.0) > 0
 
     def step(self, ascent: Tensor, share: float) -> None:
-        """Makes one Adam step; textures stay in 0..1.
+        """Changes the textures by one Adam step along a direction; values are clipped to 0..1.
 
         Args:
             ascent: (S, 3, h, w) direction in which the textures are changed.
-            share: share of the learning rate that is used, 0..1.
+            share: factor on the learning rate, 0..1.
         """
         self.done += 1
         self.mean.lerp_(ascent, 1 - BETAS[0])
@@ -85,7 +87,7 @@ class TextureOptimiser:
         return tuple(Patch(name=f"patch_{n}", rgb=one.copy()) for n, one in enumerate(rgb))
 
     def state(self) -> State:
-        """The arrays from which the optimisation can be resumed."""
+        """The arrays and numbers, by name, from which the optimisation can be resumed."""
         arrays = {name: getattr(self, name).numpy().copy() for name in ARRAYS}
         numbers = {name: np.int64(getattr(self, name)) for name in NUMBERS}
         return {**arrays, **numbers}
@@ -93,10 +95,10 @@ class TextureOptimiser:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Problem:
-    """What an attack optimises: a model, samples, the compositor and the settings.
+    """The arguments of a texture optimisation: a model, samples, the compositor and the settings.
 
     Attributes:
-        model, dataset, compositor: the arguments of `Attack.optimise`.
+        model, dataset, compositor: the attacked model, the samples, and the renderer of patches into their pictures.
         settings: settings of the optimisation.
     """
 
@@ -106,7 +108,7 @@ class Problem:
     settings: TextureSettings
 
     def surfaces(self) -> int:
-        """Number of patches to optimise.
+        """The number of patch surfaces in the scene, each of which gets a patch.
 
         Raises:
             GearError: the dataset has no sample with a patch surface.
@@ -117,14 +119,14 @@ class Problem:
         return count
 
     def seen(self, textures: Tensor, indexes: Sequence[int], step: int, seed: int) -> Seen:
-        """Composes the textures into the pictures of some samples.
+        """A batch of samples with the textures composed into their pictures.
 
-        Changes of appearance are drawn for each sample; they are the same in both views of a stereo pair.
+        Changes of the patch's appearance are drawn for each sample; they are the same in both views of a stereo pair.
 
         Args:
-            textures: (S, 3, h, w) in 0..1, one for each surface.
+            textures: (S, 3, h, w) in 0..1, one texture for each surface.
             indexes: indices of the samples in the dataset.
-            step: number of the step, which the random draws depend on.
+            step: number of the step, on which the random draws depend.
             seed: seed of the random draws.
         """
         samples = [self.dataset[index] for index in indexes]
@@ -139,10 +141,10 @@ class Problem:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Seen:
-    """A batch of samples whose pictures show the textures.
+    """A batch of samples with pictures into which the textures were composed.
 
     Attributes:
-        views: (B, 3, H, W) pictures by camera name, differentiable with respect to the textures.
+        views: (B, 3, H, W) pictures in 0..1 by camera name, differentiable with respect to the textures.
         samples: the samples of the batch.
         indexes: indices of the samples in the dataset.
     """
@@ -170,14 +172,14 @@ def optimise_textures(
     monitor: Monitor | None = None,
     before: Callable[[int], None] | None = None,
 ) -> tuple[Patch, ...]:
-    """Optimises the textures of all surfaces of the dataset together.
+    """Optimises the textures of all patch surfaces together with Adam, and returns them as patches.
 
     Args:
         problem: model, samples, compositor and settings.
         ascend: computes the ascent direction.
         budget: largest number of steps.
         rng: generator of all random choices.
-        monitor: called after every step.
+        monitor: called after every step; it can end the run and provide a saved state to start from.
         before: called before every step with the number of completed steps.
 
     Raises:
@@ -211,7 +213,7 @@ def optimise_textures(
 
 
 def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
-    """Indices of the samples of a step.
+    """The indices of the samples that one step of an attack uses.
 
     Every epoch has another permutation of the samples. The indices depend only on the arguments, so a resumed run has
     the same batches.
@@ -230,8 +232,11 @@ def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
 
 
 def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -> Direction:
-    """The direction of the scene-specific attack: the sum of the terms' gradients, each scaled to length 1,
-    minus the regularisers' gradients.
+    """Makes the ascent direction of the scene-specific attack, from the objective's and the regularisers'
+    gradients.
+
+    The gradient of each term is scaled to length 1 (with `per_term`) and multiplied by the term's weight; the sum is
+    scaled to length 1 again. The gradients of the regularisers, scaled to the lengths in the settings, are subtracted.
     """
 
     def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
@@ -267,13 +272,14 @@ def one_gradient(
     value: Callable[[Tensor, Seen], Mapping[str, Tensor]],
     penalties: Callable[[Tensor], Mapping[str, Tensor]] | None = None,
 ) -> Direction:
-    """The direction of attacks with one loss: the gradient of the sum of some scalars, without scaling.
+    """Makes the ascent direction of attacks with a single loss: the gradient of the sum of some scalars, without
+    scaling.
 
     Args:
         value: function from textures and a batch to the objective's scalars by name; it returns an empty mapping if
             nothing in the batch can be harmed any more.
-        penalties: function from textures to further scalars. Their gradients exist even if no picture shows the patch,
-            so they do not count as gradients of the objective.
+        penalties: function from textures to further scalars. Their gradients exist even if no picture contains the
+            patch, so they do not count as gradients of the objective.
     """
 
     def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
@@ -292,18 +298,18 @@ def one_gradient(
 
 
 def unit(gradient: Tensor) -> Tensor:
-    """Divides a tensor by its length (2-norm over all values); a tensor of zeros stays as it is."""
+    """A tensor divided by its length (2-norm over all values); a tensor of zeros is returned unchanged."""
     norm = gradient.norm()
     return gradient / norm if norm > 0 else gradient
 
 
 def gradient_to(value: Tensor, textures: Tensor, *, keep: bool = False) -> Tensor:
-    """The gradient of a scalar with respect to the textures; zeros if the scalar does not depend on them.
+    """The gradient of a scalar with respect to the textures; zeros if the scalar does not depend on the textures.
 
     Args:
         value: the scalar.
         textures: tensor that requires gradients.
-        keep: whether the graph is kept for another backward pass.
+        keep: whether the autograd graph is kept for another backward pass.
     """
     if not value.requires_grad:
         return torch.zeros_like(textures)

@@ -1,4 +1,4 @@
-"""Models that wrap models: several that are attacked together, and one behind a defense."""
+"""Models that contain other models: a group of models that are attacked together, and a model behind a defense."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Group(nn.Module):
 
     Attributes:
         members: the models by name.
-        device: device of the first member.
+        device: name of the first member's device.
     """
 
     def __init__(self, members: Mapping[str, Model]) -> None:
@@ -36,11 +36,11 @@ class Group(nn.Module):
         self.networks = _networks(*members.values())
 
     def predict(self, views: Mapping[str, UInt8Image]) -> dict[str, Any]:
-        """The prediction of every member, by its name."""
+        """The prediction of every member for one sample, by the member's name."""
         return {name: member.predict(views) for name, member in self.members.items()}
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """The outputs or losses of every member."""
+        """The outputs of all members for a batch, or their losses if `targets` are given, named `<member>/<name>`."""
         return {
             f"{name}/{key}": value
             for name, member in self.members.items()
@@ -48,7 +48,7 @@ class Group(nn.Module):
         }
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The feature maps of every member."""
+        """The tapped layers of all members (layers with readable feature maps), named `<member>/<name>`."""
         return {f"{name}/{key}": tap for name, member in self.members.items() for key, tap in member.taps().items()}
 
 
@@ -69,19 +69,20 @@ USUAL_WEIGHTS = DefenseWeights()
 
 
 class Defended(nn.Module):
-    """A model whose pictures are cleaned by a defense, for adaptive attacks.
+    """A model in front of which a defense cleans the pictures, for attacks that know the defense (adaptive
+    attacks).
 
     Args:
-        model: the model as the defense wraps it.
+        model: the model as the defense's `wrap` returned it.
         defense: the defense.
-        bare: the model without the wrapper, if the defense wraps it; its networks are attacked as well.
+        bare: the model before `wrap`, if the defense changes it; its networks are attacked as well.
         clean: function that cleans batches; None for the defense's `forward`.
         detect: function that cleans batches and also returns scores and masks; it replaces `clean`.
         weights: weights of the terms that lower the defense's score and mask.
         calibrate: function that fits the defense; the method `calibrate` calls it.
 
     Attributes:
-        device: device of the model without the wrapper.
+        device: name of the device of the model before `wrap`.
         weights: weights of the terms that lower the defense's score and mask.
     """
 
@@ -106,18 +107,24 @@ class Defended(nn.Module):
         self.networks = _networks(*(one for one in inside if one is not model or not isinstance(one, nn.Module)))
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """The prediction of the guarded model on pictures that are not cleaned. Attacks use `forward`, which
-        cleans them.
+        """The model's prediction for pictures of one sample, which are not cleaned by the defense.
+
+        Attacks use `forward`, which cleans the pictures.
         """
         return self.model.predict(views)
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """Outputs or losses of the model on the cleaned pictures; gradients pass the defense as its spec declares."""
+        """The model's outputs, or losses if `targets` are given, on the cleaned pictures.
+
+        Gradients pass the defense as its spec declares.
+        """
         return self.model.forward(self.defended(views).views, targets)
 
     def defended(self, views: Mapping[str, Tensor]) -> DefendedBatch:
-        """The defense's result for a batch of (B, 3, H, W) pictures by camera. The last result and its graph are
-        cached.
+        """The defense's result for a batch of (B, 3, H, W) pictures by camera name: pictures, and scores and masks
+        if any.
+
+        The last result is cached with its autograd graph.
         """
         has_gradients = torch.is_grad_enabled()
         if self._last is None or self._last[0] is not views or self._last[1] != has_gradients:
@@ -125,17 +132,20 @@ class Defended(nn.Module):
         return self._last[2]
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The feature maps of the model."""
+        """The tapped layers of the model (layers with readable feature maps), by name."""
         return self.model.taps()
 
 
 class Cleaned(Defended):
-    """A model whose pictures are cleaned by a defense that is not differentiable, for attacks that need no gradients.
+    """A model in front of which a defense without gradients cleans the pictures, for attacks that need no
+    gradients.
 
     The defense receives uint8 pictures, one sample at a time.
 
     Args:
-        model, defense, bare: as for `Defended`.
+        model: the model as the defense's `wrap` returned it.
+        defense: the defense.
+        bare: the model before `wrap`.
         clean: function that cleans the pictures of one sample.
     """
 
@@ -150,7 +160,7 @@ class Cleaned(Defended):
         super().__init__(model, defense, bare, partial(_cleaned_as_bytes, clean), calibrate=calibrate)
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """The model's outputs or losses on the cleaned pictures, without gradients."""
+        """The model's outputs, or losses if `targets` are given, on the cleaned pictures; without gradients."""
         with torch.no_grad():
             return super().forward(views, targets)
 
@@ -176,19 +186,17 @@ def _as_bytes(batch: Tensor) -> UInt8Image:
 
 
 def _networks(*models: Model) -> nn.ModuleList:
-    """The torch modules in models that may not be modules themselves, so that they are frozen and hashed too."""
+    """The torch modules inside the models as one list, so that modules of models that are no modules are frozen too."""
     return nn.ModuleList([network for model in models for _, network in networks_of(model)])
 
 
 def device_name(model: Model) -> str:
-    """Name of the device of a model; `cpu` if the model does not state one."""
+    """The name of a model's device; `cpu` if the model has no attribute `device`."""
     return str(getattr(model, "device", "cpu"))
 
 
 def members_of(model: Model) -> Mapping[str, Model]:
-    """The attacked models by prefix of their metrics: the members of a group, or the model itself with the
-    prefix "".
-    """
+    """The attacked models by the prefix of their term names: `<member>/` in a group, "" for a single model."""
     if isinstance(model, Group):
         return {f"{name}/": member for name, member in model.members.items()}
     return {"": model}

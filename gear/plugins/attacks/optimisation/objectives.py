@@ -1,8 +1,8 @@
-"""The objectives of attacks: for each task, terms that are computed from a model's outputs or losses.
+"""The objectives that attacks maximise: for each task, terms that are computed from a model's outputs or losses.
 
 Every term grows with the harm. For segmentation and depth, pixels that show the patch do not count, because an attack
-is measured by its effect on the rest of the picture. Losses of detectors and stereo networks cover the whole picture,
-as in training; there are no labelled objects on boards.
+is measured by its effect on the other pixels. Losses of detectors and stereo networks cover the whole picture, as in
+training; there are no labelled objects on billboards.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Kind = Literal["semseg", "depth", "losses"]
 
 
 def default_objective(sample: Any) -> Objective:
-    """The objective of an untargeted attack on the task of a sample."""
+    """The objective of an untargeted attack, chosen by the ground truth of a sample."""
     kind = kind_of(sample)
     if kind == "semseg":
         return SemsegObjective()
@@ -43,14 +43,14 @@ def default_objective(sample: Any) -> Objective:
 
 
 def kind_of(sample: Any) -> Kind:
-    """The kind of objective that fits a sample, by its ground truth: labels, depth, or the model's own losses."""
+    """The kind of objective that fits a sample: `semseg` for labels, `depth` for a depth map, else `losses`."""
     if hasattr(sample, "label_ids"):
         return "semseg"
     return "depth" if hasattr(sample, "depth_m") else "losses"
 
 
 def outside(samples: Sequence[Any], view: str, device: torch.device) -> Tensor:
-    """(B, H, W) bool: True for pixels that show no patch surface."""
+    """The (B, H, W) bool mask of the pixels in one view that show no patch surface."""
     masks = []
     for sample in samples:
         height, width = sample.images[view].shape[:2]
@@ -64,12 +64,13 @@ def outside(samples: Sequence[Any], view: str, device: torch.device) -> Tensor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SemsegObjective:
-    """Cross-entropy in two terms: over the correctly classified pixels (Y) and over the misclassified ones (N)
-    (Rossolini et al., 2022).
+    """Cross-entropy in two terms: over correctly classified pixels (Y) and over misclassified pixels (N).
+
+    The two terms are those of Rossolini et al. (2022).
 
     Attributes:
-        gamma: weight of the gradient of Y; that of N has 1 - gamma. `dynamic` takes the share of pixels that are
-            classified correctly.
+        gamma: weight of the term of Y; the term of N has the weight 1 - gamma. `dynamic` takes the current share of
+            correctly classified pixels.
         attacked, target: label ids. Pixels of the class `attacked` (of all classes if None) are pushed to the class
             `target`. If `target` is None, the attack is untargeted.
     """
@@ -81,7 +82,7 @@ class SemsegObjective:
 
     @property
     def needs_clean_output(self) -> bool:
-        """Whether `harm` needs the network's output on the picture without the patch; it is computed once per
+        """Whether `harm` needs the network's output on the picture without the patch, which costs one pass per
         sample.
         """
         return self.target is None and self.gamma != "dynamic"
@@ -89,7 +90,9 @@ class SemsegObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """Two terms, `correct` (pixels in Y) and `wrong` (pixels in N); for a targeted attack one term, `target`."""
+        """The terms `correct` (pixels in Y) and `wrong` (pixels in N); for a targeted attack the single term
+        `target`.
+        """
         logits, labels, counts = self._outputs(model, views, samples)
         if self.target is not None:
             return self._targeted(logits, labels, counts)
@@ -103,11 +106,11 @@ class SemsegObjective:
         return _split(loss, {"correct": (right, gamma), "wrong": (wrong, 1 - gamma)})
 
     def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
-        """The harm as one number. With a fixed `gamma` it is the weighted sum of both terms, where Y and N come from
-        the output without the patch.
+        """The harm as one number: the weighted sum of the terms.
 
-        With the current Y and N the value would fall while the attack succeeds: pixels that become wrong leave Y, the
-        mean over the rest of Y is small, and it is 0 when no pixel is right any more.
+        With a fixed `gamma`, the sets Y and N are those of the output without the patch. With the current sets the
+        value would fall while the attack succeeds: a pixel that becomes wrong leaves Y, and the mean over the remaining
+        pixels of Y is smaller.
         """
         if not self.needs_clean_output:
             terms = [one.weight * one.value for one in self.terms(model, views, samples, indexes).values()]
@@ -126,7 +129,7 @@ class SemsegObjective:
     def _outputs(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any]
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Logits, target labels, and (B, H, W) bool of the pixels that count."""
+        """Logits (B, C, H, W), target labels (B, H, W), and the (B, H, W) bool mask of the pixels that count."""
         logits = _logits(model, views)
         labels = train_labels(samples, logits.shape[1]).to(logits.device)
         return logits, labels, outside(samples, next(iter(views)), logits.device) & (labels != IGNORED_TRAIN_ID)
@@ -142,14 +145,15 @@ class SemsegObjective:
 
 
 class DepthObjective:
-    """Smooth L1 distance from the network's own output on the picture without the patch, in two terms: small and large
-    errors.
+    """Smooth L1 distance from the network's own output on the picture without the patch, in two terms by size of
+    error.
 
     Args:
-        gamma: weight of the term of small errors (at most `split_m`); that of large errors has 1 - gamma.
+        gamma: weight of the term of small errors (at most `split_m`); the term of large errors has the weight 1 -
+            gamma.
         split_m: limit between small and large errors, metres.
-        direction: `any` error, or only depth that is `farther` or `nearer` than the output without the patch. For the
-            last two there is one term, the mean change of the logarithm of depth.
+        direction: `any` error, or only depth that is `farther` or `nearer` than the output without the patch. For
+            `farther` and `nearer` there is one term, the mean change of the logarithm of depth.
     """
 
     needs_clean_output = True
@@ -163,7 +167,9 @@ class DepthObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """Two terms, `small` and `large`; or one term, named after the direction."""
+        """The terms `small` and `large` (errors up to `split_m` and above); with a direction, one term named after
+        it.
+        """
         depth_m, clean, free = self._outputs(model, views, samples, indexes)
         if self._direction != "any":
             return {self._direction: Term(value=self._pushed(depth_m, clean, free))}
@@ -185,7 +191,9 @@ class DepthObjective:
     def _outputs(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """(B, H, W) depth in metres with the patch and without it, and bool of the pixels that show no patch."""
+        """(B, H, W) depth in metres with the patch, without the patch, and the bool mask of pixels that show no
+        patch.
+        """
 
         def said(sample: Any) -> Tensor:
             return _output(model, as_batch([sample.images], list(views)), "depth_m")[0]
@@ -202,8 +210,7 @@ class DepthObjective:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LossObjective:
-    """The model's own training losses against the ground truth, for detectors and stereo networks; one term for each
-    loss.
+    """An objective of the model's own training losses against the ground truth, for detectors and stereo networks.
 
     Attributes:
         signs: weight of each loss by name: 1 maximises it, -1 minimises it, 0 ignores it. Losses without an entry have
@@ -215,7 +222,7 @@ class LossObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One term for each loss."""
+        """One term for each loss of the model with a weight other than 0."""
         losses = model.forward(views, samples)
         signs = {name: self.signs.get(name, 1.0) for name in losses}
         return {name: Term(value=loss, weight=signs[name]) for name, loss in losses.items() if signs[name]}
@@ -228,9 +235,11 @@ def counted(
     samples: Sequence[Any],
     indexes: Sequence[int],
 ) -> list[Tensor]:
-    """Scalars whose sum is the harm by which patches are compared, over all members of a group.
+    """Scalars whose sum is the harm, by which attacks without gradients compare patches; over all members of a
+    group.
 
-    For each member it is the objective's `harm` if it has that method, otherwise its weighted terms.
+    For each member the harm is the objective's `harm` if it has this method, otherwise its weighted terms. The terms
+    against a member's defense are included.
     """
     if isinstance(objective, HarmObjective):
         harms = [objective.harm(member, views, samples, indexes) for member in members_of(model).values()]
@@ -248,7 +257,9 @@ def weighted(
     samples: Sequence[Any],
     indexes: Sequence[int],
 ) -> list[Tensor]:
-    """The weighted terms of all members of a group, for attacks that maximise their sum."""
+    """The weighted terms of the objective as scalars, over all members of a group, for attacks that maximise their
+    sum.
+    """
     return [
         term.weight * term.value
         for member in members_of(model).values()
@@ -263,13 +274,13 @@ def all_terms(
     samples: Sequence[Any],
     indexes: Sequence[int],
 ) -> dict[str, Term]:
-    """The objective's terms for one model, and the terms against its defense if it has one."""
+    """The objective's terms for one model by name, and the terms against the model's defense if there is one."""
     return {**objective.terms(member, views, samples, indexes), **defense_terms(member, views, samples)}
 
 
 def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[Any]) -> dict[str, Term]:
-    """The terms `defense_score` and `defense_mask`; they grow as the defense's score falls and as its mask leaves the
-    patch.
+    """The terms against a model's defense: `defense_score` grows as the score falls, `defense_mask` as the mask
+    shrinks.
 
     They are the negative mean of the scores, and the negative mean of the unrounded mask over the visible pixels of the
     patch, as in the defense-aware attacks of Z-Mask's supplement (Rossolini et al., AAAI 2023). The result is empty for
@@ -287,7 +298,7 @@ def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[
 
 
 def not_finite(what: str, indexes: Sequence[int]) -> GearError:
-    """The error for a value that is not finite; it names the samples for which the value was computed."""
+    """Makes the error for a NaN or infinite value; the message names the samples for which the value was computed."""
     which = f"sample{'s' * (len(indexes) > 1)} {', '.join(map(str, indexes))}"
     return GearError(
         f"{what} is NaN or infinite, as is what the model says of {which} with the patch; see to its weights"
@@ -295,7 +306,7 @@ def not_finite(what: str, indexes: Sequence[int]) -> GearError:
 
 
 def loss_names(model: Model, sample: Any) -> list[str]:
-    """Names of a model's losses (or of those of all members of a group), in the order in which the model returns
+    """The names of a model's training losses, in the order in which the model (or each member of a group) returns
     them.
     """
     views = as_batch([sample.images], list(sample.images))
@@ -305,7 +316,7 @@ def loss_names(model: Model, sample: Any) -> list[str]:
 
 
 def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
-    """(B, H, W) int64 targets for logits over 19 train ids or over label ids; 255 means that a pixel is ignored.
+    """The (B, H, W) int64 target classes of samples, for logits over 19 train ids or 34 label ids; 255 is ignored.
 
     Raises:
         ValueError: there are fewer classes than Cityscapes has train ids.
@@ -320,19 +331,19 @@ def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
 
 
 def class_of(label_id: int, classes: int) -> int:
-    """The channel that belongs to a label id in logits with `classes` channels."""
+    """The channel of a Cityscapes label id in logits with `classes` channels: its train id for 19, otherwise the id."""
     return int(TRAIN_IDS[label_id]) if classes == TRAIN_CLASSES else label_id
 
 
 def _is_right(logits: Tensor, labels: Tensor) -> Tensor:
-    """(B, H, W) bool: True where the most probable class is the label; meaningless where the label is ignored."""
+    """The (B, H, W) bool mask of pixels whose most probable class is the label; undefined where labels are ignored."""
     # `amax` is much faster than `argmax`.
     given = logits.gather(1, labels.clamp(max=logits.shape[1] - 1)[:, None])[:, 0]
     return given == logits.amax(1)
 
 
 def _output(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
-    """The output `name` of a model; its size must be that of the picture.
+    """The output `name` of a model on pictures; its height and width must be those of the pictures.
 
     Raises:
         GearError: the model has no such output, or its size differs.
@@ -354,10 +365,10 @@ def _output(model: Model, views: Mapping[str, Tensor], name: str) -> Tensor:
 
 
 def _logits(model: Model, views: Mapping[str, Tensor]) -> Tensor:
-    """(B, C, H, W) logits of a network over the classes of Cityscapes.
+    """(B, C, H, W) logits of a network over the 19 train ids or the 34 label ids of Cityscapes.
 
     Raises:
-        GearError: the network has other classes.
+        GearError: the network has another number of classes.
     """
     logits = _output(model, views, "logits")
     known = TRAIN_CLASSES, len(TRAIN_IDS)
@@ -377,7 +388,7 @@ def _mask(counts: str, height: int, width: int) -> npt.NDArray[np.bool_]:
 
 
 def _split(values: Tensor, parts: Mapping[str, tuple[Tensor, float]]) -> Mapping[str, Term]:
-    """One term for each part: the mean over the part's pixels, with the part's weight.
+    """One term for each part of the pixels: the mean of the values over the part, with the part's weight.
 
     Parts that are empty or have weight 0 give no term. Counting the pixels of a part is several times as fast as `any`.
     """
@@ -385,6 +396,6 @@ def _split(values: Tensor, parts: Mapping[str, tuple[Tensor, float]]) -> Mapping
 
 
 def _mean(values: Tensor, where: Tensor) -> Tensor:
-    """Mean over the selected pixels; if none is selected, 0 with a gradient of 0."""
+    """The mean of values over the selected pixels; 0 with a gradient of 0 if no pixel is selected."""
     # The mask is converted once: a product with bools converts them in the forward and in the backward pass.
     return (values * where.to(values.dtype)).sum() / where.sum().clamp_min(1)

@@ -1,4 +1,4 @@
-"""The objective for attacks without gradients: its value on some samples, with a limit on forward passes."""
+"""The objective of attacks without gradients: harm from forward passes, whose number is limited."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Oracle:
     new sample.
 
     Attributes:
-        left: number of queries that are left.
+        left: number of remaining queries.
     """
 
     def __init__(
@@ -41,29 +41,32 @@ class Oracle:
         self._seen: set[int] = set()
 
     def state(self) -> State:
-        """The remaining queries, and the samples whose clean output is already paid for, for a checkpoint."""
+        """The arrays for a checkpoint: the remaining queries, and the samples whose output without the patch was
+        counted.
+        """
         return {"left": np.array(self.left), "paid": np.array(sorted(self._seen), np.int64)}
 
     def restore(self, state: State) -> None:
-        """Restores what `state` returned.
+        """Restores the number of queries and the counted samples from a checkpoint that contains the arrays of
+        `state`.
 
         Raises:
-            GearError: the saved state does not contain it.
+            GearError: the checkpoint lacks these arrays, or they are damaged.
         """
         check_saved(state, {"left": np.array(0), "paid": np.zeros(np.size(state.get("paid", ())), np.int64)})
         self.left, self._seen = int(state["left"]), {int(index) for index in state["paid"]}
 
     def cost(self, indexes: Sequence[int]) -> int:
-        """Number of queries that one evaluation on these samples costs."""
+        """The number of queries that one evaluation of the harm on these samples costs."""
         asks = isinstance(self._objective, HarmObjective) and self._objective.needs_clean_output
         clean = len(set(indexes) - self._seen) if asks else 0
         return len(members_of(self._model)) * (1 + clean)
 
     def harm(self, textures: Textures, indexes: Sequence[int]) -> float:
-        """The harm of textures as one number, from forward passes without gradients.
+        """The harm of textures on some samples as one number, from forward passes without gradients.
 
         Raises:
-            RuntimeError: no queries are left.
+            RuntimeError: fewer queries are left than the evaluation costs.
             GearError: the harm is not finite.
         """
         cost = self.cost(indexes)
@@ -82,6 +85,6 @@ class Oracle:
 
 
 def as_patches(textures: Textures) -> tuple[Patch, ...]:
-    """The textures as patches."""
+    """Converts (S, 3, h, w) textures to patches named `patch_0`, `patch_1`, …, one for each surface."""
     rgb = np.ascontiguousarray(textures.transpose(0, 2, 3, 1), np.float32)
     return tuple(Patch(name=f"patch_{n}", rgb=one) for n, one in enumerate(rgb))

@@ -33,8 +33,9 @@ COVERS = (0.0, 0.5, 1.0)
 
 
 def smoothness(patch: Tensor) -> Tensor:
-    """Sum of squared differences between neighbouring pixels of a (3, h, w) patch, as in the CARLA-GeAR paper; 0
-    for a single colour.
+    """Sum of squared differences between neighbouring pixels of a (3, h, w) patch, as in the CARLA-GeAR paper.
+
+    The sum is 0 for a patch of a single colour.
     """
     down, right = patch[:, 1:] - patch[:, :-1], patch[:, :, 1:] - patch[:, :, :-1]
     return down.square().sum() + right.square().sum()
@@ -44,7 +45,7 @@ def non_printability(patch: Tensor) -> Tensor:
     """Sum over the pixels of a (3, h, w) patch in 0..1 of the distance to the nearest printable colour.
 
     Sharif et al. (CCS 2016) multiply the distances to all printable colours; with many colours the gradient of that
-    product nearly vanishes. The smallest distance is used instead, as in Thys et al. (2019).
+    product nearly vanishes. Like Thys et al. (2019), this function takes the smallest distance.
     """
     palette = palette_srgb().to(patch)
     pixels = patch.flatten(1).T
@@ -53,7 +54,7 @@ def non_printability(patch: Tensor) -> Tensor:
 
 @functools.cache
 def palette_srgb() -> Tensor:
-    """The printable colours: (27, 3) sRGB values in 0..1 of all mixtures of cyan, magenta and yellow at 0, 50 and 100 %
+    """The printable colours: (27, 3) sRGB in 0..1, all mixtures of cyan, magenta, yellow at 0, 50 and 100 %
     coverage.
 
     Half coverage mixes paper and solid ink by area (Neugebauer's equations with Demichel's areas) in linear light.

@@ -1,4 +1,4 @@
-"""Settings of the texture optimisation. The module does not import torch, so that plugin specs load quickly."""
+"""Settings of attacks that optimise patch textures. The module does not import torch, so plugin specs load quickly."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Appearance:
         noise: standard deviation of noise on every value.
         brightness: standard deviation of an offset that is the same for all values.
         contrast: standard deviation of a factor around 1.
-        blur_px: largest side of a box blur in pixels. The side is drawn uniformly between 3 and this; below 3 there is
+        blur_px: largest side of a box blur, pixels. The side is drawn uniformly from 3 to this value; below 3 there is
             no blur.
     """
 
@@ -36,7 +36,7 @@ class Appearance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextureSettings:
-    """Settings of textures that Adam optimises, on values in 0..1.
+    """Settings of attacks that optimise patch textures with Adam, on values in 0..1.
 
     Attributes:
         height_px, width_px: size of every patch, pixels.
@@ -66,17 +66,17 @@ class TextureSettings:
 
     @property
     def rate(self) -> float | tuple[float, float, float]:
-        """The learning rate; 0.06 if the setting is null."""
+        """The peak learning rate, one number or one for each channel; 0.06 if the setting is null."""
         return USUAL_RATE if self.learning_rate is None else self.learning_rate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings(TextureSettings):
-    """Texture settings for gradients that are scaled to length 1, with regularisers.
+    """Settings of attacks that scale gradients to length 1 and use regularisers.
 
     Attributes:
         smoothness: length of the gradient of the smoothness term, where the objective's gradient has length 1.
-        printability: length of the gradient of the non-printability term.
+        printability: length of the gradient of the non-printability term, on the same scale.
         per_term: whether the gradient of each term is scaled to length 1 separately, which needs one backward pass for
             each term.
     """

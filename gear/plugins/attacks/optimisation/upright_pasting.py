@@ -1,4 +1,4 @@
-"""Pictures with patches pasted upright at random places, for attacks that do not use the scene."""
+"""Pictures with patches pasted upright at random positions, for attacks that do not use the scene."""
 
 from __future__ import annotations
 
@@ -15,21 +15,23 @@ from gear.formats import rle
 from gear.values.rng import derive_rng
 
 Place = tuple[int, int, int, int]
-"""Place of a pasted patch: top, left, height, width in pixels, inside the picture."""
+"""Position and size of a pasted patch: top, left, height, width in pixels, inside the picture."""
 
 
 class Upright(Sequence[Any]):
-    """A dataset and a compositor in one; the surfaces of its samples are the random places where patches are pasted.
+    """A dataset and a compositor in one: patches are pasted upright into its pictures at random positions.
 
-    Both views of a stereo pair show a patch at the same pixels, like an object very far away.
+    The surfaces in its samples are these positions. Both views of a stereo pair show a patch at the same pixels, like
+    an object very far away.
 
     Args:
         dataset: dataset of the pictures; its own surfaces are not changed.
-        seed: seed of the places.
+        seed: seed of the positions.
         aspect: height of a patch divided by its width.
         share: width of a patch as a share of the picture's width.
-        scales: range of the factor on that width, drawn uniformly.
-        shift: largest shift of a patch from its regular place, as a share of its size.
+        scales: range of the random factor on that width, drawn uniformly.
+        shift: largest shift of a patch from its regular position, as a share of its size. Regular positions divide the
+            picture's width equally.
     """
 
     def __init__(
@@ -47,7 +49,7 @@ class Upright(Sequence[Any]):
         self._step = 0
 
     def begin(self, step: int) -> None:
-        """Starts a step; new places are drawn for each step."""
+        """Starts a step of the attack: positions are drawn anew for each step."""
         self._step = step
 
     def __len__(self) -> int:
@@ -73,7 +75,7 @@ class Upright(Sequence[Any]):
         return dataclasses.replace(sample, surfaces=tuple(surfaces))
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """Composes patches into pictures.
+        """Pastes patches into the pictures of one view.
 
         Args:
             patches: (3, h, w) for all samples, or (B, 3, h, w) with a patch for each sample; 0..1.
@@ -81,7 +83,7 @@ class Upright(Sequence[Any]):
             view: name of the camera.
 
         Returns:
-            (B, 3, H, W) in 0..1.
+            (B, 3, H, W) pictures in 0..1, differentiable with respect to the patches.
         """
         pictures = []
         for number, index in enumerate(samples):
@@ -98,7 +100,7 @@ class Upright(Sequence[Any]):
         return torch.stack(pictures)
 
     def places(self, index: int) -> list[Place]:
-        """The places of a sample's patches in this step: side by side, then scaled and shifted."""
+        """The positions of a sample's patches in the current step: side by side, then scaled and shifted at random."""
         sample = self._dataset[index]
         height, width = next(iter(sample.images.values())).shape[:2]
         count = len(sample.record.surfaces)
