@@ -40,11 +40,11 @@ class BitDepth(PerPicture):
         self._table = np.rint(np.rint(np.arange(256) / 255 * steps) / steps * 255).astype(np.uint8)
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The (H, W, 3) picture with fewer bits per channel; no mask."""
+        """The (H, W, 3) uint8 picture with fewer bits per channel, and None instead of a mask."""
         return self._table[picture], None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The pictures with fewer bits, (B, 3, H, W); the gradient passes as if nothing had been done (BPDA)."""
+        """The (B, 3, H, W) pictures with fewer bits per channel; the gradient is that of the identity (BPDA)."""
         return straight_through(pictures, each_as_uint8(pictures, lambda picture: self._table[picture]))
 
 

@@ -1,6 +1,4 @@
-"""FPDA (Rossolini et al., IEEE TNNLS 2023): scores unusual features like HyperNeuron, after averaging them over
-channels.
-"""
+"""FPDA (Rossolini et al., IEEE TNNLS 2023): scores unusual features of a network after averaging over channels."""
 
 from __future__ import annotations
 
@@ -21,8 +19,9 @@ PEAK_CELLS = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FpdaConfig(DetectorConfig):
-    """Options. The paper says that features are compressed over channels and compared by z-scores, but not how in
-    detail.
+    """Options of the defense `fpda`.
+
+    The paper says that features are compressed over channels and compared by z-scores, but gives no details.
 
     Attributes:
         compress: what is averaged over channels: the features (`mean`) or their magnitudes (`mean_abs`).
@@ -35,7 +34,7 @@ class FpdaConfig(DetectorConfig):
 
 
 def build(config: FpdaConfig) -> Defense:
-    """Makes the detector from its options."""
+    """Makes the defense `fpda` from its options."""
     from torch.nn import functional
 
     from gear.plugins.defenses.activations.score_detector import Detector

@@ -45,14 +45,14 @@ class Gaussian(PerPicture):
         self._kernel: npt.NDArray[np.float32] = (kernel / kernel.sum()).astype(np.float32)
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The blurred (H, W, 3) picture; no mask."""
+        """The blurred (H, W, 3) uint8 picture, and None instead of a mask."""
         blurred = cv2.sepFilter2D(
             picture.astype(np.float32), -1, self._kernel, self._kernel, borderType=cv2.BORDER_REFLECT_101
         )
         return np.clip(np.rint(blurred), 0, 255).astype(np.uint8), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The blurred pictures, (B, 3, H, W), by the same convolution in torch."""
+        """The blurred (B, 3, H, W) pictures, by the same convolution in torch; differentiable."""
         import torch
         from torch.nn import functional
 
@@ -67,9 +67,10 @@ class Gaussian(PerPicture):
 
 
 def _mirrored(side_px: int, radius_px: int) -> npt.NDArray[np.int64]:
-    """Indices of the pixels of a row of `side_px` pixels with mirrored borders of `radius_px` pixels.
+    """Indices of the pixels of a line of `side_px` pixels with mirrored borders of `radius_px` pixels.
 
-    If a border is wider than the row, the row is mirrored repeatedly; torch's own padding does not allow such borders.
+    If a border is wider than the line, the line is mirrored repeatedly; torch's own padding does not allow such
+    borders.
     """
     there_and_back_px = max(2 * (side_px - 1), 1)
     steps = np.arange(-radius_px, side_px + radius_px) % there_and_back_px

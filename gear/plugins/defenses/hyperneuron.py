@@ -1,4 +1,4 @@
-"""HyperNeuron (Co et al., 2021): detects patches by unusual values of a network's neurons."""
+"""HyperNeuron (Co et al., 2021): a score of how unusual the values of a network's neurons are."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ FAR = 3.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HyperNeuronConfig(DetectorConfig):
-    """Options. The paper says that the score comes from the z-scores of all features of one layer, but not how they are
-    combined.
+    """Options of the defense `hyperneuron`.
+
+    The paper computes the score from the z-scores of all features of one layer, but does not say how they are combined.
 
     Attributes:
         statistics: what has a mean and a deviation: each `neuron` (channel and position), or the mean over a picture of
@@ -34,7 +35,7 @@ class HyperNeuronConfig(DetectorConfig):
 
 
 def build(config: HyperNeuronConfig) -> Defense:
-    """Makes the detector from its options."""
+    """Makes the defense `hyperneuron` from its options."""
     from gear.plugins.defenses.activations.score_detector import Detector
 
     def compress(features: Tensor) -> Tensor:

@@ -40,11 +40,11 @@ class Jpeg(PerPicture):
         self._parameters = [cv2.IMWRITE_JPEG_QUALITY, config.quality]
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The (H, W, 3) picture after compression; no mask."""
+        """The (H, W, 3) uint8 picture after JPEG compression, and None instead of a mask."""
         return self._recode(picture), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The pictures after compression, (B, 3, H, W); the gradient passes as if nothing had been done (BPDA)."""
+        """The (B, 3, H, W) pictures after JPEG compression; the gradient is that of the identity (BPDA)."""
         return straight_through(pictures, each_as_uint8(pictures, self._recode))
 
     def _recode(self, picture: UInt8Image) -> UInt8Image:

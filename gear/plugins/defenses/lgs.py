@@ -23,7 +23,7 @@ LEAST_SPREAD = 1e-7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LgsConfig:
-    """Options; the defaults are the paper's values.
+    """Options of local gradients smoothing; the defaults are the paper's values.
 
     Attributes:
         window_px: side of the windows, pixels.
@@ -49,11 +49,11 @@ class LgsConfig:
 
 
 class Lgs(PerPicture):
-    """The defense: x * (1 - clip(lambda * g * B, 0, 1)), with the normalised gradient g and the union B of windows
-    whose mean gradient exceeds the threshold.
+    """Local gradients smoothing of a picture x: x * (1 - clip(lambda * g * B, 0, 1)).
 
-    g holds first-order differences of the grey picture, normalised to 0..1 for each picture. Windows that reach over
-    the right or lower border are averaged over their part inside, so that no strip of the picture is left out.
+    The gradient g holds first-order differences of the grey picture, normalised to 0..1 for each picture. B is 1 in the
+    windows whose mean gradient exceeds the threshold, otherwise 0. Windows that reach over the right or lower border
+    are averaged over their part inside, so no strip of the picture is left out.
     """
 
     def __init__(self, config: LgsConfig) -> None:
@@ -61,7 +61,7 @@ class Lgs(PerPicture):
         self._stride_px = config.window_px - config.overlap_px
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The darkened (H, W, 3) picture, and as a mask (H, W) how much each pixel was darkened, 0..1."""
+        """The darkened (H, W, 3) uint8 picture, and the (H, W) mask of how much each pixel was darkened, 0..1."""
         unit = picture.astype(np.float32) / 255
         grey = unit @ np.array(GREY, np.float32)
         dx, dy = np.zeros_like(grey), np.zeros_like(grey)
@@ -74,7 +74,7 @@ class Lgs(PerPicture):
         return np.rint(unit * (1 - mask[..., None]) * 255).astype(np.uint8), mask.astype(np.float32)
 
     def _busy(self, gradient: Mask) -> Mask:
-        """(H, W) of 0 and 1: the union of the windows whose mean gradient exceeds the threshold."""
+        """The (H, W) union of the windows whose mean gradient exceeds the threshold: 1 inside, 0 outside."""
         height, width = gradient.shape
         sums = cv2.integral(gradient, sdepth=cv2.CV_64F)
         top, left = self._starts(height), self._starts(width)
@@ -92,9 +92,7 @@ class Lgs(PerPicture):
         return np.arange(count) * self._stride_px
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The darkened pictures, (B, 3, H, W), by the same operation in torch; the choice of windows has no
-        gradient.
-        """
+        """The darkened (B, 3, H, W) pictures, by the same operation in torch; the choice of windows has no gradient."""
         import torch
 
         grey = (pictures * pictures.new_tensor(GREY).view(1, 3, 1, 1)).sum(1, keepdim=True)

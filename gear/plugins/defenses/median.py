@@ -40,12 +40,12 @@ class Median(PerPicture):
         self._side_px = 2 * config.radius_px + 1
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The filtered (H, W, 3) picture; no mask."""
+        """The median-filtered (H, W, 3) uint8 picture, and None instead of a mask."""
         return np.asarray(cv2.medianBlur(np.ascontiguousarray(picture), self._side_px), np.uint8), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The filtered pictures, (B, 3, H, W). The median is one of the pixels of its window; the gradient goes
-        to that pixel.
+        """The median-filtered (B, 3, H, W) pictures; the gradient goes to the pixel of the window that is the
+        median.
         """
         from torch.nn import functional
 

@@ -1,4 +1,4 @@
-"""Base class of defenses that clean each picture separately: no model, no calibration, no randomness."""
+"""The base class of defenses that clean each picture separately: no model, no calibration, no randomness."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ Mask = npt.NDArray[np.float32]
 
 
 class PerPicture(ABC):
-    """A `Defense` that subclasses define by two functions that clean pictures: one in NumPy, one in torch."""
+    """The base class of defenses that clean each picture separately; subclasses define `clean` and `clean_tensor`.
+
+    `clean` is the NumPy version for evaluation, `clean_tensor` the torch version for attacks that need gradients.
+    """
 
     @abstractmethod
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
@@ -30,7 +33,7 @@ class PerPicture(ABC):
             picture: (H, W, 3) uint8 sRGB.
 
         Returns:
-            The cleaned picture, a new array, and the estimated mask of the patch in 0..1, (H, W), or None.
+            The cleaned picture as a new array, and the estimated (H, W) mask of the patch in 0..1, or None.
         """
 
     @abstractmethod
@@ -50,7 +53,7 @@ class PerPicture(ABC):
     def apply(
         self, views: Mapping[str, UInt8Image], model: Model | None, state: Any, rng: np.random.Generator
     ) -> DefenseResult:
-        """Cleans the picture of each camera."""
+        """Cleans the picture of each camera; the score is the largest mean of the masks, None without masks."""
         cleaned: dict[str, UInt8Image] = {}
         masks: dict[str, Mask] = {}
         for name, picture in views.items():
@@ -61,7 +64,7 @@ class PerPicture(ABC):
         return DefenseResult(views=cleaned, mask=masks or None, score=score)
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Cleans a batch of pictures for each camera."""
+        """Cleans the (B, 3, H, W) pictures of each camera, in 0..1."""
         return {name: self.clean_tensor(pictures) for name, pictures in views.items()}
 
     def wrap(self, model: Model) -> Model:
@@ -70,13 +73,14 @@ class PerPicture(ABC):
 
 
 def straight_through(pictures: Tensor, cleaned: Tensor) -> Tensor:
-    """The cleaned values, with the gradient of doing nothing (BPDA with the identity; Athalye et al., ICML 2018)."""
+    """The cleaned values with the gradient of the identity (BPDA; Athalye et al., ICML 2018)."""
     return pictures + (cleaned - pictures).detach()
 
 
 def each_as_uint8(pictures: Tensor, clean: Any) -> Tensor:
-    """Applies a NumPy function for one uint8 picture to every picture of a (B, 3, H, W) batch in 0..1, without a
-    gradient.
+    """Applies a NumPy function for one (H, W, 3) uint8 picture to every picture of a (B, 3, H, W) batch in 0..1.
+
+    The result has no gradient.
     """
     import torch
 

@@ -9,7 +9,7 @@ from gear.plugins.defenses.activations.zmask_options import ZMaskConfig
 
 
 def build(config: ZMaskConfig) -> Defense:
-    """Makes the defense from its options."""
+    """Makes the defense Z-Mask from its options."""
     from gear.plugins.defenses.activations.zmask import ZMask
 
     return ZMask(config)

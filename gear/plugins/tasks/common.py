@@ -31,11 +31,11 @@ REPAIR = "`gear verify DIR --repair` makes it again"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraOptions:
-    """The camera of a task, on the ego car.
+    """The options of a task's camera, which is mounted on the ego car.
 
     Attributes:
         width_px, height_px: size of the picture.
-        hfov_deg: horizontal field of view, 1 to 170; not used where `focal_px` is given.
+        hfov_deg: horizontal field of view, 1 to 170; not used if `focal_px` is set.
         position_m: in the ego frame: x forward, y left, z up, the origin on the ground.
         pitch_deg: downward rotation, -90 to 90.
         roll_deg: clockwise rotation as seen from behind the camera, -180 to 180.
@@ -70,11 +70,11 @@ class CameraOptions:
 
     @property
     def is_level(self) -> bool:
-        """Whether the camera's vertical axis is vertical in the world in every sample."""
+        """Whether the camera is level in every sample: no pitch, no roll, and `follows_road` is False."""
         return self.pitch_deg == 0 and self.roll_deg == 0 and not self.follows_road
 
     def mount(self, name: str, right_m: float = 0.0) -> CameraMount:
-        """The mount of a named camera, moved to the right along its own horizontal axis by a number of metres."""
+        """The mount of a camera on the ego car, moved by `right_m` metres along the camera's own horizontal axis."""
         return CameraMount(
             name=name,
             width_px=self.width_px,
@@ -89,7 +89,9 @@ class CameraOptions:
         )
 
     def _moved_right(self, right_m: float) -> Vec3:
-        """The position after a move along the picture's horizontal axis, which roll tilts and pitch does not."""
+        """The camera's position after a move along the picture's horizontal axis, which roll tilts and pitch does
+        not.
+        """
         x, y, z = self.position_m
         pitch_rad, roll_rad = math.radians(self.pitch_deg), math.radians(self.roll_deg)
         down_m = right_m * math.sin(roll_rad)
@@ -98,19 +100,19 @@ class CameraOptions:
 
 
 def surfaces_of(frame: Frame, record: SceneRecord) -> tuple[SurfaceTruth, ...]:
-    """Measures every surface in every view, view by view in the record's order of cameras."""
+    """The ground truth of every patch surface in every view, ordered by the record's cameras."""
     return tuple(
         truth for camera in record.cameras for truth in observe_surfaces(frame.views[camera.name], frame.geoms, record)
     )
 
 
 def images_of(frame: Frame) -> dict[str, UInt8Image]:
-    """The pictures of all views, by camera name."""
+    """The (H, W, 3) uint8 pictures of all views of a frame, by camera name."""
     return {name: view.rgb for name, view in frame.views.items()}
 
 
 def read_rgb(root: Path, relative: str, record: SceneRecord | None = None, view: str = "") -> UInt8Image:
-    """Reads a colour picture of a dataset; if a view of a record is named, the picture must have its size.
+    """Reads a colour picture of a dataset, (H, W, 3) uint8; with a record and a view, its size is checked.
 
     Raises:
         DatasetError: the file is missing, outside of the dataset, damaged, or of another size than the view.
@@ -124,7 +126,15 @@ def read_rgb(root: Path, relative: str, record: SceneRecord | None = None, view:
 def read_map(
     root: Path, relative: str, record: SceneRecord, view: str, dtype: npt.DTypeLike, most: int | None = None
 ) -> npt.NDArray[Any]:
-    """Reads a label or depth picture of one view of a record; `most` is the largest value that it may hold.
+    """Reads the (H, W) label or depth map of one view of a record.
+
+    Args:
+        root: root of the dataset.
+        relative: path of the file below the root.
+        record: record of the sample.
+        view: name of the camera.
+        dtype: dtype that the map must have.
+        most: largest allowed value.
 
     Raises:
         DatasetError: the file is missing or damaged, or has another size than the view, another dtype or larger values.
@@ -138,7 +148,7 @@ def read_map(
 
 
 def read_plain(root: Path, relative: str) -> npt.NDArray[Any]:
-    """Reads a label or depth picture of any size.
+    """Reads a label or depth map of any size and dtype, without conversion.
 
     Raises:
         DatasetError: the file is missing, outside of the dataset, or damaged.
@@ -170,14 +180,17 @@ IGNORED_COLOUR = (170, 170, 170)
 
 
 def draw_surfaces(picture: UInt8Image, sample: Sample, camera: str) -> None:
-    """Draws the outlines of a view's surfaces in magenta, in place."""
+    """Draws the outlines of the patch surfaces in one view onto a picture in magenta, in place."""
     for truth in sample.surfaces:
         if truth.camera == camera and truth.corners_px is not None:
             draw_polygon(picture, truth.corners_px, (255, 0, 255))
 
 
 def draw_polygon(picture: UInt8Image, points_px: Sequence[Sequence[float]], rgb: tuple[int, int, int]) -> None:
-    """Draws a closed line through points in index pixels, in place."""
+    """Draws a closed polygon onto a picture, in place; its corners (x, y) are in index pixels.
+
+    The centre of the first pixel is (0, 0) in index pixels.
+    """
     draw_segments(picture, list(zip(points_px, [*points_px[1:], points_px[0]], strict=True)), rgb)
 
 
@@ -188,7 +201,10 @@ FAR_PX = 4 * 8192
 def draw_segments(
     picture: UInt8Image, segments_px: Iterable[tuple[Sequence[float], Sequence[float]]], rgb: tuple[int, int, int]
 ) -> None:
-    """Draws straight lines between points in index pixels, in place; their ends may be far outside the picture."""
+    """Draws straight lines onto a picture, in place; their ends (x, y), in index pixels, may be far outside.
+
+    The centre of the first pixel is (0, 0) in index pixels.
+    """
     for ends in segments_px:
         (x0, y0), (x1, y1) = (np.round(np.clip(end, -FAR_PX, FAR_PX) * 16).astype(int).tolist() for end in ends)
         cv2.line(picture, (x0, y0), (x1, y1), rgb, 1, cv2.LINE_AA, 4)
@@ -197,7 +213,10 @@ def draw_segments(
 def draw_box(
     picture: UInt8Image, box: Sequence[float], rgb: tuple[int, int, int], text: str = "", *, dashed: bool = False
 ) -> None:
-    """Draws a box in index pixels with a text, in place; dashed for ignored objects. The box may exceed the picture."""
+    """Draws a box (left, top, right, bottom) in index pixels and a text onto a picture, in place.
+
+    The box may exceed the picture; dashed boxes mark ignored objects.
+    """
     left, top, right, bottom = (round(min(max(float(v), -FAR_PX), FAR_PX)) for v in box)
     if dashed:
         for x in range(left, right, 8):
@@ -216,7 +235,7 @@ def draw_box(
 
 
 def expect(facts: Any, *keys: str, place: Path) -> Mapping[str, Any]:
-    """Returns the facts of a sidecar after checking that they have the keys that a task needs.
+    """Returns the metadata in a sample's JSON file (sidecar) after checking that the keys that a task needs exist.
 
     Raises:
         DatasetError: a key is missing, because the sidecar is that of another task or damaged.
@@ -228,15 +247,15 @@ def expect(facts: Any, *keys: str, place: Path) -> Mapping[str, Any]:
 
 
 def check_objects(content: Json, boxes_px: Iterable[BoxPx]) -> None:
-    """Checks that the objects in the facts of a sidecar are plausible; for properties that all tasks share.
+    """Checks the numbers and boxes of the objects in a sample's JSON file (sidecar), for tasks with objects.
 
     Args:
         content: the objects as they are stored.
-        boxes_px: box of each object in the picture.
+        boxes_px: (left, top, right, bottom) of each object in the picture.
 
     Raises:
-        FieldError: a number is out of range, or a box's right is left of its left or bottom above its top; the error
-            names the object.
+        FieldError: a number is out of range, a box's right is left of its left, or its bottom is above its top; the
+            error names the object.
     """
     check_numbers(content, "objects")
     for place, (left, top, right, bottom) in enumerate(boxes_px):

@@ -41,7 +41,7 @@ from gear.values.serial import Json
 
 VIEW = "left"
 PREVIEW_DEPTHS_M = (2.0, 3.0, 5.0, 10.0, 20.0, 40.0, 80.0)
-"""Depths that the preview's legend names; nearer and farther ones have the colours of the ends."""
+"""Depths in metres at the ticks of the preview's legend; nearer and farther depths have the colours of its ends."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +49,7 @@ class DepthConfig(CameraOptions):
     """Options of monocular depth.
 
     Pictures have the size that loaders of KITTI depth crop them to, 1216 x 352. CARLA-GeAR's loader keeps the lowest
-    352 rows and assumes the camera's axis in their middle, so that it places patches correctly only in pictures of this
+    352 rows and assumes the camera's axis in their middle, so it places patches correctly only in pictures of this
     size.
 
     Attributes:
@@ -73,33 +73,33 @@ class DepthConfig(CameraOptions):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class DepthSample(Sample):
-    """A picture with its depth map.
+    """A sample of monocular depth: a picture with its depth map.
 
     Attributes:
-        depth_m: (H, W) float32, planar z, NaN where there is no ground truth.
+        depth_m: (H, W) float32 depth along the camera's axis, metres; NaN for pixels without ground truth.
     """
 
     depth_m: FloatImage
 
 
 def _paths(split: str, index: int) -> tuple[str, str, str]:
-    """Paths of the picture, the 16-bit depth and the depth in metres."""
+    """Paths of a sample's picture, of its 16-bit depth picture, and of its depth in metres."""
     name = f"{split}/rgb_{index:04d}"
     return f"leftImg8bit/{name}.png", f"gtFine/{name}.png", f"gtFine/{name}.tiff"
 
 
 class DepthTask:
-    """The task of monocular depth; it writes `leftImg8bit`, `gtFine` and `filenames`."""
+    """The task of monocular depth; it writes the folders `leftImg8bit`, `gtFine` and `filenames`."""
 
     def __init__(self, config: DepthConfig) -> None:
         self.config = config
 
     def rig(self) -> Rig:
-        """A rig of one camera."""
+        """The camera rig of the task: one camera, `left`."""
         return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> DepthSample:
-        """Takes the depth buffer up to `max_depth_m`."""
+        """Makes a sample from a rendered frame; pixels deeper than `max_depth_m` get NaN."""
         depth_m = frame.views[VIEW].depth_m
         known = (depth_m > 0) & (depth_m <= self.config.max_depth_m)
         return DepthSample(
@@ -110,7 +110,7 @@ class DepthTask:
         )
 
     def encode(self, sample: DepthSample, info: SplitInfo) -> Encoded:
-        """Encodes the picture and both depth files."""
+        """Encodes the picture, the depth as KITTI's 16-bit picture, and the depth in metres as a float file."""
         image, units, metres = _paths(info.split, sample.record.index)
         known = np.isfinite(sample.depth_m)
         files = {
@@ -121,7 +121,7 @@ class DepthTask:
         return Encoded(files=files, facts={"known_px": int(known.sum())})
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """Writes the file lists and the poses for CARLA-GeAR's loader."""
+        """Makes the files of a whole split: the file lists, and the poses that CARLA-GeAR's loader reads."""
         paths = [_paths(info.split, index) for index in range(len(sidecars))]
         records = (sidecar.record for sidecar in sidecars)
         poses = billboard_info(records, task="depth", patch_label=info.patch_label, reference=VIEW)
@@ -135,7 +135,7 @@ class DepthTask:
         }
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> DepthSample:
-        """Reads the picture and the depth in metres."""
+        """Reads a sample from its files: the picture and the depth in metres."""
         image, _, metres = _paths(info.split, sidecar.record.index)
         return DepthSample(
             record=sidecar.record,
@@ -145,23 +145,26 @@ class DepthTask:
         )
 
     def as_prediction(self, sample: DepthSample) -> FloatImage:
-        """(H, W) float32 metres; pixels without ground truth get `max_depth_m`."""
+        """The ground truth as a prediction: (H, W) float32 metres; unknown pixels get `max_depth_m`."""
         return np.where(np.isfinite(sample.depth_m), sample.depth_m, np.float32(self.config.max_depth_m))
 
     def evaluator(self) -> Evaluator[DepthSample, FloatImage]:
-        """An evaluator with the metrics of KITTI's devkit and of Eigen et al."""
+        """A new evaluator with the metrics of KITTI's devkit and of Eigen et al."""
         return DepthEvaluator(max_depth_m=self.config.eval_max_depth_m, crop=self.config.eval_crop)
 
     def reports(self) -> Mapping[str, Evaluator[DepthSample, FloatImage]]:
-        """One report, `reference`: whole pictures, ground truth below 80 m, without the sky."""
+        """Further evaluators by name: `reference` evaluates whole pictures below 80 m, without the sky."""
         return {"reference": NearDepth()}
 
     def without(self, sample: DepthSample, masks: Masks) -> DepthSample:
-        """The sample without ground truth inside the mask."""
+        """A copy of the sample without ground truth (NaN) at the pixels of the mask."""
         return replace(sample, depth_m=np.where(masks[VIEW], np.float32(np.nan), sample.depth_m))
 
     def encode_prediction(self, sample: DepthSample, prediction: FloatImage, info: SplitInfo) -> Encoded:
-        """Encodes the devkit's 16-bit picture, in which depth is clipped to 256 m, and a lossless file in metres."""
+        """Encodes a predicted depth map as the devkit's 16-bit picture and as a lossless file in metres.
+
+        The 16-bit picture is clipped to 256 m.
+        """
         units, metres = results.kitti_depth_paths(sample.record.index)
         depth_m = np.asarray(prediction, dtype=np.float32)
         return Encoded(
@@ -169,15 +172,17 @@ class DepthTask:
         )
 
     def decode_prediction(self, root: Path, sample: DepthSample, facts: Json, info: SplitInfo) -> FloatImage:
-        """Reads the lossless file in metres."""
+        """Reads a stored prediction: (H, W) float32 metres, from the lossless file."""
         return read_plain(root, results.kitti_depth_paths(sample.record.index)[1])
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """No files: the pictures are complete results."""
+        """Returns no files, because the depth pictures of the samples are complete results."""
         return {}
 
     def preview(self, sample: DepthSample) -> Mapping[str, UInt8Image]:
-        """The picture, and inverse depth in colours: red is nearest, black has no depth."""
+        """Pictures for people: `image` with outlined surfaces, and `depth` in colours, from red (near) to blue;
+        black is unknown.
+        """
         picture = sample.images[VIEW].copy()
         draw_surfaces(picture, sample, VIEW)
         colours = depth_colours(sample.depth_m)
@@ -185,7 +190,7 @@ class DepthTask:
         return {"image": picture, "depth": colours}
 
     def legends(self) -> Mapping[str, Legend]:
-        """The depths of the preview's colours."""
+        """The colour bar of the preview `depth`, with depths in metres."""
         nearness = np.linspace(1.0, _nearness(np.float64(PREVIEW_DEPTHS_M[-1])), 64)
         colours = depth_colours(PREVIEW_DEPTHS_M[0] / np.square(nearness)[None])[0]
         places = (1 - _nearness(np.array(PREVIEW_DEPTHS_M))) / (1 - nearness[-1])
@@ -201,10 +206,10 @@ def depth_colours(depth_m: npt.NDArray[np.floating[Any]]) -> UInt8Image:
     """Colours of depths for people, from red (2 m and nearer) to dark blue (80 m and farther, or unknown).
 
     Args:
-        depth_m: (H, W) metres; NaN or infinity where it is unknown.
+        depth_m: (H, W) metres; NaN or infinity where the depth is unknown.
 
     Returns:
-        (H, W, 3) uint8 RGB. The colour is linear in the square root of inverse depth, so that near things differ most.
+        (H, W, 3) uint8 RGB. The colour is linear in the square root of inverse depth, so near objects differ most.
     """
     levels = (_nearness(np.where(np.isfinite(depth_m), depth_m, PREVIEW_DEPTHS_M[-1])) * 255).astype(np.uint8)
     colours: UInt8Image = cv2.applyColorMap(levels, cv2.COLORMAP_TURBO)[..., ::-1].copy()
@@ -212,7 +217,7 @@ def depth_colours(depth_m: npt.NDArray[np.floating[Any]]) -> UInt8Image:
 
 
 def _nearness(depth_m: npt.NDArray[np.floating[Any]] | np.float64) -> Any:
-    """1 at the nearest depth that has a colour of its own, falling with distance."""
+    """1 at the nearest depth that has a colour of its own; decreases with the distance."""
     return np.sqrt(PREVIEW_DEPTHS_M[0] / np.clip(depth_m, PREVIEW_DEPTHS_M[0], PREVIEW_DEPTHS_M[-1]))
 
 
@@ -221,7 +226,7 @@ WHITE_FROM_M = 80.0
 
 
 def flip(sample: DepthSample) -> DepthSample:
-    """Mirrors a sample, left to right."""
+    """Mirrors a sample left to right: picture and depth map; surfaces are removed."""
     return replace(
         sample,
         images={name: flip_array(picture) for name, picture in sample.images.items()},
@@ -231,18 +236,19 @@ def flip(sample: DepthSample) -> DepthSample:
 
 
 def cut(sample: DepthSample, window: Window) -> DepthSample:
-    """Crops a sample to a window; depth is unknown beyond the picture.
+    """Crops a sample to a window and resizes it, as if the focal length were unchanged; surfaces are removed.
 
-    Depth is divided by the window's scale: with the same focal length, an object that appears `s` times as large is at
-    1/s of the distance.
+    Depth is divided by the window's scale, because with the same focal length an object that appears `s` times as large
+    is at 1/s of the distance. Depth is unknown (NaN) beyond the picture.
     """
     small = shrink(sample, window)
     return replace(small, depth_m=(small.depth_m / np.float32(window.scale)).astype(np.float32))
 
 
 def shrink(sample: DepthSample, window: Window) -> DepthSample:
-    """Resizes a sample to a window without changing its depth, as a camera with the same field of view and fewer
-    pixels.
+    """Crops a sample to a window and resizes it without changing its depth values; surfaces are removed.
+
+    The result is that of a camera with the same field of view and fewer pixels.
     """
     return replace(
         sample,
@@ -253,7 +259,7 @@ def shrink(sample: DepthSample, window: Window) -> DepthSample:
 
 
 def cut_depth(sample: DepthSample, rng: np.random.Generator) -> DepthSample:
-    """Vertical CutDepth: replaces a band of columns of the picture by its true depth as grey values.
+    """Vertical CutDepth: replaces a random band of columns of the picture by its true depth as grey values.
 
     Kim et al., "Global-Local Path Networks for Monocular Depth Estimation with Vertical CutDepth", 2022, section 3.3:
     the band reaches from top to bottom, because depth changes most along columns. It takes at most three quarters of
@@ -290,5 +296,5 @@ depth: TaskSpec[DepthConfig] = TaskSpec(
 
 @hookimpl
 def gear_tasks() -> list[TaskSpec[DepthConfig]]:
-    """The task plugin of this module."""
+    """Hook of the plugin system: returns the task plugin that this module defines."""
     return [depth]

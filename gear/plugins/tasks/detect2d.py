@@ -1,4 +1,4 @@
-"""2D object detection in the layout of COCO."""
+"""The task of 2D object detection, with files in the layout of COCO."""
 
 from __future__ import annotations
 
@@ -64,11 +64,11 @@ VIEW = "left"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detect2dConfig(CameraOptions):
-    """Options of 2D detection.
+    """Options of 2D object detection.
 
     Attributes:
-        visibility: what an object must show to be labelled; an object that shows less is annotated with `iscrowd` 1,
-            which evaluations ignore.
+        visibility: least visible part of an object that is labelled; an object that shows less is annotated with
+            `iscrowd` 1, which evaluations ignore.
         masks: how the annotation file describes single objects: `polygons` as COCO does, or run lengths (`rle`). Both
             give the same mask. Ignored objects have run lengths.
     """
@@ -81,15 +81,17 @@ class Detect2dConfig(CameraOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Object2d:
-    """One labelled part of an object; a cyclist has two, a bicycle and a person.
+    """One labelled part of an object in a picture; a cyclist has two parts, a bicycle and a person.
+
+    Boxes are (left, top, right, bottom) in edge pixels: the picture's top left corner is (0, 0).
 
     Attributes:
         object_id: id of the object, the same in every sample of a sequence.
         label: gear's name of the part's label.
         category_id: COCO's category id.
-        is_ignored: whether too little of it is visible for it to be labelled.
-        box_px: tight box of the visible pixels, edge pixels. Stray pixels are left out
-            (`gear.groundtruth.stray_pixels`), here and in the area and the mask.
+        is_ignored: whether too little of the object is visible for a label.
+        box_px: tight box of the visible pixels. Stray pixels are left out (`gear.groundtruth.stray_pixels`), here and
+            in the area and the mask.
         amodal_box_px: tight box of the whole silhouette; may exceed the picture.
         area_px: number of pixels of the mask.
         rle: run lengths of the mask for the whole picture.
@@ -114,12 +116,12 @@ class Object2d:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Detect2dSample(Sample):
-    """A picture with its labelled and ignored objects.
+    """A sample of 2D object detection: a picture with its labelled and ignored objects.
 
     Attributes:
         objects: labelled and ignored objects.
-        ignored_px: boxes, in edge pixels, in which detections that find no object count neither way; datasets have
-            none (`Detect2dTask.without`).
+        ignored_px: boxes in edge pixels; a detection in them that matches no object is neither right nor wrong. Samples
+            of datasets have none; `Detect2dTask.without` adds them.
     """
 
     objects: tuple[Object2d, ...]
@@ -127,17 +129,17 @@ class Detect2dSample(Sample):
 
 
 class Detect2dTask:
-    """The task of 2D object detection; it writes `images/<split>` and `annotations`."""
+    """The task of 2D object detection; it writes the folders `images/<split>` and `annotations`."""
 
     def __init__(self, config: Detect2dConfig) -> None:
         self.config = config
 
     def rig(self) -> Rig:
-        """A rig of one camera."""
+        """The camera rig of the task: one camera, `left`."""
         return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> Detect2dSample:
-        """Measures every object for which COCO has a category."""
+        """Makes a sample from a rendered frame, with every visible object for which COCO has a category."""
         view, limits = frame.views[VIEW], self.config.visibility.limits()
         height, width = view.geom_id.shape
         found = []
@@ -170,12 +172,16 @@ class Detect2dTask:
         )
 
     def encode(self, sample: Detect2dSample, info: SplitInfo) -> Encoded:
-        """Encodes the picture; its annotations are kept in the sidecar until `finalise` writes the annotation file."""
+        """Encodes the picture; the annotations go into the sample's JSON file until `finalise` writes the
+        annotation file.
+        """
         files = {f"images/{info.split}/{_name(sample.record.index)}": encode_rgb(sample.images[VIEW])}
         return Encoded(files=files, facts={"objects": to_json(sample.objects)})
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """Writes the annotation file under both of its usual names, and the poses for CARLA-GeAR's loader."""
+        """Makes the files of a whole split: the annotations, under both usual names, and poses for CARLA-GeAR's
+        loader.
+        """
         description = f"gear {info.town} {info.scene} {info.split}, patch: {info.patch_label}"
         writer = coco.DatasetWriter(description=description, created=info.created)
 
@@ -193,7 +199,7 @@ class Detect2dTask:
         }
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Detect2dSample:
-        """Reads the picture from its file and the objects from the sidecar."""
+        """Reads a sample: the picture from its file, and the objects from the sample's JSON file (sidecar)."""
         record = sidecar.record
         return Detect2dSample(
             record=record,
@@ -203,7 +209,7 @@ class Detect2dTask:
         )
 
     def as_prediction(self, sample: Detect2dSample) -> tuple[coco.Detection, ...]:
-        """Every labelled box, with a score near 1."""
+        """The ground truth as a prediction: a detection with score 1 for every object that is not ignored."""
         return tuple(
             coco.Detection(category_id=thing.category_id, box_px=thing.box_px, score=1.0)
             for thing in sample.objects
@@ -211,19 +217,22 @@ class Detect2dTask:
         )
 
     def evaluator(self) -> Evaluator[Detect2dSample, tuple[coco.Detection, ...]]:
-        """An evaluator of COCO's average precision."""
+        """A new evaluator of COCO's average precision."""
         return CocoEvaluator(self._as_shown)
 
     def reports(self) -> Mapping[str, Evaluator[Detect2dSample, tuple[coco.Detection, ...]]]:
-        """`reference`: AP50 of traffic's categories, of objects that are tall enough."""
+        """Further evaluators by name: `reference` is the AP50 of traffic's categories for objects that are tall
+        enough.
+        """
         return {"reference": TallObjects(self._as_shown)}
 
     def without(self, sample: Detect2dSample, masks: Masks) -> Detect2dSample:
-        """Ignores what lies in the mask, as COCO ignores crowds.
+        """A copy of the sample in which objects and detections inside the mask are ignored, as COCO ignores
+        crowds.
 
-        The box of each connected part of the mask is a crowd of every category: a detection that finds no object is
-        ignored at an overlap threshold t if a share of at least t of its own box lies there. An object with more than
-        half of its visible pixels in the mask is ignored.
+        The box of each connected part of the mask is a crowd of every category: a detection that matches no object is
+        ignored at an overlap threshold t if a share of at least t of its own box lies in the crowd. An object with more
+        than half of its visible pixels in the mask is ignored.
         """
         mask = masks[VIEW]
         objects = tuple(
@@ -233,7 +242,10 @@ class Detect2dTask:
         return replace(sample, objects=objects, ignored_px=(*sample.ignored_px, *part_boxes(mask)))
 
     def picture_objects(self, sample: Detect2dSample, prediction: Sequence[coco.Detection]) -> PictureObjects:
-        """The labelled objects; ignored ones are boxes in which nothing is a false alarm."""
+        """The labelled objects and the detections of a picture, for comparing samples with and without a patch.
+
+        Boxes of ignored objects are returned as regions in which no detection is a false alarm.
+        """
         pinhole = sample.record.camera(VIEW).intrinsics
         return PictureObjects(
             camera=VIEW,
@@ -259,7 +271,9 @@ class Detect2dTask:
     def encode_prediction(
         self, sample: Detect2dSample, prediction: Sequence[coco.Detection], info: SplitInfo
     ) -> Encoded:
-        """No files: the detections are kept in the facts until `finalise_predictions` writes the results file."""
+        """Returns no files: the detections go into the metadata, from which `finalise_predictions` writes the
+        results file.
+        """
         plain = [
             coco.Detection(
                 category_id=int(one.category_id),
@@ -273,11 +287,11 @@ class Detect2dTask:
     def decode_prediction(
         self, root: Path, sample: Detect2dSample, facts: Json, info: SplitInfo
     ) -> tuple[coco.Detection, ...]:
-        """Takes the detections from the facts."""
+        """Reads the stored detections of a sample from the metadata `facts`."""
         return from_json(tuple[coco.Detection, ...], facts["detections"], "detections")
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """Writes COCO's results file."""
+        """Makes COCO's results file of a whole split, from the metadata of all samples."""
         lines = [
             line
             for record, one in facts
@@ -288,7 +302,7 @@ class Detect2dTask:
         return {results.coco_path(info.split): dump(lines)}
 
     def preview(self, sample: Detect2dSample) -> Mapping[str, UInt8Image]:
-        """Draws masks and boxes over the picture; ignored objects are dashed, grey and have no text."""
+        """A picture for people, with masks and boxes; ignored objects are grey with dashed boxes and no text."""
         picture = sample.images[VIEW].copy()
         height, width = picture.shape[:2]
         for thing in sample.objects:
@@ -303,7 +317,9 @@ class Detect2dTask:
         return {"boxes": picture}
 
     def legends(self) -> Mapping[str, Legend]:
-        """Colours of the categories that occur in gear's worlds, and of regions that evaluations ignore."""
+        """The colours of the preview: one for each category that occurs in gear's towns, and grey for ignored
+        objects.
+        """
         occurring = sorted({label.coco_id for label in LABELS if label.coco_id is not None})
         named = tuple((coco.CATEGORY_NAMES[one], _category_colour(one)) for one in occurring)
         return {"boxes": ColourNames(entries=(*named, ("ignored", IGNORED_COLOUR)))}
@@ -315,7 +331,7 @@ class Detect2dTask:
         return replace(picture, annotations=tuple(_with_polygons(one, picture) for one in picture.annotations))
 
     def _as_shown(self, sample: Detect2dSample) -> coco.Picture:
-        """Resizes an object to the size of the sample's picture, which may be smaller than the rendered one."""
+        """The COCO entry of a sample whose picture may be smaller than the rendered one."""
         height, width = sample.images[VIEW].shape[:2]
         picture = self._as_picture(sample.record, sample.objects)
         return replace(picture, height_px=height, width_px=width, ignored_px=sample.ignored_px)
@@ -332,7 +348,7 @@ class Detect2dTask:
 
 
 def _image_id(record: SceneRecord) -> int:
-    """COCO's picture id, from 1, because some readers take 0 for "none"."""
+    """COCO's picture id of a sample, counted from 1, because some readers take 0 for "none"."""
     return record.index + 1
 
 
@@ -397,14 +413,14 @@ def _category_colour(category_id: int) -> Rgb:
 
 
 LEAST_KEPT = 0.3
-"""An object with a smaller share of its visible pixels in a window is ignored there."""
+"""A cropped object with a smaller share of its visible pixels inside the window is ignored."""
 
 LEAST_SIDE_PX = 4.0
-"""An object whose box in a window is narrower or lower is ignored there."""
+"""A cropped object whose box in the window has a shorter side, in pixels, is ignored."""
 
 
 def flip(sample: Detect2dSample) -> Detect2dSample:
-    """Mirrors a sample, left to right."""
+    """Mirrors a sample left to right: picture, boxes and masks; surfaces are removed."""
     height, width = sample.images[VIEW].shape[:2]
     return replace(
         sample,
@@ -427,10 +443,11 @@ def _flipped(thing: Object2d, height: int, width: int) -> Object2d:
 
 
 def cut(sample: Detect2dSample, window: Window) -> Detect2dSample:
-    """Crops a sample to a window. Objects outside are left out; objects with a small part inside are ignored.
+    """Crops a sample to a window and resizes it; surfaces are removed.
 
-    Masks are cropped and boxes are measured again on them. The share of a silhouette outside the window is estimated by
-    its box, because silhouettes are not stored. Distances do not change.
+    Objects outside the window are left out; objects with a small part inside are ignored. Masks are cropped, and boxes
+    are measured again on the masks. The share of a silhouette outside the window is estimated by its box, because
+    silhouettes are not stored. Distances do not change.
     """
     height, width = sample.images[VIEW].shape[:2]
     moved = (_cut(thing, window, height, width) for thing in sample.objects)
@@ -475,7 +492,7 @@ def _cut(thing: Object2d, window: Window, height: int, width: int) -> Object2d |
 
 
 def _inside(box_px: BoxPx, height: int, width: int) -> BoxPx:
-    """Clips a box in edge pixels to a picture."""
+    """A box in edge pixels, clipped to a picture."""
     return clipped(box_px, (0.0, 0.0, float(width), float(height)))
 
 
@@ -495,5 +512,5 @@ detect2d: TaskSpec[Detect2dConfig] = TaskSpec(
 
 @hookimpl
 def gear_tasks() -> list[TaskSpec[Detect2dConfig]]:
-    """The task plugin of this module."""
+    """Hook of the plugin system: returns the task plugin that this module defines."""
     return [detect2d]

@@ -1,4 +1,4 @@
-"""Semantic segmentation in the layout of Cityscapes."""
+"""The task of semantic segmentation, with files in the layout of Cityscapes."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ VIEW = "left"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LabelOptions:
-    """Option for the granularity of labels.
+    """The option for how fine the labels are.
 
     Attributes:
         granularity: `fine` labels each pixel by what it shows. `coarse` imitates an annotator with a polygon tool: each
-            pixel takes the most frequent label in a square around it, so that thin poles, wires, single leaves and the
-            sky between twigs take the label of their surroundings.
-        coarse_window_px: side of that square, odd; things thinner than about half of it vanish.
+            pixel takes the most frequent label in a square around it, so thin poles, wires, single leaves and the sky
+            between twigs take the label of their surroundings.
+        coarse_window_px: side of that square, odd; objects thinner than about half of it vanish.
     """
 
     granularity: Literal["fine", "coarse"] = "fine"
@@ -81,11 +81,11 @@ class SemsegConfig(CameraOptions):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SemsegSample(Sample):
-    """A picture with its label map and instance map.
+    """A sample of semantic segmentation: a picture with its label map and instance map.
 
     Attributes:
         label_ids: (H, W) uint8, Cityscapes ids 0..33.
-        instance_ids: (H, W) uint16, id * 1000 + number for single instances, the id for everything else.
+        instance_ids: (H, W) uint16: label id * 1000 + number for single instances, the label id for other pixels.
     """
 
     label_ids: npt.NDArray[np.uint8]
@@ -93,17 +93,17 @@ class SemsegSample(Sample):
 
 
 class SemsegTask:
-    """The task of semantic segmentation; it writes Cityscapes' `leftImg8bit`, `gtFine` and `camera`."""
+    """The task of semantic segmentation; it writes Cityscapes' folders `leftImg8bit`, `gtFine` and `camera`."""
 
     def __init__(self, config: SemsegConfig) -> None:
         self.config = config
 
     def rig(self) -> Rig:
-        """A rig of one camera."""
+        """The camera rig of the task: one camera, `left`."""
         return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> SemsegSample:
-        """Computes labels and instances from the id buffer."""
+        """Makes a sample from a rendered frame: labels and instances come from the rendered geom ids."""
         instances = instance_map(frame.views[VIEW].geom_id, frame.geoms, frame.objects)
         if self.config.labels.granularity == "coarse":
             instances = coarsen(instances, self.config.labels.coarse_window_px)
@@ -116,7 +116,7 @@ class SemsegTask:
         )
 
     def encode(self, sample: SemsegSample, info: SplitInfo) -> Encoded:
-        """Encodes picture, labels, instances, colours, polygons and camera."""
+        """Encodes picture, label map, instance map, colours, polygons (if the option is set) and camera."""
         record = sample.record
         paths = cityscapes.paths(info.town, info.split, record.sequence, record.frame)
         world_from_vehicle = record.ego.world_from_actor.transform("world", "ego")
@@ -135,13 +135,13 @@ class SemsegTask:
         return Encoded(files=files, facts={"label_px": present})
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """Writes the poses for CARLA-GeAR's loader."""
+        """Makes the file of a whole split: the poses that CARLA-GeAR's loader reads."""
         records = (sidecar.record for sidecar in sidecars)
         poses = billboard_info(records, task="ss", patch_label=info.patch_label, reference=VIEW)
         return {f"gtFine/{info.split}/camera_billboard_info.json": dump(poses)}
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> SemsegSample:
-        """Reads the picture and both label maps."""
+        """Reads a sample from its files: the picture, the label map and the instance map."""
         record = sidecar.record
         paths = cityscapes.paths(info.town, info.split, record.sequence, record.frame)
         return SemsegSample(
@@ -153,19 +153,19 @@ class SemsegTask:
         )
 
     def as_prediction(self, sample: SemsegSample) -> npt.NDArray[np.uint8]:
-        """The ground truth's (H, W) uint8 label ids."""
+        """The ground truth as a prediction: (H, W) uint8 label ids."""
         return sample.label_ids
 
     def evaluator(self) -> Evaluator[SemsegSample, npt.NDArray[np.uint8]]:
-        """An evaluator of mIoU and iIoU."""
+        """A new evaluator of mIoU and iIoU, as in Cityscapes."""
         return SemanticEvaluator()
 
     def reports(self) -> Mapping[str, Evaluator[SemsegSample, npt.NDArray[np.uint8]]]:
-        """One report, `reference`: mIoU over the classes that occur, without the class train."""
+        """Further evaluators by name: `reference` is the mIoU over the classes that occur, without the class train."""
         return {"reference": PresentClasses()}
 
     def without(self, sample: SemsegSample, masks: Masks) -> SemsegSample:
-        """The sample with pixels inside the mask unlabelled, so that no metric counts them."""
+        """A copy of the sample whose pixels inside the mask are unlabelled, so no metric counts these pixels."""
         silent = masks[VIEW]
         return replace(
             sample,
@@ -174,22 +174,22 @@ class SemsegTask:
         )
 
     def encode_prediction(self, sample: SemsegSample, prediction: npt.NDArray[np.uint8], info: SplitInfo) -> Encoded:
-        """Encodes a picture of label ids, as Cityscapes' evaluation script reads it."""
+        """Encodes predicted label ids as the picture that Cityscapes' evaluation script reads."""
         path = results.cityscapes_path(info.town, sample.record.sequence, sample.record.frame)
         return Encoded(files={path: encode_label_map(prediction.astype(np.uint8))}, facts={})
 
     def decode_prediction(
         self, root: Path, sample: SemsegSample, facts: Json, info: SplitInfo
     ) -> npt.NDArray[np.uint8]:
-        """Reads the picture of label ids."""
+        """Reads a stored prediction: (H, W) uint8 label ids."""
         return read_plain(root, results.cityscapes_path(info.town, sample.record.sequence, sample.record.frame))
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """No files: the pictures are complete results."""
+        """Returns no files, because the label pictures of the samples are complete results."""
         return {}
 
     def preview(self, sample: SemsegSample) -> Mapping[str, UInt8Image]:
-        """Draws the labels' colours over the picture, with borders between instances in white."""
+        """A picture for people: the labels' colours over the picture, with borders between instances in white."""
         colours = cityscapes.colour_map(sample.label_ids)[..., :3]
         picture = cv2.addWeighted(sample.images[VIEW], 0.45, np.ascontiguousarray(colours), 0.55, 0.0)
         instances = sample.instance_ids
@@ -201,7 +201,7 @@ class SemsegTask:
         return {"labels": picture}
 
     def legends(self) -> Mapping[str, Legend]:
-        """The benchmark's colours of the classes that it evaluates; other classes are not counted."""
+        """The colours of the classes that Cityscapes evaluates."""
         return {
             "labels": ColourNames(entries=tuple((one.name, one.rgb) for one in cityscapes.LABELS if one.is_evaluated))
         }
@@ -212,7 +212,7 @@ UNLABELLED = 0
 
 
 def flip(sample: SemsegSample) -> SemsegSample:
-    """Mirrors a sample, left to right."""
+    """Mirrors a sample left to right: picture, label map and instance map; surfaces are removed."""
     return replace(
         sample,
         images={name: flip_array(picture) for name, picture in sample.images.items()},
@@ -223,7 +223,10 @@ def flip(sample: SemsegSample) -> SemsegSample:
 
 
 def cut(sample: SemsegSample, window: Window) -> SemsegSample:
-    """Crops a sample to a window; labels are resized by nearest neighbour."""
+    """Crops a sample to a window and resizes it, label maps by nearest neighbour; surfaces are removed.
+
+    Pixels beyond the picture are unlabelled.
+    """
     return replace(
         sample,
         images={name: cut_picture(picture, window) for name, picture in sample.images.items()},
@@ -249,5 +252,5 @@ semseg: TaskSpec[SemsegConfig] = TaskSpec(
 
 @hookimpl
 def gear_tasks() -> list[TaskSpec[SemsegConfig]]:
-    """The task plugin of this module."""
+    """Hook of the plugin system: returns the task plugin that this module defines."""
     return [semseg]

@@ -1,4 +1,4 @@
-"""Stereo 3D object detection in the layout of KITTI."""
+"""The task of stereo 3D object detection, with files in the layout of KITTI."""
 
 from __future__ import annotations
 
@@ -73,11 +73,11 @@ OTHER_COLOUR = (255, 200, 60)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stereo3dConfig(CameraOptions):
-    """Options of stereo 3D detection.
+    """Options of stereo 3D object detection.
 
     Attributes:
         baseline_m: distance from the left to the right camera.
-        visibility: what an object must show to be labelled; an object that shows less is a `DontCare` region.
+        visibility: least visible part of an object that is labelled; an object that shows less is a `DontCare` region.
     """
 
     width_px: int = 1224
@@ -94,19 +94,21 @@ class Stereo3dConfig(CameraOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Object3d:
-    """One labelled object, measured in the left view.
+    """One object of a stereo pair, measured in the left view.
+
+    2D boxes are (left, top, right, bottom) in index pixels: the centre of the first pixel is (0, 0).
 
     Attributes:
         object_id: id of the object, the same in every sample of a sequence.
         kitti_type: KITTI's type of the whole object; a cyclist with bicycle is one object.
         is_ignored: whether it is a `DontCare` region, because too little of it is visible.
         box: 3D box in the frame of the left camera.
-        box_px: tight box of the silhouette inside the picture, hidden parts included; index pixels.
-        amodal_box_px: tight box of the whole silhouette, which may exceed the picture; index pixels.
+        box_px: tight box of the silhouette inside the picture, hidden parts included.
+        amodal_box_px: tight box of the whole silhouette, which may exceed the picture.
         truncated: share of the silhouette outside the picture, 0..1.
         occluded: how much of the silhouette in the picture is visible: 0 for at least 80 %, 1 for at least 50 %, 2 for
             at least 10 %, 3 for less.
-        visible_px: number of pixels in the id buffer.
+        visible_px: number of visible pixels of the object.
         occluded_fraction: covered share of the silhouette's part in the picture.
     """
 
@@ -122,7 +124,7 @@ class Object3d:
     occluded_fraction: float
 
     def label(self) -> KittiLabel:
-        """The object's line in the label file."""
+        """The object's line in KITTI's label file; `DontCare` for ignored objects."""
         if self.is_ignored:
             return dont_care(self.box_px)
         return KittiLabel(
@@ -141,13 +143,13 @@ class Object3d:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Stereo3dSample(Sample):
-    """A rectified pair with its objects.
+    """A sample of stereo 3D object detection: a rectified picture pair with its objects.
 
     Attributes:
         calibration: calibration of the pair; the left camera is the reference frame.
         objects: labelled and ignored objects.
-        ignored_px: boxes in the left picture, in index pixels, in which detections that find no object count neither
-            way; datasets have none (`Stereo3dTask.without`).
+        ignored_px: boxes in the left picture, in index pixels; a detection in them that matches no object is neither
+            right nor wrong. Samples of datasets have none; `Stereo3dTask.without` adds them.
     """
 
     calibration: Calibration
@@ -156,20 +158,21 @@ class Stereo3dSample(Sample):
 
 
 class Stereo3dTask:
-    """The task of stereo 3D detection; it writes `<split>/{image_2,image_3,calib,label_2}`, `splits` and
-    `ImageSets`.
+    """The task of stereo 3D object detection, in KITTI's folders.
+
+    It writes `<split>/{image_2,image_3,calib,label_2}`, `splits` and `ImageSets`.
     """
 
     def __init__(self, config: Stereo3dConfig) -> None:
         self.config = config
 
     def rig(self) -> Rig:
-        """A rig of two parallel cameras."""
+        """The camera rig of the task: two parallel cameras, `left` and `right`."""
         cameras = (self.config.mount(LEFT), self.config.mount(RIGHT, right_m=self.config.baseline_m))
         return Rig(cameras=cameras, follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> Stereo3dSample:
-        """Measures every object for which KITTI has a type, in the left view."""
+        """Makes a sample from a rendered frame; objects for which KITTI has a type are measured in the left view."""
         view, limits = frame.views[LEFT], self.config.visibility.limits()
         found = []
         for truth in observe_objects(view, frame.geoms, frame.objects, by_label=False):
@@ -188,7 +191,7 @@ class Stereo3dTask:
         return Calibration(intrinsics=record.camera(LEFT).intrinsics, baseline_m=self.config.baseline_m)
 
     def encode(self, sample: Stereo3dSample, info: SplitInfo) -> Encoded:
-        """Encodes both pictures, the calibration and the labels."""
+        """Encodes both pictures, the calibration and the label file."""
         name = _name(sample.record.index)
         files = {
             f"{info.split}/image_2/{name}.png": encode_rgb(sample.images[LEFT]),
@@ -200,14 +203,16 @@ class Stereo3dTask:
         return Encoded(files=files, facts=facts)
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """Writes the lists of ids, and the poses for CARLA-GeAR's loader."""
+        """Makes the files of a whole split: the lists of sample ids, and the poses that CARLA-GeAR's loader reads."""
         records = (sidecar.record for sidecar in sidecars)
         poses = billboard_info(records, task="3dod", patch_label=info.patch_label, reference=LEFT, second=RIGHT)
         lists = split_lists(info.split, [_name(index) for index in range(len(sidecars))])
         return {**lists, f"{info.split}/label_2/camera_billboard_info.json": dump(poses)}
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Stereo3dSample:
-        """Reads both pictures from their files, and the objects, which are not rounded, from the sidecar."""
+        """Reads a sample: both pictures from their files, and the unrounded objects from the sample's JSON file
+        (sidecar).
+        """
         record, name = sidecar.record, _name(sidecar.record.index)
         facts = expect(sidecar.facts, "baseline_m", "objects", place=root)
         baseline_m = from_json(float, facts["baseline_m"], "baseline_m")
@@ -227,24 +232,26 @@ class Stereo3dTask:
         )
 
     def as_prediction(self, sample: Stereo3dSample) -> tuple[KittiLabel, ...]:
-        """Every labelled object, with a score near 1."""
+        """The ground truth as a prediction: the label of every object that is not ignored, with score 1."""
         return tuple(replace(thing.label(), score=1.0) for thing in sample.objects if not thing.is_ignored)
 
     def evaluator(self) -> Evaluator[Stereo3dSample, tuple[KittiLabel, ...]]:
-        """An evaluator of KITTI's average precisions."""
+        """A new evaluator of KITTI's average precisions."""
         return KittiEvaluator(_lines, _ignored)
 
     def reports(self) -> Mapping[str, Evaluator[Stereo3dSample, tuple[KittiLabel, ...]]]:
-        """`reference`: cars seen from above, at IoU 0.5, below 40 m."""
+        """Further evaluators by name: `reference` evaluates cars below 40 m in bird's-eye view at IoU 0.5."""
         return {"reference": NearCars(_lines, _ignored)}
 
     def without(self, sample: Stereo3dSample, masks: Masks) -> Stereo3dSample:
-        """Ignores what lies in the left camera's mask, as KITTI ignores DontCare regions.
+        """A copy of the sample in which objects and detections inside the left mask are ignored, like DontCare
+        regions.
 
-        The box of each connected part of the mask is such a region: a detection that finds no object is ignored if more
-        than the benchmark's share of its own box (0.7 of a car, 0.5 of a person or a cyclist) lies there. The devkit's
-        own regions excuse in the picture alone; these regions also excuse from above and in space. An object is ignored
-        if more than half of its visible pixels must lie in the mask, because its box has too few other pixels.
+        The box of each connected part of the mask is such a region: a detection that matches no object is ignored if
+        more than the benchmark's share of its own box (0.7 of a car, 0.5 of a person or a cyclist) lies in the region.
+        KITTI's DontCare regions apply only to 2D boxes; these regions also apply to the bird's-eye view and to 3D. An
+        object is ignored if more than half of its visible pixels must lie in the mask, because its box has too few
+        other pixels.
         """
         mask = masks[LEFT]
         objects, regions = [], list(part_boxes(mask))
@@ -256,7 +263,11 @@ class Stereo3dTask:
         return replace(sample, objects=tuple(objects), ignored_px=(*sample.ignored_px, *boxes))
 
     def picture_objects(self, sample: Stereo3dSample, prediction: Sequence[KittiLabel]) -> PictureObjects:
-        """Cars, pedestrians and cyclists in the left picture; what is of another type is ignored."""
+        """The objects and the detections of the left picture, for comparing samples with and without a patch.
+
+        Only cars, pedestrians and cyclists count; boxes of other types and ignored regions are returned as ignored
+        regions.
+        """
         pairs = list(zip(sample.objects, _lines(sample), strict=True))
         wanted = [(thing, line) for thing, line in pairs if line.type in NEIGHBOURS]
         found = [one for one in prediction if one.type in NEIGHBOURS]
@@ -278,22 +289,24 @@ class Stereo3dTask:
         )
 
     def encode_prediction(self, sample: Stereo3dSample, prediction: Sequence[KittiLabel], info: SplitInfo) -> Encoded:
-        """Encodes a result file."""
+        """Encodes the detections of one sample as KITTI's result file."""
         lines = results.kitti_result_lines(prediction)
         return Encoded(files={results.kitti_object_path(sample.record.index): lines}, facts={})
 
     def decode_prediction(
         self, root: Path, sample: Stereo3dSample, facts: Json, info: SplitInfo
     ) -> tuple[KittiLabel, ...]:
-        """Reads the result file."""
+        """Reads the detections of one sample from KITTI's result file."""
         return parse_labels(read_bytes(root / results.kitti_object_path(sample.record.index)).decode())
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """No files: the result files of the samples are complete."""
+        """Returns no files, because the result files of the samples are complete."""
         return {}
 
     def preview(self, sample: Stereo3dSample) -> Mapping[str, UInt8Image]:
-        """The left picture with 3D boxes and with ignored regions dashed in grey, and the right picture."""
+        """Pictures for people: `left` with 3D boxes and ignored regions (dashed, grey), and `right`, both with
+        surfaces.
+        """
         left = sample.images[LEFT].copy()
         for thing in sample.objects:
             if thing.is_ignored:
@@ -313,7 +326,7 @@ class Stereo3dTask:
         return {LEFT: left, RIGHT: right}
 
     def legends(self) -> Mapping[str, Legend]:
-        """Colours of the boxes by type, and of regions that evaluations ignore."""
+        """The colours of the preview's boxes by KITTI type, and grey for `DontCare` regions."""
         entries = (*COLOURS.items(), ("other types", OTHER_COLOUR), ("DontCare", IGNORED_COLOUR))
         return {LEFT: ColourNames(entries=entries)}
 
@@ -346,7 +359,7 @@ def _measured(
 
 
 def _notes(config: Stereo3dConfig) -> tuple[str, ...]:
-    """Notes on the options: that 3D boxes of a tilted camera are approximate."""
+    """Notes for the user on the options: with a tilted camera, 3D boxes are approximate."""
     if config.is_level:
         return ()
     return (
@@ -372,12 +385,12 @@ def _name(index: int) -> str:
 
 
 def flip(sample: Stereo3dSample) -> Stereo3dSample:
-    """Mirrors a stereo pair, left to right: the right camera becomes the left one.
+    """Mirrors a stereo pair left to right: the right camera becomes the left one. Surfaces are removed.
 
-    Occlusion was measured in the left view and is kept for the right one. The silhouette in the right picture is not
-    stored, so its box is estimated: each side moves between the pictures as far as the same side of the projected 3D
-    box does. If the picture's border cuts an object, the other sides of its box are those of its part in the left
-    picture. Ignored boxes are left out: where they lie in the right picture is not known.
+    Occlusion was measured in the left view and is used for the right view too. The silhouette in the right picture is
+    not stored, so its box is estimated: each side moves between the pictures as far as the same side of the projected
+    3D box does. If the picture's border cuts an object, the other sides of its box are those of its part in the left
+    picture. Ignored boxes are left out, because their position in the right picture is not known.
     """
     baseline_m, intrinsics = sample.calibration.baseline_m, sample.calibration.intrinsics
     moved = (_mirrored(thing, baseline_m, intrinsics) for thing in sample.objects)
@@ -392,7 +405,7 @@ def flip(sample: Stereo3dSample) -> Stereo3dSample:
 
 
 def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Object3d | None:
-    """An object in the view of the mirrored right camera; None outside its picture."""
+    """An object in the view of the mirrored right camera; None if the object lies outside of its picture."""
     x, y, z = thing.box.bottom_m
     turned = wrap_angle_rad(math.pi - thing.box.rotation_y_rad)
     box = replace(thing.box, bottom_m=(baseline_m - x, y, z), rotation_y_rad=turned)
@@ -413,10 +426,10 @@ def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Obj
 
 
 def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
-    """Crops both pictures to a window around their centre, and adapts the calibration.
+    """Crops both pictures to a window around their centre and resizes them, and adapts the calibration.
 
     Sizes and distances in metres do not change, but the focal length does. The share of a silhouette outside the window
-    is estimated by its box.
+    is estimated by its box. Surfaces are removed.
 
     Raises:
         ValueError: the window's centre is not the picture's centre, where the principal point must be.
@@ -464,8 +477,8 @@ def _placed(
 
     Args:
         thing: the object as measured in the old picture.
-        box: its 3D box in the frame of the new camera.
-        box_px, amodal_box_px: its boxes in the new picture, not clipped; index pixels.
+        box: 3D box of the object in the frame of the new camera.
+        box_px, amodal_box_px: boxes of the object in the new picture, not clipped; index pixels.
         frame_px, shown_px: outer borders of the part of the old picture, and of the new picture, that show the scene.
     """
     left, top, right, bottom = shown_px
@@ -494,5 +507,5 @@ stereo3d: TaskSpec[Stereo3dConfig] = TaskSpec(
 
 @hookimpl
 def gear_tasks() -> list[TaskSpec[Stereo3dConfig]]:
-    """The task plugin of this module."""
+    """Hook of the plugin system: returns the task plugin that this module defines."""
     return [stereo3d]

@@ -18,7 +18,8 @@ PAPERS_DEEPEST = "ct1"
 
 
 def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[str]) -> dict[str, Tensor]:
-    """Feature maps of one sample: (C, h, w) float32 on the CPU by name of the tap, without gradients.
+    """Feature maps of one sample: (C, h, w) float32 on the CPU by name of the tap (the layer that is read), no
+    gradients.
 
     Args:
         model: model with these taps.
@@ -33,7 +34,7 @@ def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[
 
 
 def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> dict[str, Tensor]:
-    """Feature maps of a batch, with gradients if torch records them.
+    """Feature maps of a batch by name of the tap (the layer that is read), with gradients if torch records them.
 
     Args:
         model: model with these taps.
@@ -76,7 +77,9 @@ def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> d
 
 
 def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:
-    """Name of the tap whose feature map has the fewest cells, of several such taps the last one; `ct1` for BiSeNet.
+    """The name of the tap (readable layer) whose feature map has the fewest cells; `ct1` for BiSeNet.
+
+    If several feature maps have the fewest cells, it is the last of these taps.
 
     Raises:
         GearError: the model has no taps.
@@ -91,6 +94,6 @@ def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:
 
 
 def spread(items: Sequence[Any], most: int) -> Iterator[Any]:
-    """Yields at most `most` items, evenly spaced, starting with the first."""
+    """Yields at most `most` items of a sequence, evenly spaced, starting with the first."""
     count = min(most, len(items))
     return (items[index * len(items) // count] for index in range(count))

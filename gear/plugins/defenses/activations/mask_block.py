@@ -1,4 +1,4 @@
-"""Z-Mask's fusion block: a mask and a score from two heat maps, with eight learnt parameters."""
+"""Z-Mask's fusion block: computes a mask and a score from two heat maps, with eight learnt parameters."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ LEARNING_RATE, BATCH, CELLS = 0.01, 15, 4096
 NUMBERS = 8
 
 COVERED_FROM = 0.5
-"""Cells whose mask has at least this value are covered."""
+"""Cells whose mask value is above this threshold are covered."""
 
 LEAST_GAIN, LEAST_IOU = 0.95, 0.05
-"""Limits that tell whether the training has succeeded. It has not if the block's loss is above this share of the
-best constant prediction's loss, or if its IoU is below this value.
+"""Limits for a successful training: the block's loss must be below the first number times the loss of the best
+constant prediction, and its IoU must be at least the second number.
 """
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Example:
-    """A training example of the block; all arrays are (rows, columns).
+    """A training example of the fusion block: two heat maps and the true mask of one picture, (rows, columns)
+    each.
 
     Attributes:
         shallow, deep: heat maps of shallow and of deep layers.
-        truth: 1 where the patch is, 0 elsewhere.
+        truth: 1 in cells that the patch covers, 0 elsewhere.
     """
 
     shallow: Tensor
@@ -48,10 +49,10 @@ class MaskBlock:
     numbers: Tensor
 
     def mask(self, shallow: Tensor, deep: Tensor) -> Tensor:
-        """Probability in 0..1 that a cell shows a patch; for maps of any shape.
+        """The probability in 0..1 that each cell shows a patch; for two heat maps of any common shape.
 
-        The deep map opens a gate for the shallow one: M = sigmoid(w tanh(w' (H_S G) + b') + b) with
-        G = sigmoid(v tanh(v' H_D + c') + c).
+        The deep map opens a gate for the shallow map: M = sigmoid(w tanh(w' (H_S G) + b') + b) with G = sigmoid(v
+        tanh(v' H_D + c') + c).
         """
         gate_in, gate_in_offset, gate_out, gate_out_offset, mask_in, mask_in_offset, mask_out, mask_out_offset = (
             self.numbers
@@ -61,22 +62,27 @@ class MaskBlock:
         return torch.sigmoid(mask_out * inner + mask_out_offset)
 
     def score(self, shallow: Tensor, deep: Tensor) -> float:
-        """The score of an attack: how much both heat maps agree under the mask, sum(H_D H_S M) / (1 + sum M), 0
-        or more.
+        """The raw score of an attack, 0 or more: sum(H_D H_S M) / (1 + sum M).
+
+        It is high if the shallow heat map H_S and the deep heat map H_D are both high under the mask M.
         """
         return float(self.score_tensor(shallow, deep))
 
     def score_tensor(self, shallow: Tensor, deep: Tensor) -> Tensor:
-        """The same as `score`, with gradients with respect to both maps."""
+        """The raw score of an attack, 0 or more, as a scalar tensor with gradients with respect to both heat maps.
+
+        The formula is that of `score`.
+        """
         mask = self.mask(shallow, deep)
         return (deep * shallow * mask).sum() / (1 + mask.sum())
 
 
 def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> MaskBlock:
-    """Trains a block with Adam on the cross-entropy with the true masks; initial parameters are drawn from U(0, 1), as
-    published.
+    """Trains a fusion block with Adam on the cross-entropy with the true masks; initial parameters come from U(0,
+    1).
 
-    Each step uses a random subset of each picture's cells, which is enough for eight parameters and ten times as fast.
+    Initialisation and loss are the published ones. Each step uses a random subset of each picture's cells, which is
+    enough for eight parameters and ten times as fast.
 
     Args:
         examples: training examples, at least one, all on the same grid.
@@ -101,12 +107,12 @@ def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """The quality of a block on its own training examples.
+    """The quality of a fusion block on its own training examples.
 
     Attributes:
         loss: mean cross-entropy with the true masks.
-        constant_loss: loss of the best constant prediction, which does not use the maps.
-        iou: IoU of the mask, thresholded at 0.5, with the true one, over all examples together.
+        constant_loss: loss of the best constant prediction, which does not use the heat maps.
+        iou: IoU of the mask, thresholded at 0.5, with the true mask, over all examples together.
         share: share of the cells that show a patch.
     """
 
@@ -117,12 +123,12 @@ class Fit:
 
     @property
     def has_learnt(self) -> bool:
-        """Whether the block is better than a constant and finds some of the patches."""
+        """Whether the loss is clearly below that of a constant prediction and the mask overlaps some of the patches."""
         return self.loss < LEAST_GAIN * self.constant_loss and self.iou >= LEAST_IOU
 
 
 def fit_of(block: MaskBlock, examples: Sequence[Example]) -> Fit:
-    """Measures a block on examples of one grid."""
+    """Measures the quality of a fusion block on examples that share one grid."""
     shallow, deep, truth = _stacked(examples)
     said = block.mask(shallow, deep)
     share = float(truth.double().mean())
@@ -138,7 +144,7 @@ def fit_of(block: MaskBlock, examples: Sequence[Example]) -> Fit:
 
 
 def _stacked(examples: Sequence[Example]) -> tuple[Tensor, Tensor, Tensor]:
-    """(examples, cells) shallow and deep heat maps, and truth."""
+    """The shallow heat maps, the deep heat maps and the true masks of all examples, (examples, cells) each."""
     shallow, deep, truth = (
         torch.stack([getattr(one, name).flatten() for one in examples]) for name in ("shallow", "deep", "truth")
     )

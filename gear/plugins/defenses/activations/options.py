@@ -1,4 +1,4 @@
-"""Options that several detectors share."""
+"""Options that several defenses with a detection score share."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlarmConfig:
-    """Option that sets the score above which a detector raises an alarm.
+    """The option that sets the score above which a defense raises an alarm.
 
     Attributes:
         false_alarms: share of clean calibration pictures whose score may exceed 0.5.
@@ -24,7 +24,7 @@ class AlarmConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectorConfig(AlarmConfig):
-    """Options of a detector that reads one feature map.
+    """Options of a defense that computes its score from one feature map.
 
     Attributes:
         layer: name of the model's feature map that is read; empty for the deepest one.

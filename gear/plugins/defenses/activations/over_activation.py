@@ -20,7 +20,7 @@ Cells = tuple[int, int]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ChannelStatistics:
-    """Mean and standard deviation of each channel of a feature map, on clean pictures.
+    """Mean and standard deviation of each channel of a feature map on clean pictures (without patch).
 
     Attributes:
         mean, deviation: (C,) mean and standard deviation over the cells of the feature map.
@@ -30,15 +30,17 @@ class ChannelStatistics:
     deviation: Tensor
 
     def z_scores(self, features: Tensor) -> Tensor:
-        """Z-scores of (C, rows, columns) features, with the statistics of each channel."""
+        """The z-scores of a (C, rows, columns) feature map: each value minus its channel's mean, divided by the
+        deviation.
+        """
         mean, deviation = self.mean[:, None, None], self.deviation[:, None, None]
         return (features - mean) / (deviation + LEAST_DEVIATION)
 
 
 def channel_statistics(features: Tensor, grid: Cells) -> ChannelStatistics:
-    """Mean and standard deviation of each channel of one (C, h, w) feature map, measured on a grid.
+    """Mean and standard deviation of each channel of one (C, h, w) feature map that is resized to a grid.
 
-    Each cell of the map has as much weight as there are places on the grid whose nearest cell it is.
+    The map is not actually resized: each cell has as much weight as there are grid cells to which it is the nearest.
     """
     down, across = (_nearest(*sizes).sum(dim=0) for sizes in zip(features.shape[1:], grid, strict=True))
     times, count = down[:, None] * across, grid[0] * grid[1]
@@ -48,8 +50,9 @@ def channel_statistics(features: Tensor, grid: Cells) -> ChannelStatistics:
 
 
 def mean_of(many: Sequence[ChannelStatistics]) -> ChannelStatistics:
-    """The mean of the statistics of several pictures (at least one): means and deviations are averaged, as
-    published.
+    """The mean of the channel statistics of several pictures (at least one).
+
+    Means and deviations are averaged separately, as published.
     """
     return ChannelStatistics(
         mean=torch.stack([one.mean for one in many]).mean(dim=0),
@@ -58,7 +61,7 @@ def mean_of(many: Sequence[ChannelStatistics]) -> ChannelStatistics:
 
 
 def on_grid(features: Tensor, grid: Cells) -> Tensor:
-    """Resizes (C, h, w) to (C, rows, columns) by nearest neighbour."""
+    """A (C, h, w) tensor resized by nearest neighbour to (C, rows, columns)."""
     return functional.interpolate(features[None], size=grid, mode="nearest")[0]
 
 
@@ -66,7 +69,7 @@ def pooled_sizes(z: Tensor, grid: Cells, kernel: Cells) -> Tensor:
     """Magnitudes of the mean z-scores in windows of the grid, averaged over channels and resized to the grid.
 
     Windows lie inside the grid, as published. Nearest-neighbour resizing and averaging over windows are both linear and
-    separable, so they are two matrix products, whose time does not depend on the size of the windows.
+    separable, so they are two matrix products. Their time does not depend on the size of the windows.
 
     Args:
         z: (C, h, w) z-scores of any size.
@@ -84,10 +87,10 @@ def pooled_sizes(z: Tensor, grid: Cells, kernel: Cells) -> Tensor:
 
 
 def refined(pooled: Sequence[Tensor]) -> Tensor:
-    """The heat map of one layer from its pooled magnitudes, those of the largest windows first.
+    """The heat map of one layer from its pooled magnitudes, given from the largest to the smallest windows.
 
-    H starts as the first map. It is then normalised to H / (1 + max H) and multiplied by each next map, so that small
-    windows count only where large windows are active.
+    H starts as the first map. For each next map, H becomes H / (1 + max H) times that map, so small windows count only
+    where large windows are active.
     """
     result = pooled[0]
     for one in pooled[1:]:
@@ -96,12 +99,13 @@ def refined(pooled: Sequence[Tensor]) -> Tensor:
 
 
 def cell_auroc(heat: Tensor, truth: Tensor) -> float:
-    """Area under the ROC curve of a heat map as a detector of the patch's cells; NaN if all cells or no cells show the
-    patch.
+    """Area under the ROC curve of a heat map that classifies cells into patch and background.
+
+    The result is NaN if all cells or no cells show the patch.
 
     Args:
         heat: (rows, columns) heat map.
-        truth: (rows, columns), 1 where the patch is, 0 elsewhere.
+        truth: (rows, columns), 1 in cells that the patch covers, 0 elsewhere.
     """
     is_patch = truth.flatten() > 0
     inside, others = int(is_patch.sum()), int((~is_patch).sum())
@@ -112,17 +116,18 @@ def cell_auroc(heat: Tensor, truth: Tensor) -> float:
 
 
 def telling_layers(heats: Mapping[str, Sequence[Tensor]], truths: Sequence[Tensor]) -> tuple[str, ...]:
-    """The layers whose common heat map, the largest value in each cell, tells patches from other cells best.
+    """Selects the layers whose common heat map (the largest value in each cell) separates patches from other cells
+    best.
 
-    It starts with the best single layer. The others follow in the order of their own AUROC, and each is kept if it
-    raises the mean AUROC of the common map.
+    The selection starts with the best single layer. The other layers follow in the order of their own AUROC; a layer is
+    selected if it raises the mean AUROC of the common map.
 
     Args:
         heats: (rows, columns) heat maps by layer, one per picture.
-        truths: (rows, columns) of each picture, 1 where the patch is, 0 elsewhere.
+        truths: (rows, columns) of each picture, 1 in cells that the patch covers, 0 elsewhere.
 
     Returns:
-        Names of layers; empty if no picture shows a patch.
+        Names of the selected layers; empty if no picture shows a patch.
     """
 
     def area(names: Sequence[str]) -> float:
@@ -142,15 +147,16 @@ def telling_layers(heats: Mapping[str, Sequence[Tensor]], truths: Sequence[Tenso
 
 
 def _nearest(cells: int, grid: int) -> Tensor:
-    """(grid, cells) matrix of nearest-neighbour resizing along one axis: 1 where a grid place takes its value from a
-    cell.
+    """The (grid, cells) matrix of nearest-neighbour resizing along one axis.
+
+    An entry is 1 where a grid cell takes its value from a cell of the map, otherwise 0.
     """
     return functional.interpolate(torch.eye(cells)[None], size=grid, mode="nearest")[0].T
 
 
 @functools.lru_cache(maxsize=64)
 def _window_means(cells: int, grid: int, kernel: int) -> Tensor:
-    """(windows, cells) matrix along one axis from cells to means of windows of the resized grid."""
+    """The (windows, cells) matrix along one axis from the cells of a map to the window means of the resized grid."""
     sums = functional.pad(_nearest(cells, grid).double().cumsum(dim=0), (0, 0, 1, 0))
     kernel = min(kernel, grid)
     return ((sums[kernel:] - sums[:-kernel]) / kernel).float()

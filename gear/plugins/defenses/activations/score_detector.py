@@ -1,4 +1,4 @@
-"""Detectors that score the deviation of one feature map from clean pictures, such as HyperNeuron and FPDA."""
+"""Defenses that score how far one feature map deviates from clean pictures, such as HyperNeuron and FPDA."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ pictures deviate less from their own statistics than new pictures do.
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Learnt:
-    """The state of a detector after calibration.
+    """The state of a detector after calibration with clean pictures.
 
     Attributes:
-        layer: name of the tap that is read.
-        usual: statistics of the features of clean pictures.
+        layer: name of the tap (layer) whose feature map is read.
+        usual: mean and standard deviation of the features on clean pictures.
         level: raw score above which the alarm is raised.
-        report: facts about the calibration, for the user.
+        report: figures on the calibration, for the user.
     """
 
     layer: str
@@ -50,16 +50,16 @@ class Learnt:
     report: FitReport
 
     def fit_report(self) -> FitReport:
-        """Facts about the calibration: the alarm level, and how often clean pictures of the same kind exceed it."""
+        """Figures on the calibration: the alarm level, and the share of similar clean pictures expected above it."""
         return self.report
 
 
 class Detector:
-    """A `Defense` that does not change pictures; its score says how likely it is that a sample is attacked.
+    """A defense that only scores: pictures are unchanged, and the score grows with the suspicion of an attack.
 
     Args:
-        layer: name of the tap to read; "" for the deepest.
-        compress: function from a (C, h, w) feature map to the features that are compared.
+        layer: name of the tap (layer) to read; "" for the deepest.
+        compress: function from a (C, h, w) feature map to the features that are compared with clean pictures.
         aggregate: function from the z-scores of these features to one number, 0 or more.
         false_alarms: share of clean pictures whose score may exceed 0.5.
     """
@@ -77,7 +77,7 @@ class Detector:
     def fit(
         self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
     ) -> Learnt:
-        """Calibrates the detector with clean pictures only.
+        """Calibrates the detector: statistics of features and the alarm level, from the clean pictures alone.
 
         Raises:
             GearError: there are too few pictures, they differ in size, or the model has no such feature map.
@@ -99,23 +99,23 @@ class Detector:
         return Learnt(layer=layer, usual=learnt, level=level, report=FitReport(values=values))
 
     def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
-        """Returns the unchanged pictures and the score."""
+        """Returns the unchanged pictures of one sample and their score, 0.5 at the alarm level."""
         assert model is not None
         raw = self._raw(state.usual, self._numbers(model, views, state.layer))
         return DefenseResult(views=dict(views), score=sureness(raw, state.level))
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Returns the unchanged pictures."""
+        """Returns the (B, 3, H, W) pictures unchanged."""
         return dict(views)
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> DefendedBatch:
-        """The unchanged pictures, and their scores with gradients with respect to the pictures."""
+        """The unchanged (B, 3, H, W) pictures, and (B,) scores with gradients with respect to the pictures."""
         features = tapped(model, views, [state.layer])[state.layer]
         raw = torch.stack([self._aggregate(state.usual.z_scores(self._compress(one))) for one in features])
         return DefendedBatch(views=dict(views), scores=sureness_tensor(raw, state.level))
 
     def wrap(self, model: Model) -> Model:
-        """Returns the model unchanged."""
+        """Returns the model unchanged, because the detector only reads feature maps."""
         return model
 
     def _numbers(self, model: Model, views: Views, layer: str) -> Tensor:

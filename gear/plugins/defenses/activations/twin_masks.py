@@ -1,4 +1,4 @@
-"""Finds the patch's pixels from two pictures that differ only in the patch."""
+"""Finds the pixels of a patch by comparing two pictures that differ only in the patch."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ MOST_CHANGED = 0.5
 
 
 def patch_area(clean: UInt8Image, patched: UInt8Image, number: int) -> npt.NDArray[np.bool_]:
-    """(H, W) bool: pixels of the second picture that show the patch.
+    """The (H, W) bool mask of the pixels that show the patch, from a picture without and the same one with the
+    patch.
 
     Args:
-        clean, patched: (H, W, 3) uint8 pictures of one scene.
+        clean, patched: (H, W, 3) uint8 pictures of one scene without and with the patch.
         number: number of the sample, for the error message.
 
     Raises:
-        GearError: the pictures are not twins.
+        GearError: the pictures differ in size or in more than half of their pixels, so they show different scenes.
     """
     if clean.shape == patched.shape:
         changed = (cv2.absdiff(clean, patched).max(axis=2) >= LEAST_CHANGE).astype(np.uint8)

@@ -23,17 +23,17 @@ has deviation 0, and its smallest change would outweigh all other features.
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Usual:
-    """Means and standard deviations of features on clean pictures.
+    """Mean and standard deviation of each feature on clean pictures (without patch).
 
     Attributes:
-        mean, deviation: mean and standard deviation of each feature, float64.
+        mean, deviation: tensors in the shape of the features, float64.
     """
 
     mean: Tensor
     deviation: Tensor
 
     def z_scores(self, values: Tensor) -> Tensor:
-        """Z-scores of features: (values - mean) / deviation.
+        """The z-scores of features: (values - mean) / deviation.
 
         Raises:
             GearError: the features have another shape than in the calibration, because the pictures have another size.
@@ -48,10 +48,10 @@ class Usual:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Moments:
-    """Count, mean and sum of squared deviations of samples, from which standard deviations are computed.
+    """Count, mean and sum of squared deviations of several feature tensors, for computing standard deviations.
 
     Attributes:
-        count: number of samples.
+        count: number of tensors.
         mean: mean of each feature, float64.
         squares: sum of squared deviations from the mean, for each feature, float64.
     """
@@ -61,10 +61,10 @@ class Moments:
     squares: Tensor
 
     def merged(self, other: Moments) -> Moments:
-        """The moments of both sets of samples together (Chan, Golub and LeVeque, 1979).
+        """The moments of two sets of feature tensors taken together (Chan, Golub and LeVeque, 1979).
 
         Raises:
-            GearError: their shapes differ.
+            GearError: the features of the two sets have different shapes.
         """
         if not self.count or not other.count:
             return self if self.count else other
@@ -76,10 +76,10 @@ class Moments:
         return Moments(count=count, mean=mean, squares=squares)
 
     def usual(self) -> Usual:
-        """Means and standard deviations of the samples.
+        """Mean and standard deviation of each feature.
 
         Raises:
-            GearError: there are fewer than two samples.
+            GearError: the moments cover fewer than two tensors.
         """
         if self.count < 2:
             raise GearError(f"a calibration needs at least two pictures to say what is usual, got {self.count}")
@@ -90,7 +90,7 @@ NO_MOMENTS = Moments(count=0, mean=torch.zeros(()), squares=torch.zeros(()))
 
 
 def moments(samples: Iterable[Tensor]) -> Moments:
-    """Count, mean and sum of squared deviations over tensors of one shape, computed in one pass.
+    """Count, mean and sum of squared deviations over feature tensors of one shape, computed in one pass.
 
     Raises:
         GearError: the shapes differ.
@@ -112,9 +112,9 @@ def usual(samples: Iterable[Tensor]) -> Usual:
 
 
 def alarm_level(clean: Sequence[float], false_alarms: float) -> float:
-    """The score that new clean pictures exceed with a probability of at most `false_alarms`.
+    """The score that a new clean picture exceeds with a probability of at most `false_alarms`.
 
-    It is the score of rank ceil((n + 1)(1 - false_alarms)) among the n clean ones. Averaged over all draws of the
+    It is the score of rank ceil((n + 1)(1 - false_alarms)) among the n clean scores. Averaged over all draws of the
     calibration pictures, the bound holds for any distribution of the scores (Vovk et al., 2005). It would not hold for
     a quantile that is interpolated between scores.
 
@@ -133,9 +133,9 @@ def alarm_level(clean: Sequence[float], false_alarms: float) -> float:
 
 
 def false_alarm_interval(count: int, false_alarms: float) -> tuple[float, float]:
-    """The 95 % interval of the share of new clean pictures of the same kind that exceed the alarm level.
+    """The 95 % interval (low, high) of the share of new, similar clean pictures that exceed the alarm level.
 
-    The share that exceeds the k-th of n scores has the distribution Beta(n + 1 - k, k) over draws of the n calibration
+    The share above the k-th of n scores has the distribution Beta(n + 1 - k, k) over draws of the n calibration
     pictures. Pictures of other scenes may exceed the level more often.
     """
     from scipy import stats
@@ -150,14 +150,12 @@ def _rank(count: int, false_alarms: float) -> int:
 
 
 def sureness(raw: float, level: float) -> float:
-    """Converts a raw score (0 or more) to a score in 0..1: it grows with the raw score and is 0.5 at the alarm
-    level.
-    """
+    """Converts a raw score of 0 or more to a score in 0..1: raw / (raw + level), which is 0.5 at the alarm level."""
     if not math.isfinite(raw):
         return 1.0
     return raw / (raw + max(level, LEAST_LEVEL))
 
 
 def sureness_tensor(raw: Tensor, level: float) -> Tensor:
-    """The same as `sureness` for (B,) raw scores, with gradients."""
+    """Converts (B,) raw scores of 0 or more to scores in 0..1: raw / (raw + level), with gradients."""
     return raw / (raw + max(level, LEAST_LEVEL))

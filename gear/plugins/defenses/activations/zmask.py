@@ -1,4 +1,5 @@
-"""Z-Mask (Rossolini et al., AAAI 2023): regions that over-activate both shallow and deep layers are covered as patches.
+"""Z-Mask (Rossolini et al., AAAI 2023): covers regions that over-activate both shallow and deep layers of a
+network.
 
 It follows the authors' code and supplement. Choices that these leave open are options of the plugin.
 """
@@ -36,7 +37,7 @@ from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
 LAYER_PICTURES = 12
-"""Largest number of patched pictures by which layers are chosen."""
+"""Largest number of patched calibration pictures from which the layers are selected."""
 
 MOSTLY = 0.5
 """Share of a cell that the patch must cover for the cell to count as patch."""
@@ -49,13 +50,13 @@ published. For networks with another normalisation it is a grey near the middle,
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Learnt:
-    """The state of the defense after calibration.
+    """The state of Z-Mask after calibration.
 
     Attributes:
-        layers: names of the layers that are read.
-        statistics: statistics of the channels of these layers.
-        block: computes masks from heat maps.
-        level: raw score that the share `false_alarms` of clean pictures exceeds.
+        layers: names of the layers whose feature maps are read.
+        statistics: mean and deviation of the channels on clean pictures, by layer.
+        block: the fusion block, which computes masks and raw scores from heat maps.
+        level: raw score that at most the share `false_alarms` of clean pictures exceeds.
         report: quality of the fit on the calibration pictures.
     """
 
@@ -66,8 +67,8 @@ class Learnt:
     report: FitReport
 
     def fit_report(self) -> FitReport:
-        """Facts about the calibration: loss and mask IoU of the fusion block on the calibration data, and the
-        alarm level.
+        """Figures on the calibration: loss and mask IoU of the fusion block on the calibration data, and the alarm
+        level.
         """
         return self.report
 
@@ -82,10 +83,10 @@ class ZMask:
     def fit(
         self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
     ) -> Learnt:
-        """Computes statistics from clean pictures, and fits the fusion block to their twins with patches.
+        """Computes statistics from clean pictures, and fits the fusion block to the same scenes with patches.
 
         Raises:
-            GearError: there are no pictures, they are not twins, or no patch is visible in them.
+            GearError: there are no pictures, clean and patched pictures show different scenes, or no patch is visible.
         """
         assert model is not None
         if not len(clean) or not len(patched):
@@ -113,7 +114,9 @@ class ZMask:
         return Learnt(layers=layers, statistics=statistics, block=block, level=level, report=report)
 
     def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
-        """Covers regions that over-activate the network; the score is the highest one over the cameras."""
+        """Covers regions of one sample's pictures that over-activate the network; the score is the highest over
+        the cameras.
+        """
         assert model is not None
         masks = {name: np.zeros(picture.shape[:2], np.float32) for name, picture in views.items()}
         score = 0.0
@@ -137,11 +140,12 @@ class ZMask:
         raise ValueError("Z-Mask looks into the model: it has `forward_fitted`")
 
     def forward_fitted(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> Mapping[str, Tensor]:
-        """Cleans (B, 3, H, W) pictures by camera; the result is that of `defend_batch` without masks and scores."""
+        """Cleans (B, 3, H, W) pictures by camera name; masks and scores of `defend_batch` are left out."""
         return self.defend_batch(views, model, state).views
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> DefendedBatch:
-        """Cleans (B, 3, H, W) pictures by camera as `apply` does, and returns masks and scores with gradients.
+        """Cleans (B, 3, H, W) pictures by camera name as `apply` does, and returns masks and scores with
+        gradients.
 
         The gradient of the covered pictures is that of the mask before rounding.
         """
@@ -172,7 +176,7 @@ class ZMask:
         return DefendedBatch(views=cleaned, masks=masks, scores=score)
 
     def wrap(self, model: Model) -> Model:
-        """Returns the model unchanged."""
+        """Returns the model unchanged, because Z-Mask only changes pictures."""
         return model
 
     def _statistics(self, clean: Sequence[Views], model: Model, layers: Layers) -> dict[str, ChannelStatistics]:
@@ -192,7 +196,7 @@ class ZMask:
         layers: Layers,
         statistics: Mapping[str, ChannelStatistics],
     ) -> Iterator[Example]:
-        """Training examples: heat maps of the pictures in which a patch is visible, with the true mask."""
+        """Yields training examples: the heat maps of each picture in which a patch is visible, with the true mask."""
         for number in spread(range(len(patched)), self._settings.learning_pictures):
             without, look = looks(clean[number])[0], looks(patched[number])[0]
             area = patch_area(without.views[look.camera], look.views[look.camera], number)
@@ -202,8 +206,9 @@ class ZMask:
                 yield Example(shallow=shallow, deep=deep, truth=truth)
 
     def _grid(self, height: int, width: int) -> Cells:
-        """Rows and columns of the grid for a picture of a size. Cells have the aspect ratio of those of a 150 x 300
-        grid on a picture of 2048 x 1024.
+        """Rows and columns of the grid for a picture size.
+
+        Cells have the aspect ratio of those of a 150 x 300 grid on a picture of 2048 x 1024.
         """
         return self._settings.rows, max(1, round(self._settings.rows * width / height))
 
@@ -263,7 +268,7 @@ class ZMask:
         `ddrnet23_slim_depth` with `rb1`, `rb2` and `rbb2` (loss 0.140, the best constant's is 0.150; mask IoU 0). With
         `rb2` alone it does (0.121 instead of 0.169 on 14 pictures; IoU 0.22, and 0.34 on billboard02).
 
-        A layer may be both shallow and deep, as in the supplement. Layers that the options name are always kept.
+        A layer may be both shallow and deep, as in the supplement. Layers that the options name are always used.
         """
         every = Layers(shallow=layers.all(), deep=layers.all())
         heats: dict[str, dict[str, list[Tensor]]] = {"shallow": {}, "deep": {}}
@@ -284,7 +289,7 @@ class ZMask:
 
 
 def _truth(area: npt.NDArray[np.bool_], grid: Cells) -> Tensor:
-    """(rows, columns) of 0 and 1: cells of which the patch covers more than `MOSTLY`."""
+    """The true mask on the grid, (rows, columns): 1 in cells of which the patch covers at least `MOSTLY`, else 0."""
     share = cv2.resize(area.astype(np.float32), grid[::-1], interpolation=cv2.INTER_AREA)
     return torch.from_numpy((share >= MOSTLY).astype(np.float32))
 

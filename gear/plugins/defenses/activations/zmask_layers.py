@@ -1,4 +1,4 @@
-"""What Z-Mask reads: the layers of a network, and the pictures of a camera rig."""
+"""The inputs of Z-Mask: the layers of a network that are read, and the pictures of a camera rig."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gear.values.frames import UInt8Image
 
 Views = Mapping[str, UInt8Image]
 Shown = TypeVar("Shown", UInt8Image, Tensor)
-"""One picture of (H, W, 3) bytes, or a batch of (B, 3, H, W) numbers."""
+"""Type of pictures: one (H, W, 3) uint8 picture, or a (B, 3, H, W) tensor."""
 
 LEFT, RIGHT = "left", "right"
 
@@ -25,7 +25,7 @@ class Layers:
     """The feature maps that Z-Mask reads.
 
     Attributes:
-        shallow, deep: names of the taps with shallow and with deep feature maps.
+        shallow, deep: names of the taps (layers) with shallow and with deep feature maps.
     """
 
     shallow: tuple[str, ...]
@@ -45,7 +45,12 @@ KNOWN = (
 
 
 def layers_of(model: Model, shallow: Sequence[str], deep: Sequence[str]) -> Layers:
-    """The layers of a network: the given ones, otherwise those of the paper, otherwise the first and the last tap.
+    """The layers that Z-Mask reads: those in the arguments, otherwise the published ones, otherwise first and last
+    tap.
+
+    Args:
+        model: the network; its taps are the layers that can be read.
+        shallow, deep: names of the layers; empty for the default.
 
     Raises:
         GearError: the model has no taps.
@@ -60,10 +65,10 @@ def layers_of(model: Model, shallow: Sequence[str], deep: Sequence[str]) -> Laye
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look(Generic[Shown]):
-    """One input for the network, made from a sample or a batch.
+    """One input of the network, made from the pictures of a sample or of a batch.
 
     Attributes:
-        camera: name of the camera whose picture the feature maps describe.
+        camera: name of the camera whose picture the network's feature maps describe.
         views: pictures for the network, by camera name.
         is_mirrored: whether the pictures are mirrored, left to right.
     """
@@ -74,11 +79,12 @@ class Look(Generic[Shown]):
 
 
 def looks(views: Mapping[str, Shown]) -> tuple[Look[Shown], ...]:
-    """One input for each camera whose picture the network's feature maps can describe, with the reference camera first.
+    """The network inputs by which every camera's picture is described by feature maps; the reference camera is
+    first.
 
-    The feature maps of a stereo network describe the left picture. Mirrored, the right picture becomes the left one of
-    another pair, so that the same network and statistics also describe it. For other rigs only the first camera is
-    used.
+    The feature maps of a stereo network describe the left picture. In the mirrored pair the right picture becomes the
+    left one, so the same network and statistics also describe the right picture. For other rigs only the first camera
+    is used.
     """
     first = LEFT if LEFT in views else next(iter(views))
     plain = Look(camera=first, views=views, is_mirrored=False)

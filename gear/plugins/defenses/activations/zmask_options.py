@@ -10,17 +10,18 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZMaskConfig(AlarmConfig):
-    """Options; the defaults are those of the authors' demonstration (BiSeNet, pictures of 2048 x 1024).
+    """Options of Z-Mask; the defaults are those of the authors' demonstration (BiSeNet, pictures of 2048 x 1024).
 
     Attributes:
-        shallow, deep: names of the model's feature maps; empty for those of the paper, or, for networks that the paper
-            does not name, for the first one (shallow) and the first and the last one (deep).
+        shallow, deep: names of the model's feature maps. Empty: the calibration selects those that separate patches
+            best, from the feature maps in the paper, or, for networks that the paper does not name, from the first and
+            the last one.
         rows: number of rows of the grid on which activations are compared.
         shallow_kernels, deep_kernels: rows of the pooling windows, large ones first; they are twice as wide.
         statistics_pictures: largest number of clean pictures from which statistics are computed.
         learning_pictures: largest number of pictures with patches to which the fusion block is fitted.
         steps: number of training steps; the authors train for 250 passes over 100 pictures, 15 per step.
-        only_if_sure: whether pictures with a score below 0.5 are left unchanged.
+        only_if_sure: whether pictures with a score of at most 0.5 are left unchanged.
     """
 
     shallow: tuple[str, ...] = ()
