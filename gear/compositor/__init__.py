@@ -1,4 +1,4 @@
 """Compositors put patches into stored pictures, differentiably with respect to the patches.
 
-Attacks use them. Collecting never imports this package.
+Attacks use compositors. The collection of datasets never imports this package.
 """

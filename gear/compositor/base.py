@@ -1,4 +1,4 @@
-"""The base class of compositors: in stored pictures, they replace the pixels of a surface by a patch."""
+"""The base class of compositors, which replace the pixels of a patch surface in stored pictures by a patch."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CACHE_BYTES = 4 << 30
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """One view of one sample, prepared for patches of given sizes, so that composing again is quick.
+    """One view of one sample, prepared for patches of certain sizes, so the next composition is fast.
 
     Attributes:
         picture: (3, H, W) uint8, the stored picture.
@@ -45,20 +45,20 @@ class Prepared:
 
     @property
     def nbytes(self) -> int:
-        """Memory of this object in bytes."""
+        """The memory of this object in bytes."""
         return self.picture.nbytes + self.where.nbytes + self.inner_bytes
 
 
 class BaseCompositor:
-    """Base class of compositors; implements `gear.contracts.attacks.Compositor`.
+    """The base class of compositors; implements `gear.contracts.attacks.Compositor`.
 
     Subclasses choose the pixels to replace and compute their values.
 
     Args:
         dataset: the split whose samples are composed; its pictures are the background.
         device: torch device to compute on.
-        rounding: whether patches and pictures are rounded to bytes, as files are. Gradients pass the rounding
-            unchanged.
+        rounding: whether patches and pictures are rounded to multiples of 1/255, as in files. Gradients pass the
+            rounding unchanged.
         cache_bytes: memory limit for prepared samples.
         cache: a cache that several compositors share; None for a new one of `cache_bytes`.
     """
@@ -79,14 +79,14 @@ class BaseCompositor:
 
     @property
     def surfaces(self) -> int:
-        """Number of patches that `compose` expects: the number of patch surfaces in the scene."""
+        """The number of patches that `compose` expects: the number of patch surfaces in the scene."""
         return len(self.dataset.sidecar(0).record.surfaces)
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """Composes pictures of samples with the given patches on their surfaces.
+        """Composes the patches onto their surfaces in the pictures of some samples.
 
-        The result is differentiable with respect to the patches. Pixels that show no surface are equal to the dataset's
-        pixels, bit for bit.
+        The result is differentiable with respect to the patches. Pixels that no patch can change are equal to the
+        dataset's pixels, bit for bit.
 
         Args:
             patches: one tensor for each surface, sRGB in 0..1: (3, h, w) for all samples, or (B, 3, h, w) with a patch
@@ -119,7 +119,7 @@ class BaseCompositor:
         """The stored ground truth of a surface in a view.
 
         Raises:
-            DatasetError: the sample has none for this view.
+            DatasetError: the sample has no ground truth of this surface in this view.
         """
         for truth in sample.surfaces:
             if truth.name == name and truth.camera == view:
@@ -134,7 +134,9 @@ class BaseCompositor:
 
     @abstractmethod
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
-        """The pyramid of each patch as a list of colours: (columns, 3), or (B, columns, 3) for a batch of patches."""
+        """The texels of each patch at all mip levels as a list of colours, (columns, 3) or (B, columns, 3) per
+        patch.
+        """
 
     @abstractmethod
     def _composed(self, inner: Sequence[Any], columns: Sequence[Tensor]) -> Tensor:
@@ -178,11 +180,12 @@ class _Paste(torch.autograd.Function):
 
 
 def products(matrices: Sequence[SparseMatrix], columns: Tensor) -> Tensor:
-    """Sparse product for each view: the light of the pixels of one surface.
+    """Multiplies the sparse sampling matrix of each view with a patch's texels, which gives the light of the
+    pixels.
 
     Args:
-        matrices: for each view, a matrix (N_i, columns).
-        columns: (columns, 3) for all views, or (B, columns, 3) with one entry for each view.
+        matrices: for each view, a sparse matrix (N_i, columns) of one surface.
+        columns: the texels, (columns, 3) for all views, or (B, columns, 3) with one entry for each view.
 
     Returns:
         (sum of N_i, 3).
@@ -193,9 +196,7 @@ def products(matrices: Sequence[SparseMatrix], columns: Tensor) -> Tensor:
 
 
 def rounded(values: Tensor) -> Tensor:
-    """Rounds values in 0..1 to multiples of 1/255. Gradients pass as if nothing was rounded (straight-through
-    estimator).
-    """
+    """Rounds values in 0..1 to multiples of 1/255; gradients pass unchanged (straight-through estimator)."""
     stepped = torch.floor(values.detach() * 255 + 0.5) / 255
     return values + (stepped - values.detach())
 

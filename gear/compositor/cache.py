@@ -8,11 +8,11 @@ from typing import Generic, Protocol, TypeVar
 
 
 class Sized(Protocol):
-    """Protocol of objects that know how much memory they take."""
+    """Protocol of objects with an attribute `nbytes`, their memory in bytes."""
 
     @property
     def nbytes(self) -> int:
-        """Memory of the object in bytes."""
+        """The memory of the object in bytes."""
         ...
 
 
@@ -20,8 +20,9 @@ ThingT = TypeVar("ThingT", bound=Sized)
 
 
 class Cache(Generic[ThingT]):
-    """A dictionary of objects with a limit in bytes; the least recently used object is dropped first. Not
-    thread-safe.
+    """A dictionary of objects with a limit in bytes, which drops the least recently used object first.
+
+    It is not thread-safe.
     """
 
     def __init__(self, max_bytes: int) -> None:
@@ -33,9 +34,9 @@ class Cache(Generic[ThingT]):
         return len(self._things)
 
     def get(self, key: Hashable, make: Callable[[], ThingT]) -> ThingT:
-        """Returns the object for a key; if it is missing, `make` creates it and it is stored.
+        """Returns the object for a key; a missing object is created by `make` and stored.
 
-        An object that is larger than the whole cache is returned but not stored.
+        An object that is larger than the whole cache is returned but not stored, and the cache is emptied.
         """
         if key in self._things:
             self._things.move_to_end(key)

@@ -40,12 +40,12 @@ PIXELS_AT_ONCE = 1 << 17
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Outline:
-    """The N pixels that surfaces cover, by pinhole projection and lens.
+    """Data of the N pixels that patch surfaces cover, by pinhole projection and lens.
 
     Attributes:
         background: (N, 3) float32 values of the stored picture, 0..1, multiplied by the share of the pixel that no
             surface covers.
-        matrices: for each surface, a matrix (N, columns).
+        matrices: for each surface, a sparse matrix (N, columns).
         covers: for each surface, (N, 1) float32: the share of each pixel that it covers and no nearer surface does.
     """
 
@@ -55,7 +55,10 @@ class _Outline:
 
 
 class HomographyCompositor(BaseCompositor):
-    """The compositor of the CARLA-GeAR paper; it works with every dataset. `BaseCompositor` documents its arguments."""
+    """The compositor of the CARLA-GeAR paper: patches are pasted by homography, without light or occluders.
+
+    It works with every dataset. `BaseCompositor` documents the arguments.
+    """
 
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
         return [pyramid_of(int(p.shape[-2]), int(p.shape[-1])).spread(p) for p in patches]

@@ -1,4 +1,4 @@
-"""The texture of a patch and its mip levels, as linear functions of the patch's pixels.
+"""The mip levels of a patch's texture, as linear functions of the patch's pixels.
 
 The patch is first resized to the texture's size by area averages; then each mip level has half the sides of the
 previous one. Both operations treat rows and columns separately: level = rows @ patch @ columns.T. Levels that are finer
@@ -26,17 +26,17 @@ Ints = npt.NDArray[np.int64]
 Halving = Literal["middles", "areas"]
 """How a mip level with an odd number of texels along an axis is halved.
 
-`middles` reads it bilinearly at the centres of the new, larger texels, as blits on a GPU do. `areas` averages the area
-that each new texel covers. Even numbers of texels are averaged in pairs by both.
+`middles` interpolates at the centres of the new, larger texels, as blits on a GPU do. `areas` averages the area that
+each new texel covers. With an even number of texels, both rules average pairs.
 """
 
 
 def halving_of(renderer: str, driver: str) -> Halving:
-    """The rule of halving that a renderer uses with a graphics driver.
+    """The rule by which a renderer with a graphics driver computes the next mip level of a texture.
 
-    Filament halves with its own blits on every driver. OpenGL leaves it to the driver: Mesa blits, NVIDIA averages
-    areas (measured on an H100: with the wrong rule composed pictures differ by up to 7 levels of 255, with the right
-    one by 0.4).
+    Filament uses its own rule on every driver. With OpenGL the driver decides: Mesa interpolates at texel centres,
+    NVIDIA averages areas. On an H100, composed pictures differ from renders by up to 7 levels of 255 with the wrong
+    rule, and by 0.4 with the right one.
 
     Args:
         renderer: name of the renderer.
@@ -47,7 +47,12 @@ def halving_of(renderer: str, driver: str) -> Halving:
 
 @cache
 def halving_matrix(size: int, halving: Halving = "middles") -> Array:
-    """(max(1, size // 2), size) matrix that computes the next mip level along one axis; read-only."""
+    """The (max(1, size // 2), size) matrix that computes the next mip level along one axis; read-only.
+
+    Args:
+        size: number of texels along the axis.
+        halving: rule of halving.
+    """
     target = max(1, size // 2)
     if halving == "areas":
         return box_matrix(size, target)
@@ -62,13 +67,15 @@ def halving_matrix(size: int, halving: Halving = "middles") -> Array:
 
 @lru_cache(maxsize=16)
 def axis_matrices(patch_px: int, face_px: int, halving: Halving = "middles") -> tuple[Array, ...]:
-    """For each mip level, from the finest to a single texel: the matrix from a patch's pixels to the level's texels
-    along one axis.
+    """One matrix per mip level, from the finest to a single texel: patch pixels to texels along one axis.
 
     Args:
         patch_px: number of the patch's pixels along the axis.
         face_px: number of the texture's texels along the axis.
         halving: rule of halving.
+
+    Returns:
+        (texels of the level, patch_px) matrices; rows sum to 1.
     """
     matrices = [box_matrix(patch_px, face_px)]
     while matrices[-1].shape[0] > 1:
@@ -78,7 +85,7 @@ def axis_matrices(patch_px: int, face_px: int, halving: Halving = "middles") -> 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reads:
-    """For each of the texels along one axis of a level: the k columns that it is read from, and their weights.
+    """The weighted sum by which each texel along one axis of a mip level is read from k columns.
 
     Attributes:
         index: (texels, k) int64 indices of columns.
@@ -97,7 +104,7 @@ class Pyramid:
         height_px, width_px: size of the patch.
         halving: rule of halving.
         rows, columns: for each level, the matrices of both axes.
-        folded: number of the finest levels that are not computed; they are read from the patch.
+        folded: number of the finest levels that are not computed; their texels are read from the patch.
         starts: for each level, the index of its first column; 0 (the patch) for the levels that are not computed.
         size: number of columns.
     """
@@ -113,16 +120,16 @@ class Pyramid:
 
     @property
     def levels(self) -> int:
-        """Number of mip levels."""
+        """The number of mip levels."""
         return len(self.starts)
 
     def shape(self, level: int) -> tuple[int, int]:
-        """Number of rows and columns of a level's texels."""
+        """The number of texel rows and texel columns of a mip level."""
         return self.rows[level].shape[0], self.columns[level].shape[0]
 
     def reads(self, level: int) -> tuple[Reads, Reads, int]:
-        """How a level is read: the reads along its rows, those along its columns, and the stride (number of
-        columns) from row to row.
+        """How the texels of a mip level are read: the reads along both axes, and the number of columns per texel
+        row.
         """
         if level < self.folded:
             return _nonzero(self.rows[level]), _nonzero(self.columns[level]), self.width_px
@@ -130,7 +137,7 @@ class Pyramid:
         return _identity(height), _identity(width), width
 
     def spread(self, patch: Tensor) -> Tensor:
-        """The columns of a patch: (..., 3, h, w) linear light to (..., size, 3); differentiable."""
+        """Computes the texels of all mip levels: (..., 3, h, w) patch to (..., size, 3) columns; differentiable."""
         import torch
 
         levels = [patch]
@@ -148,7 +155,9 @@ class Pyramid:
         )
 
     def _next(self, last: Tensor, patch: Tensor, level: int) -> Tensor:
-        """A level, computed from the previous one; the first computed level is made from the patch."""
+        """The texels of a mip level, computed from the previous level, or from the patch for the first computed
+        level.
+        """
         import torch
 
         size = tuple(last.shape[-2:])
@@ -165,7 +174,7 @@ class Pyramid:
 
 @lru_cache(maxsize=16)
 def pyramid_of(height_px: int, width_px: int, halving: Halving = "middles") -> Pyramid:
-    """The pyramid for patches of a given size; cached."""
+    """The mip levels (pyramid) for patches of one size; cached."""
     rows = list(axis_matrices(height_px, FACE_SIZE_PX[1], halving))
     columns = list(axis_matrices(width_px, FACE_SIZE_PX[0], halving))
     # The shorter axis keeps one texel while the longer one is halved further.
@@ -192,7 +201,7 @@ def pyramid_of(height_px: int, width_px: int, halving: Halving = "middles") -> P
 
 
 def _nonzero(matrix: Array) -> Reads:
-    """The nonzero columns of each row, padded with weights of zero."""
+    """The nonzero entries of each row of a matrix, as reads; shorter rows are padded with weights of zero."""
     most = int((matrix > 0).sum(axis=1).max())
     index = np.argsort(-matrix, axis=1, kind="stable")[:, :most]
     return Reads(index=index, weight=np.take_along_axis(matrix, index, axis=1))

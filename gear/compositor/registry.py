@@ -1,4 +1,4 @@
-"""Finds compositors by name."""
+"""Makes compositors by their names, `transport` or `homography`."""
 
 from __future__ import annotations
 
@@ -31,9 +31,10 @@ def open_compositor(
 
     Args:
         name: one of `COMPOSITORS`.
-        dataset: the split whose samples are composed; `transport` needs one that was collected with probes.
+        dataset: the split whose samples are composed; `transport` needs a split that was collected with probes (samples
+            rendered with each patch surface black and white).
         device: torch device to compute on.
-        rounding: whether patches and pictures are rounded to bytes, as files are.
+        rounding: whether patches and pictures are rounded to multiples of 1/255, as in files.
         cache_bytes: memory limit for prepared samples.
         cache: a cache that several compositors share; None for a new one of `cache_bytes`.
 

@@ -1,8 +1,8 @@
-"""Texture samples of the pixels that show a patch.
+"""The texture samples of the pixels that show a patch.
 
 Each pixel has a few samples: a position on the patch's surface, a mip level and a weight. Its colour is their weighted
-mean. Samples beside the surface have weight 0, because the probes already contain the share of a pixel that the surface
-covers.
+mean. Samples beside the surface have weight 0, because the share of a pixel that the surface covers is already in the
+probes (renders with the surface black and white).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _QUARTERS = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Samples:
-    """Texture samples of N pixels, S for each.
+    """Texture samples of N pixels, S samples for each pixel.
 
     Attributes:
         u, v: (N, S) positions on the surface, 0..1 to the right and down.
@@ -44,7 +44,7 @@ class Samples:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SampleScheme:
-    """How a renderer and a camera take texture samples.
+    """The rules by which a renderer and a camera take texture samples.
 
     Attributes:
         supersampled: whether each pixel has 2 x 2 samples (quality `film` of all renderers but `classic`).
@@ -61,7 +61,7 @@ class SampleScheme:
 
     @staticmethod
     def of(renderer_name: str, quality: Quality, effects: tuple[Effect, ...]) -> SampleScheme:
-        """The scheme of a renderer and its quality, with the camera's active effects."""
+        """The rules of a renderer at a quality, with the camera's active effects."""
         is_film = quality == "film"
         return SampleScheme(
             supersampled=is_film and renderer_name != "classic",
@@ -72,7 +72,7 @@ class SampleScheme:
 
 
 def unit_from_image(truth: SurfaceTruth, surface: SurfaceRecord, camera: CameraRecord) -> Array:
-    """(3, 3) homography from index pixels of the pinhole to patch coordinates 0..1.
+    """The (3, 3) homography from index pixels of the pinhole picture to patch coordinates in 0..1.
 
     Its third row gives the inverse of depth, positive in front of the camera. It also exists for surfaces that reach
     behind the camera.
@@ -91,7 +91,7 @@ def take_samples(
     """Computes the texture samples of some pixels.
 
     Args:
-        scheme: how samples are taken.
+        scheme: rules by which samples are taken.
         unit: (3, 3) homography, from `unit_from_image`.
         pixels: (N,) columns and (N,) rows, index pixels.
         mask: (H, W) bool, True for pixels whose id is that of the surface.
@@ -129,7 +129,7 @@ def take_samples(
 
 
 def _on_face(unit: Array, x: Array, y: Array) -> tuple[Array, Array, Mask]:
-    """Positions u and v on the surface, and whether they are in front of the camera."""
+    """Positions u and v of pixels on the surface, 0..1 inside, and whether they are in front of the camera."""
     u, v, depth = (row[0] * x + row[1] * y + row[2] for row in unit)
     in_front = depth > 1e-12
     safe = np.where(in_front, depth, 1.0)

@@ -14,7 +14,7 @@ from torch import Tensor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SparseMatrix:
-    """A sparse matrix and its transpose in CSR form: one for the forward product, one for gradients.
+    """A constant sparse matrix for differentiable products, with its transpose for gradients; CSR format.
 
     Attributes:
         forward: (N, M) sparse CSR.
@@ -26,12 +26,12 @@ class SparseMatrix:
 
     @staticmethod
     def of(matrix: Any, device: torch.device) -> SparseMatrix:
-        """Converts a SciPy CSR matrix of float32 and puts it on a device."""
+        """Converts a SciPy CSR matrix of float32 and puts it, with its transpose, on a torch device."""
         return SparseMatrix(_csr(matrix, device), _csr(matrix.T.tocsr(), device))
 
     @property
     def nbytes(self) -> int:
-        """Memory of both matrices in bytes."""
+        """The memory of both matrices in bytes."""
         parts = [m for csr in (self.forward, self.backward) for m in (csr.crow_indices(), csr.col_indices())]
         return sum(p.nbytes for p in parts) + 2 * int(self.forward.values().nbytes)
 

@@ -34,7 +34,7 @@ from gear.values.frames import LINEAR_FULL_SCALE
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Light:
-    """The data from which the N composed pixels of a view are computed.
+    """The light from which the N composed pixels of a view are computed.
 
     Attributes:
         black: (N, 3) float32 linear light with all surfaces black, 1.0 is full scale.
@@ -62,7 +62,11 @@ class _Light:
 
 
 class TransportCompositor(BaseCompositor):
-    """The exact compositor; it needs a dataset with probes. `BaseCompositor` documents its arguments."""
+    """The exact compositor: light, air, occluders and lens act on the patch as in the renderer.
+
+    It needs a dataset with probes (samples rendered with each surface black and white). `BaseCompositor` documents the
+    arguments.
+    """
 
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
         renderer = self._renderer
@@ -80,7 +84,7 @@ class TransportCompositor(BaseCompositor):
         return torch.cat([view.shown(part) for view, part in zip(inner, parts, strict=True)])
 
     def _pyramid(self, size: tuple[int, int]) -> Pyramid:
-        """The pyramid for patches of size (height, width), as the dataset's renderer filters textures."""
+        """The mip levels for patches of size (height, width), as the dataset's renderer computes them."""
         renderer = self._renderer
         driver = str(self.dataset.manifest["renderer"].get("driver"))
         return pyramid_of(*size, halving_of(renderer, driver))

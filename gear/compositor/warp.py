@@ -1,4 +1,4 @@
-"""Texture samples as one sparse matrix, from the columns of a patch's pyramid to pixels."""
+"""The texture samples of all pixels as one sparse matrix, from the texels of a patch's mip levels to pixels."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from gear.values.geometry import Array
 
 
 def warp_matrix(samples: Samples, pyramid: Pyramid) -> Any:
-    """The weights with which each pixel reads the columns of a pyramid: trilinear filtering of a texture that repeats.
+    """The sparse matrix of weights with which pixels read a patch's texels: trilinear filtering, repeating
+    texture.
 
     Args:
         samples: texture samples of N pixels.
-        pyramid: pyramid for patches of one size.
+        pyramid: mip levels for patches of one size.
 
     Returns:
         (N, columns) SciPy CSR matrix of float32; rows sum to 1.

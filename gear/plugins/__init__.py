@@ -1,1 +1,1 @@
-"""Plugins: their discovery, and the built-in tasks, models, attacks and defenses, one file each."""
+"""Discovery and building of plugins, and the built-in tasks, models, attacks and defenses, one file each."""

@@ -22,7 +22,7 @@ NO_OPTIONS = Mapping({}, Place("defaults"))
 
 
 def find(kind: Kind, name: str) -> PluginEntry:
-    """Finds a plugin by kind and name.
+    """Finds a plugin by its kind and name in this environment's catalogue.
 
     Raises:
         UnknownNameError: there is no such plugin.
@@ -32,31 +32,31 @@ def find(kind: Kind, name: str) -> PluginEntry:
 
 
 def plugins_of_kind(kind: Kind) -> tuple[PluginEntry, ...]:
-    """All plugins of a kind, by name."""
+    """All plugins of a kind in this environment, sorted by name."""
     return catalogue().of_kind(kind)
 
 
 def broken_hint() -> str:
-    """In brackets, the plugins that failed to load, for messages about an unknown name; "" if none did."""
+    """A text in brackets that names the plugins that failed to load, for messages about unknown names; "" for none."""
     return catalogue().broken_hint()
 
 
 def name_of_task(written: JsonMapping[str, Any]) -> str:
-    """The name by which the task that wrote a dataset is found.
+    """The name by which the catalogue finds the task with which a dataset was written.
 
     Args:
-        written: the entry on the task in the dataset's plan.
+        written: the entry on the task in the dataset's plan (its stored configuration), with `name` and `package`.
 
     Returns:
-        `package/name` where that package is installed, since another package may have a task of the same name; else
-            `name`.
+        `package/name` if that package is installed, since another package may have a task of the same name; otherwise
+        `name`.
     """
     full = f"{written.get('package')}/{written['name']}"
     return full if any(found.full_name == full for found in catalogue().of_kind("task")) else written["name"]
 
 
 def build(found: PluginEntry, options: Node = NO_OPTIONS) -> Any:
-    """Makes a plugin's product from its options.
+    """Builds a plugin's product (a task, model, attack, defense or metric) from its options.
 
     Raises:
         ConfigError: the options do not fit.
@@ -69,8 +69,8 @@ def build(found: PluginEntry, options: Node = NO_OPTIONS) -> Any:
 
 @contextlib.contextmanager
 def blamed(found: PluginEntry, stage: str) -> Iterator[None]:
-    """A context for a plugin's code: output to stdout goes to stderr, and exceptions of another package's plugin name
-    it.
+    """A context for running a plugin's code: exceptions get the plugin's name, and output to stdout goes to
+    stderr.
 
     Raises:
         PluginError: code of another package raised something other than a `GearError`. Exceptions of built-in plugins
@@ -91,8 +91,9 @@ def blamed(found: PluginEntry, stage: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def traced(founds: Iterable[PluginEntry], stage: str) -> Iterator[None]:
-    """A context for code that calls plugins, such as an attack that calls a network: exceptions that pass through
-    another package name it.
+    """A context for code that calls plugins, such as an attack that calls a network of another package.
+
+    An exception that passed through the code of such a package gets the plugin's name.
 
     Raises:
         PluginError: code of one of the packages, or code that it called, raised something other than a `GearError`.
@@ -113,7 +114,7 @@ def traced(founds: Iterable[PluginEntry], stage: str) -> Iterator[None]:
 
 
 def build_task(name: str, options: Node = NO_OPTIONS) -> tuple[TaskSpec[Any], Task[Any, Any]]:
-    """The spec of a task and the task built from options."""
+    """Builds a task from its options, and returns its spec (the plugin's description) and the task."""
     found = find("task", name)
     assert isinstance(found.spec, TaskSpec)
     return found.spec, build(found, options)

@@ -1,4 +1,4 @@
-"""The catalogue of plugins: specs with their owners, broken plugins, and the look-up of names."""
+"""The catalogue of plugins: working plugins with their packages, broken plugins, and the look-up by name."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from gear.values.errors import DuplicateNameError, PluginError, UnknownNameError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Owner:
-    """The distribution that contains a plugin.
+    """The Python package (distribution) that contains a plugin.
 
     Attributes:
-        plugin: name of its entry point; for built-ins the name of the module.
-        package: name of the distribution; `mujoco-gear` for built-ins.
+        plugin: name of the plugin's entry point; for built-in plugins the name of the module.
+        package: name of the distribution; `mujoco-gear` for built-in plugins.
         version: version of the distribution.
     """
 
@@ -27,7 +27,7 @@ class Owner:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PluginEntry:
-    """A plugin in the catalogue: one spec and its distribution."""
+    """A working plugin in the catalogue: its kind, its spec and its package."""
 
     kind: Kind
     spec: AnySpec
@@ -44,9 +44,9 @@ class Broken:
     """A plugin that failed to load.
 
     Attributes:
-        owner: the distribution that contains it.
-        stage: `entry_points.txt`, `import`, `register`, `hook <name>` or `spec`.
-        problem: one line.
+        owner: the package that contains the plugin.
+        stage: step at which it failed: `entry_points.txt`, `import`, `register`, `hook <name>` or `spec`.
+        problem: the failure in one line.
     """
 
     owner: Owner
@@ -54,24 +54,24 @@ class Broken:
     problem: str
 
     def error(self) -> PluginError:
-        """The failure as an exception, for `--strict-plugins`."""
+        """The failure as an exception, which `--strict-plugins` raises."""
         return PluginError(f"{self.owner.plugin} ({self.owner.package} {self.owner.version})", self.stage, self.problem)
 
 
 @dataclass(frozen=True, slots=True)
 class Catalogue:
-    """All plugins of this environment.
+    """All plugins that are installed in this Python environment.
 
     Attributes:
         found: plugins that work.
-        broken: plugins that failed.
+        broken: plugins that failed to load.
     """
 
     found: tuple[PluginEntry, ...]
     broken: tuple[Broken, ...] = field(default=())
 
     def of_kind(self, kind: Kind) -> tuple[PluginEntry, ...]:
-        """The plugins of a kind, sorted by name, then package."""
+        """The plugins of a kind, sorted by name, then by package."""
         return tuple(sorted((f for f in self.found if f.kind == kind), key=lambda f: (f.spec.name, f.owner.package)))
 
     def names(self, kind: Kind) -> tuple[str, ...]:
@@ -83,10 +83,11 @@ class Catalogue:
         return tuple(f.spec.name if short.count(f.spec.name) == 1 else f.full_name for f in found)
 
     def get(self, kind: Kind, name: str) -> PluginEntry:
-        """The plugin with a short name, if that is unique, or with a name `package/name`.
+        """The plugin of a kind with a unique short name, or with a full name `package/name`.
 
         Raises:
-            UnknownNameError: there is none; the message suggests similar names and lists plugins that failed to load.
+            UnknownNameError: there is no such plugin; the message suggests similar names and lists plugins that failed
+                to load.
             DuplicateNameError: several plugins have the name.
         """
         found = self.of_kind(kind)
@@ -98,14 +99,16 @@ class Catalogue:
         raise UnknownNameError(kind, name, self.names(kind), self.broken_hint())
 
     def broken_hint(self) -> str:
-        """In brackets, the plugins that failed to load, for messages about unknown names; "" if none did."""
+        """A text in brackets that names the plugins that failed to load, for messages about unknown names; "" for
+        none.
+        """
         if not self.broken:
             return ""
         names = dict.fromkeys(b.owner.plugin for b in self.broken)
         return f"({len(names)} plugin(s) failed to load: {', '.join(names)}; see `gear plugins`)"
 
     def clashes(self) -> tuple[tuple[Kind, str, tuple[str, ...]], ...]:
-        """Short names that several packages use, with the full names."""
+        """Short names that several packages use: kind, short name, and the full names."""
         result: list[tuple[Kind, str, tuple[str, ...]]] = []
         for kind in KINDS:
             by_name: dict[str, list[str]] = {}
@@ -116,10 +119,10 @@ class Catalogue:
 
 
 def as_iterable(value: Any) -> Iterable[Any]:
-    """The return value of a hook, if it is a collection.
+    """Checks that the return value of a plugin's hook is a collection of specs, and returns it.
 
     Raises:
-        TypeError: the value is not a collection.
+        TypeError: the value is not a collection, or a text or dictionary.
     """
     if isinstance(value, (str, bytes, dict)) or not isinstance(value, Iterable):
         raise TypeError(f"a hook returns a list of specs, got {type(value).__name__}")

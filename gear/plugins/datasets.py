@@ -17,7 +17,7 @@ from gear.values.errors import DatasetError
 __all__ = ["Dataset", "Twins", "open_dataset", "open_twins", "root_and_split", "roots_of", "task_of"]
 
 DEEPEST = 3
-"""Largest number of folder levels between a given folder and the roots in it."""
+"""Largest number of folder levels between a folder and the dataset roots that are searched in it."""
 
 LISTED = 5
 """Largest number of datasets that an error names."""
@@ -27,12 +27,12 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
     """Opens one finished split of a dataset.
 
     Args:
-        path: root of the dataset.
-        split: its name; optional if there is only one.
+        path: root folder of the dataset.
+        split: name of the split; optional if there is only one.
 
     Returns:
-        A sequence of samples, decoded one by one: `dataset[0].images["left"]`, `.record`, `.surfaces` and
-        the task's own fields.
+        A sequence of samples, decoded one by one: `dataset[0].images["left"]`, `.record`, `.surfaces` and the task's
+        own fields.
 
     Raises:
         DatasetError: there is no dataset, no such split, or it is not finished.
@@ -51,11 +51,11 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
 
 
 def task_of(root: Path, plan: Plan) -> Task[Any, Any]:
-    """The task that made a split, with its options.
+    """Builds the task that wrote a split, with the options that are stored in the split's plan.
 
     Args:
-        root: of the dataset, for messages.
-        plan: of the split.
+        root: root folder of the dataset, for messages.
+        plan: the stored configuration of the split.
 
     Raises:
         UnknownNameError: the task's plugin is not installed.
@@ -66,7 +66,7 @@ def task_of(root: Path, plan: Plan) -> Task[Any, Any]:
 
 
 def root_and_split(path: str | Path) -> tuple[Path, str | None]:
-    """Root and split of a path written as `DIR` or `DIR:SPLIT`; the split is None in the former case."""
+    """Splits a path written as `DIR` or `DIR:SPLIT` into the dataset's root and the split's name (None for `DIR`)."""
     if not Path(path).exists() and ":" in str(path):
         text, _, split = str(path).rpartition(":")
         return Path(text), split
@@ -74,9 +74,7 @@ def root_and_split(path: str | Path) -> tuple[Path, str | None]:
 
 
 def roots_of(folder: Path) -> list[Path]:
-    """The folder itself if it is the root of a dataset, otherwise the roots inside it, by name; empty if there are
-    none.
-    """
+    """The folder itself if it is the root of a dataset, otherwise the sorted roots of datasets inside the folder."""
     if next(folder.glob("gear/*/plan.json"), None) is not None:
         return [folder]
     plans = (plan for depth in range(DEEPEST + 1) for plan in folder.glob("*/" * depth + "gear/*/plan.json"))
@@ -84,7 +82,7 @@ def roots_of(folder: Path) -> list[Path]:
 
 
 def open_twins(first: str | Path, second: str | Path, split: str | None = None) -> Twins[Sample]:
-    """Opens two datasets that differ only in their patch, and pairs their samples by index.
+    """Opens two datasets that differ only in their patch (twins), and pairs their samples by index.
 
     Raises:
         DatasetError: the datasets differ in more than the patch, or one of them cannot be opened.

@@ -1,4 +1,4 @@
-"""Descriptions of plugins for lists and pages: capabilities, options with meaning and unit, source file."""
+"""Descriptions of plugins for command output and documentation: capabilities, options, source file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gear.plugins.text import printable
 
 COMMON = {field.name for field in dataclasses.fields(Spec)}
 ELSEWHERE = {"recipe", "published", "convert", "parameters", "starts", "notes"}
-"""Fields that are left out here because `training`, `gear models` and `gear collect` show them."""
+"""Fields of specs that `summary` leaves out, because `training`, `gear models` and `gear collect` show them."""
 
 LONGEST_MEANING = 2000
 """Largest length of an option's description in characters."""
@@ -28,7 +28,7 @@ UNITS = {
 
 
 def summary(found: PluginEntry) -> dict[str, Any]:
-    """Kind, name, package, version, summary and capabilities; JSON."""
+    """A plugin's kind, name, package, version, summary and capabilities as a JSON object."""
     capabilities = {
         field.name: sorted(value) if isinstance(value := getattr(found.spec, field.name), frozenset) else value
         for field in dataclasses.fields(found.spec)
@@ -45,8 +45,10 @@ def summary(found: PluginEntry) -> dict[str, Any]:
 
 
 def training(spec: AnySpec) -> dict[str, Any]:
-    """JSON of a network's training recipe (None if gear cannot train it) and the names that `gear train --init` accepts
-    in addition to `shipped` and files; empty for plugins that are not models.
+    """A network's training recipe (None if gear cannot train it) and its starting points, as a JSON object.
+
+    The starting points are the names that `gear train --init` accepts in addition to `shipped` and files. The result is
+    empty for plugins that are not models.
     """
     if not isinstance(spec, ModelSpec):
         return {}
@@ -54,7 +56,7 @@ def training(spec: AnySpec) -> dict[str, Any]:
 
 
 def options(config: type[Any]) -> list[dict[str, Any]]:
-    """JSON of every option with type, default, meaning and unit; names of nested options have dots."""
+    """Every option of a plugin as a JSON object with name, type, default, meaning and unit; nested names have dots."""
     return _options(config(), "")
 
 
@@ -82,8 +84,9 @@ def _options(defaults: Any, prefix: str) -> list[dict[str, Any]]:
 
 
 def meanings_of(config: type[Any]) -> dict[str, str]:
-    """The descriptions of a config's fields under `Attributes:` in its docstring and those of its bases, one line
-    each.
+    """The descriptions of a config's fields, one line each, by name of the field.
+
+    They stand below `Attributes:` in the docstrings of the class and its base classes.
     """
     result: dict[str, str] = {}
     for owner in reversed(config.__mro__):
@@ -104,7 +107,7 @@ def meanings_of(config: type[Any]) -> dict[str, str]:
 
 
 def source_of(spec: AnySpec) -> str:
-    """The source file of the plugin's `build`; "" if Python does not know it."""
+    """The path of the source file that defines the plugin's `build`; "" if Python does not know it."""
     try:
         return inspect.getsourcefile(spec.build) or ""
     except TypeError:

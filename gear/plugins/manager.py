@@ -1,4 +1,6 @@
-"""Discovery of plugins. Errors of a plugin are caught and reported with its name; the other plugins are loaded."""
+"""Discovery of plugins. An error in one plugin is caught and reported with the plugin's name; other plugins are
+loaded.
+"""
 
 from __future__ import annotations
 
@@ -36,11 +38,11 @@ MOST_SPECS = 1000
 
 @cache
 def catalogue() -> Catalogue:
-    """All plugins of this environment, discovered once per process.
+    """All plugins of this Python environment, discovered once per process.
 
-    `GEAR_DISABLE_PLUGINS` (names joined by commas, or `*` for all) disables plugins of other packages. A plugin that is
-    new on this machine is first loaded in a separate process (`gear.plugins.probe`). If it ends or hangs that process,
-    or raises KeyboardInterrupt there, it is not loaded into this process.
+    The variable `GEAR_DISABLE_PLUGINS` (names joined by commas, or `*` for all) disables plugins of other packages. A
+    plugin that is new on this machine is first loaded in a separate process (`gear.plugins.probe`). A plugin that ends
+    or blocks that process, or raises KeyboardInterrupt in it, is not loaded into this process.
     """
     entry_points, damaged = installed_entry_points(GROUP)
     allowed = _allowed(entry_points, os.environ.get("GEAR_DISABLE_PLUGINS", ""))
@@ -55,7 +57,7 @@ def catalogue() -> Catalogue:
 
 
 def discover(entry_points: Iterable[importlib.metadata.EntryPoint], disabled: str = "") -> Catalogue:
-    """Loads built-ins and the given entry points into this process.
+    """Loads the built-in plugins and the plugins of some entry points into this process.
 
     Args:
         entry_points: entry points of other packages.
@@ -63,7 +65,8 @@ def discover(entry_points: Iterable[importlib.metadata.EntryPoint], disabled: st
 
     Raises:
         Exception: a built-in plugin is broken, which is a bug of gear and keeps its traceback.
-        KeyboardInterrupt: the user pressed Ctrl-C. One that a plugin raises is reported like any other exception.
+        KeyboardInterrupt: the user pressed Ctrl-C. A KeyboardInterrupt that a plugin raises is reported like any other
+            exception.
     """
     manager = pluggy.PluginManager(hookspecs.PROJECT)
     manager.add_hookspecs(hookspecs)
@@ -86,7 +89,7 @@ def discover(entry_points: Iterable[importlib.metadata.EntryPoint], disabled: st
 
 
 def owner_of(entry_point: importlib.metadata.EntryPoint) -> Owner:
-    """The distribution of an entry point; the name of its module if the distribution is unknown."""
+    """The package (distribution) of an entry point; if it is unknown, the name of the entry point's module."""
     package, version = entry_point.value.split(":")[0], "?"
     if entry_point.dist is not None:
         package, version = identity(entry_point.dist)
@@ -155,7 +158,7 @@ def _call_hooks(manager: pluggy.PluginManager, owners: dict[str, Owner]) -> tupl
 
 
 def _specs_of(hook: Callable[[], Any]) -> list[Any]:
-    """The specs that a hook returns.
+    """The specs that a plugin's hook returns, as a list.
 
     Raises:
         TypeError: the hook returned something else than a collection of specs.
@@ -168,7 +171,7 @@ def _specs_of(hook: Callable[[], Any]) -> list[Any]:
 
 
 class PluginRaisedError(Exception):
-    """A plugin's code raised an exception.
+    """An exception that wraps whatever a plugin's code raised.
 
     Attributes:
         error: the raised exception, which need not be an `Exception`.
@@ -182,7 +185,7 @@ class PluginRaisedError(Exception):
 
 
 def guarded(call: Callable[[], Any]) -> Any:
-    """Runs a plugin's code, with its output to stdout redirected to stderr.
+    """Runs a plugin's code and discards what it prints to stdout.
 
     Raises:
         PluginRaisedError: the code raised any exception, including SystemExit, GeneratorExit and KeyboardInterrupt.

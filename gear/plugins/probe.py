@@ -37,7 +37,7 @@ MOST_FILES = 2000
 """Largest number of a package's files whose times and sizes are compared."""
 
 MOST_KEPT = 1000
-"""Verdicts in the cache; the newest stay."""
+"""Largest number of results in the cache; the newest are stored."""
 
 Verdict = tuple[str, str]
 """Stage and problem of a plugin that must not be loaded; None for a safe plugin."""
@@ -50,7 +50,7 @@ def unsafe_plugins(entry_points: Iterable[EntryPoint]) -> dict[EntryPoint, Verdi
     """The plugins that must not be loaded into this process, with their failures in the separate process.
 
     Args:
-        entry_points: entry points of other packages; a plugin is probed again only if its files changed.
+        entry_points: entry points of other packages. A plugin whose files have not changed is taken from the cache.
     """
     importlib.invalidate_caches()  # a package may have been installed since this process began
     stamped = {one: stamp(one) for one in entry_points}
@@ -68,8 +68,9 @@ def unsafe_plugins(entry_points: Iterable[EntryPoint]) -> dict[EntryPoint, Verdi
 
 
 def _probe_if_possible(entry_point: EntryPoint) -> Verdict | None:
-    """Probes a plugin; returns `UNKNOWN` if no process can be started. The plugin is then loaded, and
-    probed next time.
+    """Loads a plugin in a separate process; returns `UNKNOWN` if no process can be started.
+
+    In that case the plugin is loaded into gear's process, and tested next time.
     """
     try:
         return probe(entry_point)
@@ -78,14 +79,15 @@ def _probe_if_possible(entry_point: EntryPoint) -> Verdict | None:
 
 
 def probe(entry_point: EntryPoint, limit_s: float = LIMIT_S) -> Verdict | None:
-    """Loads one plugin in a separate process.
+    """Loads one plugin in a separate process, to find out whether it is safe to load into gear's process.
 
     Args:
         entry_point: entry point of the plugin.
         limit_s: seconds after which the process and its children are ended.
 
     Returns:
-        None if the process ended normally, even if the plugin raised exceptions; otherwise stage and problem.
+        None for a safe plugin: the process ended normally, even if the plugin raised exceptions. Otherwise stage and
+        problem, also if the plugin raised KeyboardInterrupt.
 
     Raises:
         OSError: the process failed before it loaded the plugin.
@@ -130,7 +132,7 @@ main(*sys.argv[2:])
 
 
 def stamp(entry_point: EntryPoint) -> str:
-    """A hash of everything that may change how a plugin loads: its files, its environment and gear."""
+    """A hash that changes whenever a plugin may load differently: of its files, its Python environment and gear."""
     facts: list[Any] = [sys.executable, sys.version, entry_point.name, entry_point.value, __file__]
     with contextlib.suppress(Exception):  # damaged metadata, or a finder that raises: then there is less to look at
         if entry_point.dist is not None:
@@ -167,7 +169,7 @@ def _cache_file() -> Path | None:
 
 
 def _read(path: Path | None) -> dict[str, Verdict | None]:
-    """Cached results by hash; empty if there is no valid cache file."""
+    """Reads the cached results by hash; returns an empty dictionary if there is no valid cache file."""
     if path is None:
         return {}
     try:
@@ -197,4 +199,4 @@ def _write(path: Path | None, known: dict[str, Verdict | None]) -> None:
 
 
 MOST_KEPT = 1000
-"""Verdicts that are kept; those of the last probes stay."""
+"""Largest number of results in the cache; the newest are stored."""

@@ -1,4 +1,4 @@
-"""The separate process that loads one plugin as a test; started by `gear.plugins.probe`.
+"""The separate process in which `gear.plugins.probe` loads one plugin as a test.
 
 It writes its current stage to a file, and a final entry at its end. The parent process relies only on this file,
 because the plugin may print, leave threads running or register functions that run at exit.
@@ -21,7 +21,12 @@ from gear.plugins.spec_validation import HOOK_OF, spec_problem
 
 
 def main(name: str, value: str, group: str, notes: str) -> None:
-    """Imports the plugin, calls its hooks and checks its specs; never returns."""
+    """Imports the plugin, calls its hooks, checks its specs and ends the process; never returns.
+
+    Args:
+        name, value, group: the plugin's entry point.
+        notes: path of the file to which each stage is written.
+    """
     path = Path(notes)
 
     def note(line: str) -> None:

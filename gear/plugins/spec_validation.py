@@ -1,4 +1,4 @@
-"""Checks every field of a plugin's spec against the type hints of its spec class."""
+"""Checks every field of a plugin's spec (its description for gear) against the type hints of the spec class."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ COMMON_FIELDS = frozenset(field.name for field in dataclasses.fields(Spec))
 
 
 def spec_problem(kind: Kind, spec: Any) -> str | None:
-    """The first reason, in one line, why a spec cannot be used; None for a sound one. Never raises."""
+    """The first reason why a plugin's spec cannot be used, in one line; None for a valid spec. Never raises."""
     try:
         return _spec_problem(kind, spec)
     except Exception as error:
@@ -51,7 +51,7 @@ def _spec_problem(kind: Kind, spec: Any) -> str | None:
 
 
 def _common_problem(spec: Spec[Any, Any]) -> str | None:
-    """The problem with summary, config class or build, for which type hints are not enough."""
+    """The problem with a spec's summary, config class or build, for which type hints are not enough; None for none."""
     summary, config, build = (getattr(spec, name) for name in ("summary", "config", "build"))
     if not isinstance(summary, str) or not summary.strip() or not summary.isprintable():
         return "its summary is not one line"
@@ -64,7 +64,7 @@ def _common_problem(spec: Spec[Any, Any]) -> str | None:
 
 
 def _field_problem(kind: Kind, spec: Any) -> str | None:
-    """The problem with a field that the kind declares, by its type hint."""
+    """The first problem with a spec's fields beyond the common ones, by their type hints; None for none."""
     for name, hint in _hints(kind).items():
         problem = mismatch(getattr(spec, name), hint, name)
         if problem is not None:
@@ -82,13 +82,13 @@ def _default_problem(spec: Spec[Any, Any]) -> str | None:
 
 @cache
 def _hints(kind: Kind) -> dict[str, Any]:
-    """The type hints of a spec class's fields, except the common ones, by name."""
+    """The type hints of a spec class by field, without the fields that every spec has."""
     hints = typing.get_type_hints(SPEC_TYPES[kind])
     return {name: hint for name, hint in hints.items() if name not in COMMON_FIELDS}
 
 
 def mismatch(value: Any, hint: Any, name: str) -> str | None:
-    """The difference of a value from a type hint, as `<name> must be <what>, got <type>`; None if it fits.
+    """Describes how a value differs from a type hint, as `<name> must be <what>, got <type>`; None if it fits.
 
     Supports classes, `Literal`, unions, callables, mappings, `tuple`, `frozenset` and nested dataclasses, whose fields
     are checked too. A float may be an integer; a number must not be a bool; a text must be printable, because it is
@@ -141,7 +141,7 @@ def _item_problem(value: Any, kind: type[Any], arguments: tuple[Any, ...], name:
 
 
 def _nested(problems: list[str | None], name: str) -> str | None:
-    """The problem with a union's member whose type fits but one of whose parts does not."""
+    """The problem inside a value whose own type fits one member of a union; None if no member's own type fits."""
     return next((one for one in problems if one is not None and not one.startswith(f"{name} must be ")), None)
 
 

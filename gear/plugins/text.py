@@ -1,4 +1,4 @@
-"""Makes texts of plugins safe to print: one line, no control characters, limited length."""
+"""Makes texts that come from plugins safe to print: one line, no control characters, limited length."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ LONGEST = 200
 
 
 def printable(text: str, longest: int = LONGEST) -> str:
-    """The text as one line with control characters, such as terminal escapes, escaped; cut at `longest` characters.
+    """A text as one line of at most `longest` characters; control characters, such as terminal escapes, are
+    escaped.
 
     Characters that the terminal's encoding lacks are not replaced here, since they depend on where the text is printed.
     """

@@ -17,7 +17,7 @@ NAME = "adabins"
 
 
 def build(options: AdaBinsOptions) -> Model:
-    """Makes the network with its weights.
+    """Builds AdaBins and loads its weights.
 
     Raises:
         GearError: timm, torchvision or the weights are missing.
@@ -32,7 +32,7 @@ def build(options: AdaBinsOptions) -> Model:
 
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
-    """Renames the keys of the authors' checkpoint to those of gear's network."""
+    """Renames the tensors of the AdaBins authors' checkpoint to the names in gear's network."""
     from gear.networks.depth.adabins import from_official
 
     return from_official(state)

@@ -21,7 +21,7 @@ AUXILIARY_WEIGHT = 1.0
 
 
 def build(options: SegmentationOptions) -> SemsegNetwork:
-    """Makes the network with its weights."""
+    """Builds BiSeNet with Xception39 and loads its weights."""
     from gear.networks.input_scale import input_scale_of
     from gear.networks.segmentation.bisenet import BiSeNetX39
     from gear.networks.segmentation.losses import SegmentationLosses
@@ -37,7 +37,7 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Converts a published state with `gear.networks.segmentation.bisenet.from_official`."""
+    """Renames the tensors of a published BiSeNet checkpoint to the names in gear's network."""
     from gear.networks.segmentation.bisenet import from_official
 
     return from_official(state)

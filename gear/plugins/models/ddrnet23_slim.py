@@ -21,7 +21,7 @@ AUXILIARY_WEIGHT = 0.4
 
 
 def build(options: SegmentationOptions) -> SemsegNetwork:
-    """Makes the network with its weights."""
+    """Builds DDRNet-23-slim and loads its weights."""
     from gear.networks.input_scale import input_scale_of
     from gear.networks.segmentation.ddrnet import DDRNet23Slim
     from gear.networks.segmentation.losses import SegmentationLosses
@@ -37,7 +37,7 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Converts a published state with `gear.networks.segmentation.ddrnet.from_official`."""
+    """Renames the tensors of a published DDRNet checkpoint to the names in gear's network."""
     from gear.networks.segmentation.ddrnet import from_official
 
     return from_official(state)

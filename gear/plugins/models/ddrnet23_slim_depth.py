@@ -16,7 +16,7 @@ nearly everywhere.
 
 
 def build(options: DepthOptions) -> Model:
-    """Makes the network with its weights.
+    """Builds the depth network on DDRNet-23-slim and loads its weights.
 
     Raises:
         GearError: the weights are missing.

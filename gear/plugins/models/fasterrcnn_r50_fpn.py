@@ -17,7 +17,7 @@ NAME = "fasterrcnn_r50_fpn"
 
 
 def build(options: OfficialDetectorOptions) -> FasterRcnnDetector:
-    """Makes the network with its weights."""
+    """Builds Faster R-CNN with ResNet-50 and a feature pyramid, and loads its weights."""
     from gear.networks.detection.fasterrcnn import FasterRcnnDetector
     from gear.networks.detection.graphs import fasterrcnn_r50_fpn
     from gear.networks.detection.network import OFFICIAL_CATEGORIES, Sizing, fitted
@@ -32,7 +32,7 @@ def build(options: OfficialDetectorOptions) -> FasterRcnnDetector:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Converts a published state with `gear.networks.detection.official.from_official`."""
+    """Converts a published checkpoint to the tensors of gear's Faster R-CNN."""
     from gear.networks.detection.official import from_official
 
     return from_official(state)

@@ -17,7 +17,7 @@ NAME = "glpdepth"
 
 
 def build(options: GlpnOptions) -> Model:
-    """Makes the network with its weights.
+    """Builds GLPDepth with the encoder MiT-b4 and loads its weights.
 
     Raises:
         GearError: transformers or the weights are missing.
@@ -31,7 +31,9 @@ def build(options: GlpnOptions) -> Model:
 
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
-    """Renames the keys of a checkpoint, by the authors or from transformers, to those of gear's network."""
+    """Renames the tensors of a GLPDepth checkpoint, the authors' or that of transformers, to those in gear's
+    network.
+    """
     from gear.networks.depth.glpn_official import from_official
 
     return from_official(state)

@@ -12,7 +12,7 @@ NAME = "glpn_b0"
 
 
 def build(options: GlpnB0Options) -> Model:
-    """Makes the network with its weights.
+    """Builds GLPDepth with the encoder MiT-b0 and loads its weights.
 
     Raises:
         GearError: transformers or the weights are missing.

@@ -23,7 +23,7 @@ RECIPE = Recipe(learning_rate=6e-5, weight_decay=1e-2, batch=8, epochs=20, gradi
 
 
 def build_semseg(options: FolderOptions) -> FolderSegmenter:
-    """Makes a semantic segmentation network from a local folder, such as SegFormer."""
+    """Builds a semantic segmentation network, such as SegFormer, from a local Hugging Face folder."""
     from gear.networks.huggingface.folder import open_folder
     from gear.networks.huggingface.network import FolderSegmenter
 
@@ -31,7 +31,7 @@ def build_semseg(options: FolderOptions) -> FolderSegmenter:
 
 
 def build_depth(options: DepthFolderOptions) -> FolderDepth:
-    """Makes a depth network from a local folder, such as GLPN or Depth Anything."""
+    """Builds a depth network, such as GLPN or Depth Anything, from a local Hugging Face folder."""
     from gear.networks.huggingface.folder import open_folder
     from gear.networks.huggingface.network import FolderDepth
 
@@ -39,7 +39,7 @@ def build_depth(options: DepthFolderOptions) -> FolderDepth:
 
 
 def build_detect2d(options: DetectorFolderOptions) -> FolderDetector:
-    """Makes a detector from a local folder, such as DETR or RT-DETR."""
+    """Builds a 2D detector, such as DETR or RT-DETR, from a local Hugging Face folder."""
     from gear.networks.huggingface.folder import open_folder
     from gear.networks.huggingface.network import FolderDetector
 
@@ -47,7 +47,7 @@ def build_detect2d(options: DetectorFolderOptions) -> FolderDetector:
 
 
 def _start(auto: str) -> Mapping[str, Callable[[Any], None]]:
-    """The starting point `folder` of `gear train --init folder`: loads the weights in the folder."""
+    """The starting point `folder` of `gear train --init folder`, which loads the weights in the folder."""
 
     def begin(model: Any) -> None:
         from gear.networks.huggingface.folder import start_from

@@ -1,5 +1,6 @@
-"""Two RetinaNets that are trained on gear's own data: with ResNet-18, and with EfficientNet-Lite0 (ImageNet
-weights at the start).
+"""Two RetinaNets that are trained on gear's own data: with ResNet-18, and with EfficientNet-Lite0.
+
+The trunk of the latter starts from ImageNet weights.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ RECIPE = Recipe(
 
 
 def build_r18(options: ReferenceDetectorOptions) -> RetinaNetDetector:
-    """Makes the network with ResNet-18 and its weights."""
+    """Builds RetinaNet with ResNet-18 and loads its weights."""
     from gear.networks.detection.graphs import retinanet_r18_fpn
     from gear.networks.detection.network import Sizing, scaled
     from gear.networks.detection.retinanet import RetinaNetDetector
@@ -50,7 +51,7 @@ def build_r18(options: ReferenceDetectorOptions) -> RetinaNetDetector:
 
 
 def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
-    """Makes the network with EfficientNet-Lite0 and its weights."""
+    """Builds RetinaNet with EfficientNet-Lite0 and loads its weights."""
     from gear.networks.detection.graphs import retinanet_lite0_fpn
     from gear.networks.detection.network import Sizing, scaled
     from gear.networks.detection.retinanet import LiteRetinaNetDetector
@@ -66,14 +67,14 @@ def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
 
 
 def scale_of(options: ReferenceDetectorOptions, name: str) -> float:
-    """The factor by which pictures are resized: from the options, otherwise from the weights, otherwise 0.5."""
+    """The factor by which input pictures are resized: from the options, otherwise from the weights, otherwise 0.5."""
     from gear.networks.input_scale import input_scale_of
 
     return input_scale_of(options, name, INPUT_SCALE)
 
 
 def start_from_imagenet(model: Any) -> None:
-    """Loads ImageNet weights into the trunk; see `gear.networks.efficientnet_lite0.start_from_imagenet`."""
+    """Loads ImageNet weights into the network's EfficientNet-Lite0 trunk, as a starting point of training."""
     from gear.networks.efficientnet_lite0 import start_from_imagenet
 
     start_from_imagenet(model.graph.get_submodule("backbone"))

@@ -17,7 +17,7 @@ NAME = "retinanet_r50_fpn"
 
 
 def build(options: OfficialDetectorOptions) -> RetinaNetDetector:
-    """Makes the network with its weights."""
+    """Builds RetinaNet with ResNet-50 and a feature pyramid, and loads its weights."""
     from gear.networks.detection.graphs import retinanet_r50_fpn
     from gear.networks.detection.network import OFFICIAL_CATEGORIES, Sizing, fitted
     from gear.networks.detection.retinanet import RetinaNetDetector
@@ -32,7 +32,7 @@ def build(options: OfficialDetectorOptions) -> RetinaNetDetector:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Converts a published state with `gear.networks.detection.official.from_official`."""
+    """Converts a published checkpoint to the tensors of gear's RetinaNet."""
     from gear.networks.detection.official import from_official
 
     return from_official(state)

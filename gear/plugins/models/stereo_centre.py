@@ -22,7 +22,7 @@ RECIPE = Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=4, epochs=20, gradi
 
 
 def build_resnet(options: StereoCentreOptions) -> StereoCentreNetwork:
-    """Makes the network on ResNet-18, with its weights."""
+    """Builds the stereo network on ResNet-18 and loads its weights."""
     from gear.networks.network import Normalise
     from gear.networks.stereo.centre_network import StereoCentreNetwork
     from gear.networks.stereo.centre_resnet import StereoCentre
@@ -31,7 +31,7 @@ def build_resnet(options: StereoCentreOptions) -> StereoCentreNetwork:
 
 
 def build_lite0(options: StereoCentreOptions) -> StereoCentreNetwork:
-    """Makes the network on EfficientNet-Lite0, with its weights."""
+    """Builds the stereo network on EfficientNet-Lite0 and loads its weights."""
     from gear.networks.efficientnet_lite0 import MEAN, STD
     from gear.networks.network import Normalise
     from gear.networks.stereo.centre_lite0 import StereoCentreLite0
@@ -42,7 +42,7 @@ def build_lite0(options: StereoCentreOptions) -> StereoCentreNetwork:
 
 
 def start_from_imagenet(model: Any) -> None:
-    """Loads ImageNet weights into the trunk; see `gear.networks.efficientnet_lite0.start_from_imagenet`."""
+    """Loads ImageNet weights into the network's EfficientNet-Lite0 trunk, as a starting point of training."""
     from gear.networks.efficientnet_lite0 import start_from_imagenet
 
     start_from_imagenet(model.graph)

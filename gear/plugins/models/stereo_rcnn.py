@@ -12,14 +12,16 @@ from gear.networks.stereo.options import LEFT, RIGHT, StereoRcnnOptions
 
 
 def build(options: StereoRcnnOptions) -> Model:
-    """Makes the network with its weights."""
+    """Builds Stereo R-CNN and loads its weights."""
     from gear.networks.stereo.rcnn_network import StereoRcnnNetwork
 
     return StereoRcnnNetwork(options)
 
 
 def from_official(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The tensors of a published state; missing variances of the losses get their initial values."""
+    """Converts a published Stereo R-CNN checkpoint to gear's tensors; missing loss variances get their initial
+    values.
+    """
     from gear.networks.stereo.rcnn_graph import from_official
 
     return from_official(state)
