@@ -1,1 +1,1 @@
-"""Tests for authors of plugins: contract classes to subclass, and fixtures. Public API; the contracts need pytest."""
+"""Tests for authors of plugins: contract classes to subclass, and fixtures. It is public API; contracts need pytest."""

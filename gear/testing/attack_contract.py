@@ -31,31 +31,31 @@ ROOM = Thing(parts=(box_part("building", 2.0, 60.0, 14.0),), position_m=(40.0, 0
 
 
 class Counted:
-    """A model that counts the forward passes through it."""
+    """A wrapper of a model that counts the forward passes."""
 
     def __init__(self, model: Any) -> None:
         self.network = model
         self.passes = 0
 
     def predict(self, views: Mapping[str, Any]) -> Any:
-        """The model's prediction; counted."""
+        """The model's prediction for one sample; it counts as one pass."""
         self.passes += 1
         return self.network.predict(views)
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """The model's outputs or losses; counted."""
+        """The model's outputs, or losses if `targets` are given, for a batch; it counts as one pass."""
         self.passes += 1
         outputs: Mapping[str, Tensor] = self.network(views, targets)
         return outputs
 
     def taps(self) -> Mapping[str, torch.nn.Module]:
-        """The feature maps of the model."""
+        """The tapped layers of the model (layers with readable feature maps), by name."""
         taps: Mapping[str, torch.nn.Module] = self.network.taps()
         return taps
 
 
 class RecordingMonitor:
-    """A `Monitor` that records the values of every step, and can start from a saved state."""
+    """A `Monitor` that records the number and the state of every step, and can start an attack from a saved state."""
 
     def __init__(self, start: State | None = None) -> None:
         self.start = start
@@ -63,7 +63,7 @@ class RecordingMonitor:
         self.states: list[State] = []
 
     def resume(self) -> State | None:
-        """The saved state that it was created with; None for a new run."""
+        """The saved state from which the attack starts; None for a new run."""
         return self.start
 
     def step(
@@ -73,7 +73,10 @@ class RecordingMonitor:
         patches: Callable[[], tuple[Patch, ...]],
         state: Callable[[], State],
     ) -> bool:
-        """Records its arguments; never asks the attack to stop."""
+        """Records the number of the step and the state, and checks the types of values and patches.
+
+        It returns False, so it never ends the attack.
+        """
         self.steps_done.append(done)
         self.states.append(state())
         assert all(isinstance(value, float) for value in values.values())
@@ -82,12 +85,12 @@ class RecordingMonitor:
 
 
 class AttackContract:
-    """The promises of an attack, as tests. A plugin's test file subclasses it and sets `spec`.
+    """The promises of an attack plugin, as tests. A plugin's test file subclasses it and sets `spec`.
 
     Attributes:
-        spec: the attack.
+        spec: the attack's spec.
         options: options of the attack's config, small enough for quick tests.
-        task: a task that it can attack and for which gear has a tiny network: `semseg` or `depth`.
+        task: a task that the attack supports and for which gear has a tiny network: `semseg` or `depth`.
         task_options: options of the task's config, such as the size of the pictures.
         steps: number of steps after which the attack does measurable harm.
         passes_per_step: largest number of forward passes per step.
@@ -101,15 +104,15 @@ class AttackContract:
     passes_per_step: ClassVar[int] = 4
 
     def make(self) -> Attack:
-        """A new attack."""
+        """Builds a new attack from the spec and the options."""
         return self.spec.build(self.spec.config(**self.options))
 
     def model(self) -> Counted:
-        """A tiny network for the task."""
+        """Builds a tiny network for the task, which counts its forward passes."""
         return Counted(TINY[self.task].build(TinyConfig()))
 
     def dataset(self, boards: int = 1) -> list[Any]:
-        """Two samples with the given number of boards."""
+        """Makes two read-only samples of a synthetic street with the given number of billboards."""
         found = catalogue().get("task", self.task).spec
         assert isinstance(found, TaskSpec)
         task = found.build(found.config(**self.task_options))
@@ -120,7 +123,7 @@ class AttackContract:
         return [freeze(task.ground_truth(*frame)) for frame in frames]
 
     def budget(self, steps: int) -> Budget:
-        """A budget with a number of steps; attacks without gradients get a number of queries as well."""
+        """A budget of some steps; for attacks without gradients also of `passes_per_step` queries per step."""
         return Budget(steps=steps, queries=None if self.spec.needs_gradients else steps * self.passes_per_step)
 
     def attack(
@@ -132,13 +135,13 @@ class AttackContract:
         seed: int = SEED,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Runs a new attack once."""
+        """Runs a new attack with `TinyCompositor`, and returns its patches."""
         compositor = TinyCompositor(dataset)
         rng = derive_rng(seed, "attack")
         return self.make().optimise(model, dataset, compositor, budget=self.budget(steps), rng=rng, monitor=monitor)
 
     def harm(self, model: Counted, dataset: Sequence[Any], patches: Sequence[Patch]) -> float:
-        """What the attack maximises; override for attacks with another objective than the loss."""
+        """The harm that the attack maximises: the sum of the model's losses. Override it for another objective."""
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         (view,) = TINY[self.task].views
         with torch.no_grad():
@@ -146,7 +149,9 @@ class AttackContract:
             return float(sum(model.forward({view: pictures}, dataset).values()))
 
     def test_the_spec_can_be_used(self) -> None:
-        """Name, protocol, config and build are sound; it can attack the task that it is tested on."""
+        """Name, protocol, config and build of the spec are valid; the attack supports the task on which it is
+        tested.
+        """
         check_spec("attack", self.spec, self.options)
         assert not self.spec.tasks or self.task in self.spec.tasks
         assert self.spec.max_surfaces >= 1
@@ -178,8 +183,8 @@ class AttackContract:
         assert not difference(dataset, self.dataset(), "dataset")
 
     def test_it_can_be_watched(self) -> None:
-        """A monitor does not change the patches, receives steps in order, and an attack can be resumed from a reported
-        state.
+        """A monitor does not change the patches and receives steps in order; a saved state resumes the attack
+        exactly.
         """
         dataset, plain = self.dataset(), self.attack(self.model(), self.dataset(), steps=4)
         monitor = RecordingMonitor()
@@ -198,7 +203,7 @@ class AttackContract:
         assert not difference(first, second, "patches")
 
     def test_it_stays_within_its_budget(self) -> None:
-        """Forward passes are limited by steps, or by queries where there are no gradients."""
+        """The number of forward passes is limited by steps, or by queries for attacks without gradients."""
         for steps in (1, 3):
             model = self.model()
             self.attack(model, self.dataset(), steps=steps)
@@ -206,7 +211,7 @@ class AttackContract:
             assert least <= model.passes <= steps * self.passes_per_step * (not self.spec.is_control)
 
     def test_it_does_harm(self) -> None:
-        """The patch does more harm than a grey board of the same size; controls are exempt."""
+        """The patch does more harm than a grey patch of the same size; control patches (not optimised) are exempt."""
         if self.spec.is_control:
             return
         model, dataset = self.model(), self.dataset()
@@ -215,7 +220,7 @@ class AttackContract:
         assert self.harm(model, dataset, patches) > self.harm(model, dataset, grey)
 
     def test_gradients_are_needed_where_declared(self) -> None:
-        """An attack that declares no need of gradients works on a model that gives none."""
+        """An attack that declares that it needs no gradients runs on a model that returns none."""
         if self.spec.needs_gradients:
             return
 

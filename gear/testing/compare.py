@@ -1,4 +1,4 @@
-"""Equality of samples, which hold arrays and therefore have no usable `==`."""
+"""Comparison of nested values with arrays, such as samples, for which `==` does not work."""
 
 from __future__ import annotations
 
@@ -10,8 +10,13 @@ import numpy as np
 
 
 def difference(a: Any, b: Any, where: str = "value") -> str:
-    """Describes the first difference of two values; "" if they are equal. Arrays are equal in shape, dtype and all
-    elements, where NaN equals NaN.
+    """Describes the first difference between two nested values; "" if they are equal.
+
+    Arrays are equal if shape, dtype and all elements are equal, where NaN equals NaN.
+
+    Args:
+        a, b: dataclasses, mappings, sequences, arrays or plain values.
+        where: name of the values in the description.
     """
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return _array_difference(np.asarray(a), np.asarray(b), where)
@@ -32,10 +37,11 @@ def difference(a: Any, b: Any, where: str = "value") -> str:
 
 
 def share_apart(a: Any, b: Any, tolerance: float) -> float:
-    """Share, 0..1, of the numbers that differ by more than `tolerance` times the largest of their array; NaN equals
+    """The share, 0..1, of the numbers in `a` that differ from `b` by more than a relative tolerance; NaN equals
     NaN.
 
-    For containers this is the largest share among their items; it is 1 if shapes, types, names or counts differ.
+    The tolerance is a fraction of the largest number of the array in `b`. For containers the result is the largest
+    share among their items; it is 1 if shapes, types, names or counts differ.
     """
     if dataclasses.is_dataclass(a) and type(a) is type(b):
         names = [field.name for field in dataclasses.fields(a)]

@@ -27,7 +27,7 @@ SEED = 7
 
 
 def street_picture(width_px: int, height_px: int, seed: int) -> UInt8Image:
-    """A smooth street-like picture: sky, buildings, road, with a few edges."""
+    """A (H, W, 3) uint8 picture of a simple street: sky, road, and six rectangles as buildings."""
     rng = derive_rng(SEED, "picture", seed)
     rows = np.linspace(0, 1, height_px)[:, None, None]
     columns = np.linspace(0, 1, width_px)[None, :, None]
@@ -41,7 +41,7 @@ def street_picture(width_px: int, height_px: int, seed: int) -> UInt8Image:
 
 
 def noisy_patch(picture: UInt8Image, seed: int) -> tuple[UInt8Image, np.ndarray]:
-    """The picture with a rectangle of strong noise, and (H, W) bool of that rectangle."""
+    """The picture with a rectangle of strong noise, and the (H, W) bool mask of that rectangle."""
     height, width = picture.shape[:2]
     area = np.zeros((height, width), np.bool_)
     area[height // 4 : height // 2, width // 3 : width * 3 // 4] = True
@@ -50,12 +50,12 @@ def noisy_patch(picture: UInt8Image, seed: int) -> tuple[UInt8Image, np.ndarray]
 
 
 class DefenseContract:
-    """The promises of a defense, as tests. A plugin's test file subclasses it and sets `spec`.
+    """The promises of a defense plugin, as tests. A plugin's test file subclasses it and sets `spec`.
 
     Attributes:
-        spec: the defense.
+        spec: the defense's spec.
         options: options of the defense's config.
-        views: names of the cameras whose pictures it is given.
+        views: names of the cameras whose pictures the defense receives.
         size_px: width and height of the pictures.
     """
 
@@ -65,41 +65,41 @@ class DefenseContract:
     size_px: ClassVar[tuple[int, int]] = (128, 72)
 
     def model(self) -> Model | None:
-        """The guarded model; override where the defense needs one."""
+        """The model that the defense protects; override it for defenses that need a model."""
         return None
 
     def make(self) -> Defense:
-        """A new defense."""
+        """Builds a new defense from the spec and the options."""
         return self.spec.build(self.spec.config(**self.options))
 
     def pictures(self, seed: int = 0, *, is_patched: bool = True) -> dict[str, UInt8Image]:
-        """The pictures of one sample, by camera name."""
+        """The (H, W, 3) uint8 pictures of one sample by camera name, with or without noise patches."""
         plain = {name: street_picture(*self.size_px, seed * 10 + i) for i, name in enumerate(self.views)}
         return {name: noisy_patch(p, seed)[0] for name, p in plain.items()} if is_patched else plain
 
     def state(self, defense: Defense) -> Any:
-        """What `fit` returns for four samples."""
+        """The state that `fit` returns for four clean and four patched samples."""
         clean = [self.pictures(i, is_patched=False) for i in range(4)]
         patched = [self.pictures(i) for i in range(4)]
         return defense.fit(clean, patched, self.model(), derive_rng(SEED, "fit"))
 
     def result(self, pictures: Mapping[str, UInt8Image], seed: int = SEED) -> DefenseResult:
-        """The result of a new defense, fitted and applied."""
+        """The result of a new, fitted defense for one sample."""
         defense = self.make()
         return defense.apply(pictures, self.model(), self.state(defense), derive_rng(seed, "apply"))
 
     def test_the_spec_can_be_used(self) -> None:
-        """Name, protocol, config and build are sound."""
+        """Name, protocol, config and build of the spec are valid."""
         assert spec_problem("defense", self.spec) is None
 
     def test_the_config_survives_yaml(self) -> None:
-        """load(dump(config)) == config."""
+        """A config that is written as YAML and read again is equal to the original."""
         config = self.spec.config(**self.options)
         assert read_node(self.spec.config, parse_text(to_yaml(config), "config")) == config
         assert dataclasses.replace(config) == config
 
     def test_pictures_keep_shape_and_type(self) -> None:
-        """Every view comes back in a `DefenseResult`, cleaned or not."""
+        """The result has a uint8 picture of the same shape for every camera."""
         pictures = self.pictures()
         result = self.result(pictures)
         assert isinstance(result, DefenseResult)
@@ -109,7 +109,9 @@ class DefenseContract:
             assert picture.dtype == np.uint8
 
     def test_it_leaves_its_input_alone(self) -> None:
-        """The defense works on read-only pictures, and its result shares no memory with them."""
+        """The defense works on read-only pictures; each returned picture is the same array or shares no memory
+        with it.
+        """
         pictures = self.pictures()
         for picture in pictures.values():
             picture.setflags(write=False)
@@ -118,7 +120,7 @@ class DefenseContract:
             assert picture is pictures[name] or not np.shares_memory(picture, pictures[name])
 
     def test_the_same_generator_gives_the_same_result(self) -> None:
-        """All random choices come from `rng`."""
+        """Two runs with equal random generators give equal pictures, masks and scores."""
         first, second = self.result(self.pictures()), self.result(self.pictures())
         for name in self.views:
             assert np.array_equal(first.views[name], second.views[name])
@@ -127,8 +129,8 @@ class DefenseContract:
         assert first.score == second.score
 
     def test_outputs_are_what_the_spec_declares(self) -> None:
-        """Masks and scores are returned if and only if they are declared; both are in 0..1, and every view
-        has a mask.
+        """Masks and scores are returned if and only if the spec declares them; values are in 0..1, one mask per
+        camera.
         """
         result = self.result(self.pictures())
         assert (result.mask is not None) == ("mask" in self.spec.outputs)
@@ -154,7 +156,7 @@ class DefenseContract:
         assert alone.score == again.score
 
     def test_a_wrapped_model_is_a_model(self) -> None:
-        """`wrap` returns the model itself or a model that contains it."""
+        """`wrap` returns an object with the methods of a model: `predict`, `forward` and `taps`."""
         pytest.importorskip("torch", reason="models need torch")
         from gear.testing.tiny_networks import TinyConfig, TinySegmenter
 
@@ -162,8 +164,9 @@ class DefenseContract:
         assert all(callable(getattr(wrapped, name, None)) for name in ("predict", "forward", "taps"))
 
     def test_gradients_pass_as_declared(self) -> None:
-        """`forward` agrees with `apply`, gives the same for single pictures and batches, and passes a gradient if
-        declared.
+        """`forward` agrees with `apply`, does not depend on the batch, and passes a gradient to every picture.
+
+        A defense that declares no gradient raises ValueError instead.
         """
         torch = pytest.importorskip("torch", reason="gradients need torch")
         defense = self.make()

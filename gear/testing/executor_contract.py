@@ -1,4 +1,7 @@
-"""The contract of engines, as tests. Subclass `ExecutorContract` in a test of an engine, and set `executor`."""
+"""The contract of execution engines (how work is distributed to workers), as tests.
+
+Subclass `ExecutorContract` in a test of an engine, and define the fixture `executor`.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from gear.values.errors import GearError
 
 
 def write_items(folder: str, failing: tuple[int, ...], indices: Iterator[int], report: Report) -> None:
-    """Work that writes one file for each item, and fails for some."""
+    """Work for tests: writes one file per item and reports the item; items in `failing` are reported as failed."""
     in_row = 0
     for index in indices:
         if index in failing:
@@ -29,7 +32,7 @@ def write_items(folder: str, failing: tuple[int, ...], indices: Iterator[int], r
 
 
 def cannot_start(indices: Iterator[int], report: Report) -> None:
-    """Work that opens something which is not there.
+    """Work for tests that fails before its first item.
 
     Raises:
         GearError: always.
@@ -38,15 +41,15 @@ def cannot_start(indices: Iterator[int], report: Report) -> None:
 
 
 class ExecutorContract:
-    """Tests of an engine; subclasses give it as `executor`."""
+    """The promises of an execution engine, as tests; subclasses define the fixture `executor`."""
 
     @pytest.fixture
     def executor(self) -> Executor:
-        """The engine that is tested."""
+        """The engine that is tested; a pytest fixture that subclasses define."""
         raise NotImplementedError
 
     def test_every_item_is_made_once_and_reported_once(self, executor: Executor, tmp_path: Path) -> None:
-        """With any number of workers every item is made once and has one report."""
+        """Every item is made once and reported once, in any order."""
         reported: list[Outcome] = []
         executor.run(partial(write_items, str(tmp_path), ()), [5, 3, 9, 0, 7], reported.append)
         assert sorted(outcome.index for outcome in reported) == [0, 3, 5, 7, 9]
@@ -62,7 +65,7 @@ class ExecutorContract:
         assert reported[2].error == "item 2 cannot be made"
 
     def test_an_error_that_is_not_of_one_item_ends_the_run(self, executor: Executor) -> None:
-        """An error that does not concern a single item is raised by `run`."""
+        """An error of the work itself, not of a single item, is raised by `run`."""
         with pytest.raises(GearError, match="no renderer here"):
             executor.run(cannot_start, [0, 1], lambda outcome: None)
 

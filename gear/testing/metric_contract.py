@@ -30,12 +30,12 @@ SAMPLES = 3
 
 
 class MetricContract:
-    """What every metric promises, for each task that it measures.
+    """The promises of a metric plugin, as tests, for each task that the metric supports.
 
     Attributes:
-        spec: the metric.
-        options: of its config.
-        task_options: of the tasks' configs: the pictures' size, small enough for quick tests.
+        spec: the metric's spec.
+        options: options of the metric's config.
+        task_options: options of the tasks' configs, such as a size of pictures that is small enough for quick tests.
     """
 
     spec: ClassVar[MetricSpec[Any]]
@@ -43,9 +43,9 @@ class MetricContract:
     task_options: ClassVar[Mapping[str, Any]] = {"width_px": 256, "height_px": 128}
 
     def spoil(self, task: str, prediction: Any) -> Any:
-        """A clearly worse prediction of the same type.
+        """A clearly worse prediction of the same type, made from a good prediction.
 
-        Label maps are shifted by 20 pixels, depth is doubled, detections and stereo boxes are left out.
+        Label maps are shifted by 20 pixels, depth is doubled, and lists of detections or stereo boxes become empty.
         """
         if task == "semseg":
             return np.roll(prediction, 20, axis=1)
@@ -60,13 +60,13 @@ class MetricContract:
         return self.spec.build(self.spec.config(**self.options))
 
     def task(self, name: str) -> Task[Any, Any]:
-        """A task of the metric."""
+        """Builds a task by its name, with `task_options`."""
         found = catalogue().get("task", name).spec
         assert isinstance(found, TaskSpec)
         return found.build(found.config(**self.task_options))
 
     def pairs(self, task: str, *, spoilt: bool = False) -> list[tuple[Any, Any]]:
-        """Samples of synthetic streets with perfect or with spoilt predictions; all arrays are read-only."""
+        """Pairs of a sample and a prediction, perfect or clearly worse, of synthetic streets; arrays are read-only."""
         builder, found = self.task(task), []
         for index in range(SAMPLES):
             sample = builder.ground_truth(*synthetic_frame(builder.rig(), index=index, seed=5))
@@ -75,13 +75,13 @@ class MetricContract:
         return found
 
     def test_the_spec_can_be_used(self) -> None:
-        """Name, summary, protocol, config and tasks are sound."""
+        """Name, summary, protocol, config and tasks of the spec are valid."""
         check_spec("metric", self.spec, self.options)
         known = catalogue().names("task")
         assert all(task in known for task in self.spec.tasks), f"its tasks must be among {', '.join(known)}"
 
     def test_every_evaluator_is_a_fresh_one(self) -> None:
-        """`build` returns a new evaluator each time; evaluators do not share gathered samples."""
+        """`build` returns a new evaluator each time; evaluators do not share their samples."""
         for task in self.spec.tasks:
             empty = dict(self.make().result())
             self.gathered(self.pairs(task))
@@ -89,7 +89,9 @@ class MetricContract:
             assert not difference(dict(self.make().result()), empty)
 
     def test_metrics_are_numbers_by_name(self) -> None:
-        """`update` and `result` give numbers by name, none infinite; the main metric is among those of `result`."""
+        """`update` and `result` return numbers by name; those of `result` include the main metric and are not
+        infinite.
+        """
         for task in self.spec.tasks:
             evaluator = self.make()
             for sample, prediction in self.pairs(task):
@@ -103,7 +105,7 @@ class MetricContract:
         assert all(math.isnan(value) for value in check_metrics(self.make().result(), "result").values())
 
     def test_a_spoilt_prediction_is_worse(self) -> None:
-        """The main metric is worse for a spoilt prediction, in the direction that the spec declares."""
+        """A clearly worse prediction has a worse main metric, in the direction that the spec declares."""
         for task in self.spec.tasks:
             good, bad = (self.gathered(self.pairs(task, spoilt=spoilt)).result() for spoilt in (False, True))
             better, worse = good[self.spec.metric], bad[self.spec.metric]
@@ -128,7 +130,10 @@ class MetricContract:
             assert not difference(pairs, before)
 
     def test_resampling_equals_merging(self) -> None:
-        """`resampled` (`Resampled`), or `totals` with `metrics` (`Additive`), agrees with merging."""
+        """Evaluators with fast resampling give the same metrics as merging single-sample evaluators.
+
+        Fast resampling is `resampled` (protocol `Resampled`), or `totals` with `metrics` (protocol `Additive`).
+        """
         for task in self.spec.tasks:
             pairs = self.pairs(task, spoilt=True)
             parts = [self.gathered([pair]) for pair in pairs]
@@ -162,7 +167,7 @@ class MetricContract:
             check_metrics(self.gathered([(builder.without(sample, masks), prediction)]).result(), "result")
 
     def gathered(self, pairs: Sequence[tuple[Any, Any]]) -> Any:
-        """An evaluator to which these pairs of sample and prediction were added."""
+        """A new evaluator to which these pairs of sample and prediction were added."""
         evaluator = self.make()
         for sample, prediction in pairs:
             evaluator.update(sample, prediction)
@@ -170,7 +175,7 @@ class MetricContract:
 
 
 def _assert_close(found: Mapping[str, float], expected: Mapping[str, float]) -> None:
-    """Equal up to the rounding of sums in another order."""
+    """Asserts that metrics are equal up to the rounding of sums in another order; NaN equals NaN."""
     for name, value in found.items():
         assert math.isclose(value, expected[name], rel_tol=1e-9, abs_tol=1e-12) or (
             math.isnan(value) and math.isnan(expected[name])

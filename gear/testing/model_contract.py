@@ -27,7 +27,7 @@ from gear.values.frames import UInt8Image
 
 
 class ModelContract:
-    """The promises of a model, as tests. A plugin's test file subclasses it and sets `spec`.
+    """The promises of a model plugin, as tests. A plugin's test file subclasses it and sets `spec`.
 
     Attributes:
         spec: the model's spec.
@@ -43,7 +43,7 @@ class ModelContract:
     tolerance: ClassVar[float] = 1e-4
 
     def make(self) -> Model:
-        """A new model; override if the options depend on the test."""
+        """Builds a new model from the spec and the options; override it if the options depend on the test."""
         return self.spec.build(self.spec.config(**self.options))
 
     def samples(self, task: str) -> list[Any]:
@@ -54,31 +54,34 @@ class ModelContract:
         return [builder.ground_truth(*synthetic_frame(builder.rig(), index=i, seed=5)) for i in range(2)]
 
     def views(self, sample: Any) -> dict[str, UInt8Image]:
-        """The pictures of a sample that the model takes."""
+        """The (H, W, 3) uint8 pictures of a sample that the model takes, by camera name."""
         return {name: sample.images[name] for name in self.spec.views}
 
     def batch(self, samples: Sequence[Any]) -> dict[str, Tensor]:
-        """The pictures of several samples as tensors that require gradients."""
+        """The pictures of several samples as (B, 3, H, W) tensors by camera name.
+
+        They require gradients if the model declares gradients.
+        """
         tensors = as_batch([self.views(sample) for sample in samples])
         return {name: tensor.requires_grad_(self.spec.has_gradients) for name, tensor in tensors.items()}
 
     def test_the_spec_can_be_used(self) -> None:
-        """Name, protocol, config and build are sound; the spec names tasks and views."""
+        """Name, protocol, config and build of the spec are valid; the spec names tasks and views."""
         check_spec("model", self.spec, self.options)
         assert self.spec.tasks and self.spec.views
 
     def test_the_tasks_show_what_it_looks_at(self) -> None:
-        """Its tasks are installed, and their rigs have the model's cameras."""
+        """The model's tasks are installed, and their samples have pictures of the model's cameras."""
         for task in self.spec.tasks:
             assert set(self.spec.views) <= set(self.samples(task)[0].images)
 
     def test_predict_sees_pictures_alone(self) -> None:
-        """`predict` takes the views and nothing else, so that ground truth cannot reach it."""
+        """`predict` has the single parameter `views`, so ground truth cannot reach the model."""
         parameters = inspect.signature(self.make().predict).parameters
         assert list(parameters) == ["views"]
 
     def test_predictions_suit_the_evaluators(self) -> None:
-        """The evaluator of every task accepts its prediction and gives no infinite metric."""
+        """The evaluator of every task accepts the model's predictions and gives no infinite metric."""
         model = self.make()
         for name in self.spec.tasks:
             found = catalogue().get("task", name).spec
@@ -88,9 +91,7 @@ class ModelContract:
             assert not any(np.isinf(value) for value in evaluator.result().values())
 
     def test_predict_repeats_and_leaves_everything_alone(self) -> None:
-        """The same pictures give the same prediction, whatever was predicted earlier; pictures and weights do not
-        change.
-        """
+        """`predict` is repeatable, does not depend on earlier calls, and changes neither pictures nor weights."""
         model = self.make()
         one, two = (self.views(sample) for sample in self.samples(self.spec.tasks[0]))
         before = state_of(model)
@@ -100,7 +101,7 @@ class ModelContract:
         assert not changes(before, state_of(model))
 
     def test_many_are_predicted_as_one_by_one(self) -> None:
-        """`predict_many` of a `BatchPredictor` gives each sample's prediction, in order."""
+        """`predict_many` of a `BatchPredictor` gives the same predictions as `predict`, in the order of the samples."""
         model, samples = self.make(), self.samples(self.spec.tasks[0])
         if not isinstance(model, BatchPredictor):
             return
@@ -116,13 +117,13 @@ class ModelContract:
             assert apart <= swapped, "predictions are not in the samples' order"
 
     def test_two_of_the_same_options_are_alike(self) -> None:
-        """Two models with the same options have the same weights."""
+        """Two models with the same options give the same prediction."""
         pictures = self.views(self.samples(self.spec.tasks[0])[0])
         assert not difference(self.make().predict(pictures), self.make().predict(pictures), "prediction")
 
     def test_forward_takes_batches(self) -> None:
-        """Every output is a tensor whose first axis is the batch; the outputs of a picture do not depend on
-        the others.
+        """Every output of `forward` has the batch as its first axis and does not depend on other pictures in the
+        batch.
         """
         model, samples = self.make(), self.samples(self.spec.tasks[0])
         with torch.no_grad():
@@ -135,12 +136,12 @@ class ModelContract:
             assert float((tensor[:1] - one[name]).abs().max()) <= self.tolerance * scale, f"{name} depends on the batch"
 
     def test_forward_looks_at_the_picture(self) -> None:
-        """Different pictures give different outputs."""
+        """`forward` gives different outputs for different pictures."""
         outputs = self.make().forward(self.batch(self.samples(self.spec.tasks[0])))
         assert any(not torch.equal(tensor[0], tensor[1]) for tensor in outputs.values())
 
     def test_forward_leaves_everything_alone(self) -> None:
-        """With or without targets, `forward` changes neither weights, buffers, modes nor samples."""
+        """`forward`, with or without targets, changes neither weights, buffers, modes nor samples."""
         model = self.make()
         before = state_of(model)
         for task in self.spec.tasks:
@@ -151,14 +152,14 @@ class ModelContract:
             assert not difference(samples, self.samples(task), "samples")
 
     def test_losses_are_numbers(self) -> None:
-        """With the batch's samples as targets `forward` gives finite scalar losses."""
+        """`forward` with the batch's samples as targets gives finite scalar losses."""
         for task in self.spec.tasks:
             samples = self.samples(task)
             for name, loss in self.make().forward(self.batch(samples), samples).items():
                 assert loss.shape == () and bool(torch.isfinite(loss)), name
 
     def test_gradients_flow_where_declared(self) -> None:
-        """Outputs and losses have finite gradients, not all zero, to the pixels of every view."""
+        """Outputs and losses have finite gradients, not all zero, with respect to the pictures of every camera."""
         if not self.spec.has_gradients:
             return
         model, samples = self.make(), self.samples(self.spec.tasks[0])
@@ -173,7 +174,7 @@ class ModelContract:
                 assert float(gradient.abs().sum()) > 0, f"no gradient reaches the view {name!r}"
 
     def test_taps_are_there(self) -> None:
-        """`taps` has exactly the declared names; each module runs in `forward` and returns a tensor."""
+        """`taps` has exactly the names in the spec; each tapped layer runs in `forward` and returns a tensor."""
         model = self.make()
         taps = model.taps()
         assert set(taps) == set(self.spec.taps)

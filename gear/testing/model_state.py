@@ -1,4 +1,4 @@
-"""The state of a model, to check that code that uses a model leaves it unchanged."""
+"""Snapshots of a model's weights and modes, to check that code that uses the model leaves it unchanged."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from gear.plugins.attacks.optimisation.frozen_model import networks_of
 
 
 def state_of(model: Any) -> dict[str, str]:
-    """Hashes of all parameters and buffers, whether each requires and has a gradient, and the mode of every module."""
+    """A snapshot of a model by name: hashes of parameters, gradients and buffers, `requires_grad`, and modules'
+    modes.
+    """
     state: dict[str, str] = {}
     for root, network in networks_of(model):
         for name, module in network.named_modules():
@@ -25,7 +27,7 @@ def state_of(model: Any) -> dict[str, str]:
 
 
 def changes(before: dict[str, str], after: dict[str, str]) -> list[str]:
-    """Names of the entries that differ between two states."""
+    """The sorted names of the entries that differ between two snapshots of `state_of`."""
     return sorted(name for name in before.keys() | after.keys() if before.get(name) != after.get(name))
 
 

@@ -1,4 +1,4 @@
-"""Checks of specs that hold for all kinds of plugins."""
+"""Checks that hold for the specs of all kinds of plugins."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from gear.plugins.spec_validation import spec_problem
 
 
 def check_spec(kind: Kind, spec: AnySpec, options: Mapping[str, Any]) -> None:
-    """Asserts that a spec can be used and that its config, with default and given options, survives YAML.
+    """Asserts that a plugin's spec is valid, and that its config is unchanged by a round trip through YAML.
+
+    The config is tested with default options and with the options in the arguments.
 
     Raises:
         AssertionError: the spec or its config fails a check.

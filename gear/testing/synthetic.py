@@ -1,7 +1,7 @@
-"""Frames without a renderer: boxes on a plane, drawn by exact ray casting.
+"""Rendered frames without a renderer: boxes on a plane, drawn by exact ray casting.
 
-Colour, depth and ids of every pixel are known in closed form, so that tasks are compared with geometry instead of a
-renderer. Textures are fixed to the objects, so that two cameras see the same marks.
+Colour, depth and ids of every pixel are known in closed form, so tests compare tasks with geometry instead of a
+renderer. Textures are fixed to world positions, so two cameras see the same marks.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from gear.values.scene import ActorRecord, CameraRecord, Pose, SceneRecord, Surf
 
 GROUND_GEOM = 0
 CELL_M = 0.4
-"""Side of the painted squares."""
+"""Side of the squares painted on all geoms."""
 
 UNIT_FACES = np.array(
     [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
@@ -41,16 +41,17 @@ def synthetic_frame(
     seed: int = 0,
     world_from_ego: RigidTransform | None = None,
 ) -> tuple[Frame, SceneRecord]:
-    """Renders objects on a road as an ego car sees them.
+    """Renders boxes on a road as the cameras of an ego car see them.
 
     Args:
         rig: the cameras.
         things: objects in the ego car's frame (x forward, y left); `street(seed, index)` by default.
-        index, seed: of the record.
+        index: sample index in the record.
+        seed: seed in the record.
         world_from_ego: pose of the ego car; the origin by default. All objects move with it.
 
     Returns:
-        The frame, whose views are exact, and its record.
+        The frame with exact views, and its record.
     """
     world_from_ego = world_from_ego or RigidTransform.from_yaw("world", "ego", (0.0, 0.0, 0.0), 0.0)
     placed = tuple(_moved(thing, world_from_ego) for thing in (street(seed, index) if things is None else things))
@@ -69,7 +70,7 @@ def synthetic_frame(
 
 
 def behind_lens(frame: Frame, lens: Lens) -> Frame:
-    """Distorts a frame of pinhole cameras by a lens. The cameras of the result hold the lens.
+    """Distorts a frame of pinhole cameras by a lens; the lens is added to the cameras of the result.
 
     Raises:
         ValueError: the distortion folds a picture over.
@@ -132,7 +133,7 @@ def _scene_object(thing: Thing) -> SceneObject:
 
 
 def _render(camera: CameraRecord, boxes: Sequence[tuple[Thing, Part]], geoms: GeomTable) -> View:
-    """Nearest hit of each pixel's ray with the ground plane and every box."""
+    """The view of a camera: for each pixel, the nearest hit of its ray with the ground plane and every box."""
     height, width = camera.height_px, camera.width_px
     u, v = np.meshgrid(np.arange(width), np.arange(height))
     world_from_camera = camera.world_from_camera_transform
@@ -156,7 +157,7 @@ def _render(camera: CameraRecord, boxes: Sequence[tuple[Thing, Part]], geoms: Ge
 
 
 def _window(camera: CameraRecord, thing: Thing, part: Part) -> tuple[slice, slice]:
-    """Rows and columns outside which no ray can meet the box."""
+    """The rows and columns of the pixels whose rays can meet the box."""
     camera_from_world = camera.world_from_camera_transform.inverse()
     corners = camera_from_world.apply(thing.world_from_thing.apply(_corners(part)))
     if corners[:, 2].min() < 0.01:
@@ -167,7 +168,7 @@ def _window(camera: CameraRecord, thing: Thing, part: Part) -> tuple[slice, slic
 
 
 def _enter(origin: Array, rays: Array, thing: Thing, part: Part) -> Array:
-    """Depth at which each ray enters the box, infinite where it misses it. Rays have unit depth a step."""
+    """The depth at which each ray enters the box; infinite for a miss. Rays have depth 1 per unit of length."""
     thing_from_world = thing.world_from_thing.inverse()
     start = thing_from_world.apply(origin) - part.centre_m
     along = rays @ thing_from_world.rotation.T
@@ -180,7 +181,9 @@ def _enter(origin: Array, rays: Array, thing: Thing, part: Part) -> Array:
 
 
 def _paint(points: Array, ids: npt.NDArray[np.int32], geoms: GeomTable) -> npt.NDArray[np.uint8]:
-    """A colour for each geom, in two shades by squares of the world; the sky is a gradient."""
+    """The (H, W, 3) uint8 colours of hit points: one colour per geom in two shades by squares; a gradient for the
+    sky.
+    """
     square = (np.floor(points / CELL_M).astype(np.int64).sum(axis=-1) % 2)[..., None]
     number = ids.astype(np.int64)[..., None]
     code = geoms.label_code[ids].astype(np.int64)[..., None]
@@ -220,8 +223,10 @@ def _record(
 
 
 def _surface(thing: Thing, part: Part) -> SurfaceRecord:
-    """The face is the side of the part that looks along -x of the thing; right is -y, down is -z, into the board is
-    +x."""
+    """The record of a patch surface: the side of the part that faces -x of the object.
+
+    In the surface's frame, right is -y of the object, down is -z, into the board is +x.
+    """
     x, y, z = part.centre_m
     rotation = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
     thing_from_surface = RigidTransform.from_parts("object", "surface", rotation, (x - part.size_m[0] / 2, y, z))

@@ -41,14 +41,14 @@ WORLD_FROM_EGO = RigidTransform.from_yaw("world", "ego", (12.0, -34.0, 0.0), 0.7
 
 
 class TaskContract:
-    """The promises of a task, as tests. A plugin's test file subclasses it and sets `spec`.
+    """The promises of a task plugin, as tests. A plugin's test file subclasses it and sets `spec`.
 
     Attributes:
-        spec: the task.
+        spec: the task's spec.
         options: options of the task's config, small enough for quick tests.
         headline: name of the metric by which predictions are compared.
         perfect: value of that metric for a perfect prediction.
-        repeats: number of times that samples are added to the evaluator before the metric is read.
+        repeats: number of times that each sample is added to the evaluator before the metric is read.
     """
 
     spec: ClassVar[TaskSpec[Any]]
@@ -58,30 +58,30 @@ class TaskContract:
     repeats: ClassVar[int] = 2
 
     def spoil(self, prediction: Any) -> Any:
-        """A prediction that is clearly worse."""
+        """A prediction that is clearly worse, made from a good prediction; subclasses define it."""
         raise NotImplementedError("say how to spoil a prediction of this task")
 
     def task(self) -> Task[Any, Any]:
-        """A new task."""
+        """Builds a new task from the spec and the options."""
         return self.spec.build(self.spec.config(**self.options))
 
     def frame(self, index: int = 0) -> tuple[Frame, SceneRecord]:
-        """A synthetic street, seen by the task's rig."""
+        """A synthetic street, rendered for the task's camera rig, with its record."""
         return synthetic_frame(self.task().rig(), index=index, seed=5, world_from_ego=WORLD_FROM_EGO)
 
     def sample(self, index: int = 0) -> Any:
-        """The ground truth of a synthetic frame."""
+        """The task's sample, with ground truth, of a synthetic frame."""
         return self.task().ground_truth(*self.frame(index))
 
     def sidecar(self, sample: Sample, encoded: Encoded) -> Sidecar:
-        """The sidecar of a sample after a round trip through JSON."""
+        """The metadata of a sample (sidecar) after a round trip through JSON."""
         text = json.dumps([to_json(sample.record), to_json(sample.surfaces), encoded.facts], allow_nan=False)
         record, surfaces, facts = json.loads(text)
         truths = tuple(from_json(type(old), new) for old, new in zip(sample.surfaces, surfaces, strict=True))
         return Sidecar(record=from_json(SceneRecord, record), surfaces=truths, facts=facts, files={})
 
     def write(self, root: Path, indexes: Sequence[int] = (0, 1)) -> list[Sidecar]:
-        """Writes a small split to disk as the collector does."""
+        """Writes a small split to disk as `gear collect` does, and returns the samples' metadata (sidecars)."""
         task, sidecars = self.task(), []
         for index in indexes:
             sample = self.sample(index)
@@ -99,13 +99,15 @@ class TaskContract:
         assert spec.config() == spec.config(), "every option needs a default"
 
     def test_rig_has_the_views_of_the_spec(self) -> None:
-        """The rig's cameras are the spec's views."""
+        """The task's rig has exactly the cameras that the spec names as views, and is the same for every new task."""
         rig = self.task().rig()
         assert tuple(camera.name for camera in rig.cameras) == self.spec.views
         assert rig == self.task().rig()
 
     def test_sample_has_images_and_surfaces(self) -> None:
-        """A sample has the rendered pictures of every view, and every surface in every view."""
+        """A sample has the rendered picture of every view, and the ground truth of every patch surface in every
+        view.
+        """
         frame, record = self.frame()
         sample = self.task().ground_truth(frame, record)
         assert sample.record == record
@@ -119,7 +121,7 @@ class TaskContract:
         assert [(truth.camera, truth.name) for truth in sample.surfaces] == expected
 
     def test_ground_truth_leaves_the_frame_alone_and_repeats(self) -> None:
-        """The same frame gives the same sample; the frame may be read-only and does not change."""
+        """`ground_truth` gives the same sample for the same frame; the frame may be read-only and does not change."""
         frame, record = freeze(self.frame())
         untouched, _ = self.frame()
         first = self.task().ground_truth(frame, record)
@@ -128,7 +130,7 @@ class TaskContract:
         assert not difference(frame.views, untouched.views)
 
     def test_encode_is_pure(self) -> None:
-        """The same sample gives the same bytes; the sample does not change."""
+        """`encode` gives the same bytes for the same sample and does not change the sample."""
         sample = freeze(self.sample())
         first, second = self.task().encode(sample, INFO), self.task().encode(sample, INFO)
         assert first.files == second.files
@@ -136,12 +138,12 @@ class TaskContract:
         assert not difference(sample, self.sample())
 
     def test_facts_are_json(self) -> None:
-        """Facts are unchanged by a round trip through JSON."""
+        """The metadata `facts` of an encoded sample is unchanged by a round trip through JSON."""
         facts = self.task().encode(self.sample(), INFO).facts
         assert json.loads(json.dumps(facts, allow_nan=False)) == facts
 
     def test_paths_stay_inside_and_apart(self, tmp_path: Path) -> None:
-        """No path leaves the dataset's root, and no file is written twice."""
+        """No file is outside of the dataset's root or in its folder `gear`, and no file is written twice."""
         task, sidecars = self.task(), self.write(tmp_path)
         samples = [set(task.encode(self.sample(index), INFO).files) for index in (0, 1)]
         indexes = set(task.finalise(sidecars, INFO))
@@ -152,19 +154,19 @@ class TaskContract:
             assert path.parts[0] != "gear", "the dataset room keeps its own files there"
 
     def test_splits_share_a_root(self) -> None:
-        """Two splits write different files."""
+        """Two splits with the same root write different files."""
         task, sample = self.task(), self.sample()
         other = dataclasses.replace(INFO, split="test")
         assert not set(task.encode(sample, INFO).files) & set(task.encode(sample, other).files)
 
     def test_reading_gives_back_what_was_written(self, tmp_path: Path) -> None:
-        """`decode` is the exact inverse of `encode`."""
+        """`decode` returns exactly the sample that `encode` wrote."""
         for index, sidecar in enumerate(self.write(tmp_path)):
             read = self.task().decode(tmp_path, sidecar, INFO)
             assert not difference(read, self.sample(index))
 
     def test_finalise_repeats_and_needs_no_files(self, tmp_path: Path) -> None:
-        """Index files depend only on the sidecars."""
+        """The files that `finalise` makes for a split depend only on the samples' metadata (sidecars)."""
         sidecars = freeze(self.write(tmp_path))
         first, second = self.task().finalise(sidecars, INFO), self.task().finalise(sidecars, INFO)
         assert first == second
@@ -175,30 +177,31 @@ class TaskContract:
         assert all(isinstance(data, bytes) for data in self.task().finalise([], INFO).values())
 
     def test_perfect_prediction_is_perfect(self) -> None:
-        """Ground truth as the prediction gives the perfect value."""
+        """The ground truth as a prediction has the perfect value of the headline metric."""
         result = self.evaluate([0, 1])
         assert math.isclose(result[self.headline], self.perfect, abs_tol=1e-9), result
 
     def test_spoilt_prediction_is_worse(self) -> None:
-        """The headline metric is worse for a spoilt prediction."""
+        """A clearly worse prediction differs from the perfect value of the headline metric."""
         result = self.evaluate([0, 1], spoilt=True)
         assert abs(result[self.headline] - self.perfect) > 1e-3, result
 
     def test_merged_evaluators_say_the_same(self) -> None:
-        """Evaluators of two halves, merged, give the metrics of the whole."""
+        """Two merged evaluators of one sample each give the same metrics as one evaluator of both samples."""
         whole = self.evaluate([0, 1])
         parts = [self._gather(self.task().evaluator(), [index]) for index in (0, 1)]
         parts[0].merge(parts[1])
         assert not difference(dict(parts[0].result()), dict(whole))
 
     def test_an_empty_evaluator_says_nan(self) -> None:
-        """Without samples every metric is NaN."""
+        """An evaluator without samples gives NaN for every metric."""
         result = self.task().evaluator().result()
         assert all(value != value for value in result.values())
 
     def test_predictions_survive_their_files(self, tmp_path: Path) -> None:
-        """If the task stores predictions, reading them gives exactly what was written, and they overwrite no other
-        file.
+        """Stored predictions are read exactly as they were written, and each has files of its own.
+
+        The test is skipped for tasks that do not store predictions.
         """
         task = self.task()
         if not isinstance(task, KeepsPredictions):
@@ -220,7 +223,10 @@ class TaskContract:
         assert not any(PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts for name in names)
 
     def test_masked_ground_truth_says_nothing(self) -> None:
-        """If ground truth can be masked, a full mask leaves no metric defined, and an empty mask changes nothing."""
+        """With all ground truth masked, the headline metric is NaN; with an empty mask, it is perfect.
+
+        The test is skipped for tasks whose ground truth cannot be masked.
+        """
         task, sample = self.task(), freeze(self.sample())
         if not isinstance(task, Maskable):
             return
@@ -234,7 +240,10 @@ class TaskContract:
             assert math.isnan(metric) if value else math.isclose(metric, self.perfect, abs_tol=1e-9)
 
     def test_ground_truth_finds_every_object(self) -> None:
-        """Where twins are compared object by object, a perfect prediction finds each object and invents none."""
+        """With the ground truth as the prediction, every object is detected and no detection is a false alarm.
+
+        The test is skipped for tasks without objects.
+        """
         task, sample = self.task(), freeze(self.sample())
         if not isinstance(task, WithObjects):
             return
@@ -247,14 +256,16 @@ class TaskContract:
         assert {one.role for one in seen.detections} == {"found"}
 
     def test_reports_are_evaluators(self) -> None:
-        """Each further report accepts the same samples, and is NaN without samples."""
+        """Each further evaluator of `reports` accepts the task's samples without infinite metrics, and is NaN
+        without samples.
+        """
         task = self.task()
         for name, evaluator in task.reports().items() if isinstance(task, Reports) else ():
             assert all(value != value for value in evaluator.result().values()), name
             assert not any(math.isinf(v) for v in self._gather(evaluator, [0, 1]).result().values()), name
 
     def test_preview_shows_pictures(self) -> None:
-        """There is at least one preview, in RGB."""
+        """`preview` returns at least one picture; all are (H, W, 3) uint8."""
         sample = freeze(self.sample())
         pictures = self.task().preview(sample)
         assert pictures
@@ -262,7 +273,7 @@ class TaskContract:
             assert picture.dtype == np.uint8 and picture.ndim == 3 and picture.shape[2] == 3
 
     def evaluate(self, indexes: Sequence[int], *, spoilt: bool = False) -> Mapping[str, float]:
-        """The metrics with ground truth as the prediction, unchanged or spoilt."""
+        """The metrics of synthetic samples with the ground truth as the prediction, unchanged or made clearly worse."""
         result: Mapping[str, float] = self._gather(self.task().evaluator(), indexes, spoilt=spoilt).result()
         return result
 

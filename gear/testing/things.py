@@ -13,12 +13,12 @@ from gear.values.scene import Role, Vec3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """One box of an object, in the object's frame.
+    """One box of a synthetic object, in the object's frame.
 
     Attributes:
         label: name of a gear label.
-        centre_m, size_m: centre, and length (x), width (y), height (z).
-        surface: number of the patch surface whose face this box is, or -1.
+        centre_m, size_m: centre (x, y, z), and length (x), width (y), height (z).
+        surface: number of the patch surface on this box, or -1.
     """
 
     label: str
@@ -29,14 +29,14 @@ class Part:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Thing:
-    """An object: boxes that move together.
+    """A synthetic object: boxes that move together.
 
     Attributes:
         parts: its boxes; the first one has the object's main label.
-        position_m, yaw_rad: pose of its frame in the world.
-        object_id: as in `GeomTable.object_id`; -1 for objects that are no instances.
+        position_m, yaw_rad: pose of the object's frame in the world.
+        object_id: id of the instance, as in `GeomTable.object_id`; -1 for objects that are no instances.
         role: role of the actor; None for a fixed part of the town.
-        key_points: named points in its frame, metres.
+        key_points: named points in the object's frame, metres.
     """
 
     parts: tuple[Part, ...]
@@ -48,7 +48,7 @@ class Thing:
 
     @property
     def world_from_thing(self) -> RigidTransform:
-        """Pose of the object in the world."""
+        """The pose of the object in the world."""
         return RigidTransform.from_yaw("world", "object", self.position_m, self.yaw_rad)
 
 
@@ -83,7 +83,15 @@ SLOTS = (
 
 
 def board(distance_m: float, left_m: float = 0.0, *, surface: int = 0, bottom_m: float = 0.15) -> Thing:
-    """A billboard ahead of an ego car at the origin, facing it: a 7.4 m x 3.7 m face on a thicker board."""
+    """A billboard in front of an ego car at the origin, facing the car: a 7.4 m x 3.7 m surface on a thicker
+    board.
+
+    Args:
+        distance_m: distance ahead of the origin.
+        left_m: distance to the left.
+        surface: number of the patch surface.
+        bottom_m: height of the surface's lower edge.
+    """
     middle = bottom_m + 1.85
     face = Part(label="billboard", centre_m=(0.005, 0.0, middle), size_m=(0.01, 7.4, 3.7), surface=surface)
     back = Part(label="billboard", centre_m=(0.16, 0.0, middle), size_m=(0.3, 7.8, 4.1))
@@ -91,8 +99,10 @@ def board(distance_m: float, left_m: float = 0.0, *, surface: int = 0, bottom_m:
 
 
 def street(seed: int = 0, index: int = 0) -> tuple[Thing, ...]:
-    """A street ahead of the origin: a board, cars, a van, a truck, people, a cyclist, a traffic light; drawn from the
-    seed."""
+    """A street ahead of the origin: billboard, building, cars, van, truck, people, cyclist, traffic light.
+
+    The positions of vehicles and people are drawn from the seed and the index.
+    """
     rng = derive_rng(seed, "synthetic", index)
     things = [
         board(24.0, 6.0),

@@ -1,6 +1,8 @@
-"""A small compositor for tests: pastes patches by homography onto the corners of their surfaces in the ground truth.
+"""A small compositor for tests: pastes patches by homography onto the corners of their surfaces in the ground
+truth.
 
-It ignores light. It serves tests of attacks without a renderer, whereas gear's exact compositor needs rendered probes.
+It ignores light. Attacks are tested with it without a renderer, whereas gear's exact compositor needs probes (samples
+rendered with each surface black and white).
 """
 
 from __future__ import annotations
@@ -18,28 +20,28 @@ from gear.values.ground_truth import SurfaceTruth
 
 
 class TinyCompositor:
-    """Implements `gear.contracts.attacks.Compositor` for the samples of a task."""
+    """A compositor for tests; implements `gear.contracts.attacks.Compositor` for the samples of a task."""
 
     def __init__(self, dataset: Sequence[Sample]) -> None:
         self._dataset = dataset
         self.calls = 0
-        """How often it was asked for a batch."""
+        """Number of calls of `compose`."""
 
     @property
     def surfaces(self) -> int:
-        """Number of patches that it takes."""
+        """The number of patches that `compose` expects: the number of patch surfaces."""
         return len(self._dataset[0].record.surfaces)
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """Pictures with the patches on their surfaces.
+        """Composes the patches onto their surfaces in the pictures of some samples.
 
         Args:
             patches: one for each surface, values in 0..1: (3, h, w), or (B, 3, h, w) with one for each sample.
-            samples: B numbers of samples.
+            samples: B indices of samples.
             view: name of the camera.
 
         Returns:
-            (B, 3, H, W) pictures in 0..1.
+            (B, 3, H, W) pictures in 0..1, differentiable with respect to the patches.
 
         Raises:
             ValueError: the number of patches is not that of the surfaces.

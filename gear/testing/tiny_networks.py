@@ -32,8 +32,8 @@ class TinyConfig:
     """Options of a tiny network.
 
     Attributes:
-        seed: of its weights.
-        width: channels of its hidden layers.
+        seed: seed of the network's random weights.
+        width: channels of the hidden layers.
     """
 
     seed: int = 0
@@ -41,13 +41,16 @@ class TinyConfig:
 
 
 def as_batch(views: Sequence[Mapping[str, UInt8Image]]) -> dict[str, Tensor]:
-    """Pictures of several samples as `Model.forward` takes them: (B, 3, H, W) float32 in 0..1 by camera name."""
+    """The pictures of several samples as the input of `Model.forward`: (B, 3, H, W) float32 in 0..1 by camera name."""
     stacked = {name: np.stack([sample[name] for sample in views]).transpose(0, 3, 1, 2) for name in views[0]}
     return {name: torch.from_numpy(np.ascontiguousarray(one)).float() / 255 for name, one in stacked.items()}
 
 
 class TinyNetwork(nn.Module, ABC):
-    """A stem, a strided trunk with batch normalisation, a head, and bilinear interpolation back to the picture."""
+    """The base class of tiny networks: a stem, a trunk with stride 2 and batch normalisation, and a head.
+
+    The head's map is interpolated back to the size of the picture.
+    """
 
     def __init__(self, config: TinyConfig, channels: int) -> None:
         super().__init__()
@@ -65,7 +68,7 @@ class TinyNetwork(nn.Module, ABC):
         self.eval()
 
     def forward(self, views: Mapping[str, Tensor], targets: Sequence[Any] | None = None) -> Mapping[str, Tensor]:
-        """Outputs of a batch, or its loss where `targets`, the batch's samples of the task, are given."""
+        """The outputs of a batch by name, or its `loss` if `targets` (the batch's samples) are given."""
         pictures = views[VIEW]
         hidden = functional.relu(self.stem((pictures - 0.5) * 4))
         hidden = functional.relu(self.norm(self.trunk(hidden)))
@@ -74,54 +77,54 @@ class TinyNetwork(nn.Module, ABC):
         return self.outputs(raw) if targets is None else {"loss": self.loss(raw, targets)}
 
     def module(self) -> nn.Module:
-        """The network itself, which `gear train` trains and saves."""
+        """The torch module that `gear train` trains and saves: the network itself."""
         return self
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The feature maps `stem` and `trunk`."""
+        """The tapped layers `stem` and `trunk` (layers with readable feature maps)."""
         return {"stem": self.stem, "trunk": self.trunk}
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """The task's prediction for one sample."""
+        """The prediction for the pictures of one sample, in the form of the network's task."""
         with torch.no_grad():
             return self.answer(self(as_batch([{VIEW: views[VIEW]}])))
 
     @abstractmethod
     def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
-        """Outputs by name from the head's (B, C, H, W) map."""
+        """Converts the head's (B, C, H, W) map to the network's outputs by name."""
 
     @abstractmethod
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
-        """Scalar loss for training."""
+        """The scalar training loss from the head's (B, C, H, W) map and the batch's samples."""
 
     @abstractmethod
     def answer(self, outputs: Mapping[str, Tensor]) -> Any:
-        """The task's prediction from the outputs of a batch of one."""
+        """Converts the outputs of a batch of one sample to the task's prediction."""
 
 
 class TinySegmenter(TinyNetwork):
-    """Semantic segmentation: `logits` (B, 34, H, W) over Cityscapes label ids."""
+    """A tiny semantic segmentation network with the output `logits`, (B, 34, H, W) over Cityscapes label ids."""
 
     def __init__(self, config: TinyConfig) -> None:
         super().__init__(config, LABEL_COUNT)
 
     def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
-        """`logits` (B, 34, H, W)."""
+        """The output `logits`: the head's (B, 34, H, W) map."""
         return {"logits": raw}
 
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
-        """Cross-entropy with each sample's `label_ids`."""
+        """The cross-entropy of the logits with each sample's `label_ids`."""
         labels = torch.from_numpy(np.stack([sample.label_ids for sample in targets])).long()
         return functional.cross_entropy(raw, labels)
 
     def answer(self, outputs: Mapping[str, Tensor]) -> npt.NDArray[np.uint8]:
-        """(H, W) uint8 label ids."""
+        """The prediction for one sample: (H, W) uint8 label ids."""
         labels: npt.NDArray[np.uint8] = outputs["logits"][0].argmax(0).to(torch.uint8).numpy()
         return labels
 
 
 class TinyDepth(TinyNetwork):
-    """Monocular depth: `depth_m` (B, H, W), above 0."""
+    """A tiny monocular depth network with the output `depth_m`, (B, H, W) in metres, above 0."""
 
     LEAST_M: ClassVar[float] = 0.1
 
@@ -129,11 +132,11 @@ class TinyDepth(TinyNetwork):
         super().__init__(config, 1)
 
     def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
-        """`depth_m` (B, H, W) in metres."""
+        """The output `depth_m`: (B, H, W) in metres, above 0.1 m."""
         return {"depth_m": 10 * functional.softplus(raw[:, 0]) + self.LEAST_M}
 
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
-        """Mean absolute difference of logarithms where each sample's `depth_m` is known."""
+        """The mean absolute difference of log depth, over the pixels whose `depth_m` is known."""
         depth_m = torch.from_numpy(np.stack([sample.depth_m for sample in targets]))
         is_known = torch.isfinite(depth_m)
         known_m = torch.where(is_known, depth_m, torch.ones_like(depth_m))
@@ -141,7 +144,7 @@ class TinyDepth(TinyNetwork):
         return (error * is_known).sum() / is_known.sum().clamp_min(1)
 
     def answer(self, outputs: Mapping[str, Tensor]) -> FloatImage:
-        """(H, W) float32 depth in metres."""
+        """The prediction for one sample: (H, W) float32 depth in metres."""
         depth_m: FloatImage = outputs["depth_m"][0].numpy()
         return depth_m
 

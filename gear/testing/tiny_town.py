@@ -21,10 +21,10 @@ from gear.world.world import World
 DATA = Path(__file__).parent / "data"
 
 TINY_TOWN = DATA / "mjcf" / "towns" / "tiny.xml"
-"""Path of the town's MJCF, which `--town` takes."""
+"""Path of the tiny town's MJCF file, a value for `--town`."""
 
 TINY_SCENES = DATA / "scenes" / "tiny.yml"
-"""Its scene library: `board`, `double`, `truck`, `no_billboard`."""
+"""Path of the tiny town's scene library with the scenes `board`, `double`, `truck` and `no_billboard`."""
 
 CLEAR = Weather(name="ClearNoon", cloudiness=5.0, sun_altitude_deg=60.0)
 
@@ -33,16 +33,16 @@ SMALL_RIG = Rig(cameras=(CameraMount(name="rgb", width_px=320, height_px=160),))
 
 
 def tiny_scenes() -> SceneLibrary:
-    """The scene library of the tiny town."""
+    """Reads the scene library of the tiny town: its scenes by name."""
     return read_node(SceneLibrary, parse_file(TINY_SCENES))
 
 
 def build_tiny_world(scene: str = "board", weather: Weather = CLEAR) -> World:
-    """A world of the tiny town, freshly compiled."""
+    """Compiles a new world of the tiny town, with one of its scenes."""
     return World.build(town=TINY_TOWN, scene_name=scene, scene=tiny_scenes().scenes[scene], weather=weather)
 
 
 @cache
 def tiny_world(scene: str = "board") -> World:
-    """A world of the tiny town that tests share: compiled once per process, changed by every `place`."""
+    """A world of the tiny town that tests share: compiled once per process, changed by every call of its `place`."""
     return build_tiny_world(scene)

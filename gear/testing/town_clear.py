@@ -1,4 +1,7 @@
-"""Finds obstacles on the lanes and walks of a town, collision and visible geoms; one line for each lane or walk."""
+"""Finds obstacles on the lanes and walks of a town; each function returns one line for each blocked lane or walk.
+
+Obstacles are collision geoms and visible geoms.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,7 @@ COLLISION_GAP_M, VISIBLE_GAP_M = 0.2, 0.4
 
 PERSON_HEIGHTS_M = (0.4, 0.8, 1.3, 1.7)
 PERSON_RAYS = 3
-"""Number of neighbouring rays that must be free for a person to pass: half a metre."""
+"""Number of neighbouring rays that must hit nothing for a person to pass: half a metre."""
 
 PERSON_GAP_M = 0.25
 WALK_PIECE_M = 0.5
@@ -35,7 +38,7 @@ DETOUR_M, STEP_UP_M = 1.0, 0.1
 
 
 def blocked_lanes(town: TownUnderTest) -> list[str]:
-    """Lanes with an obstacle on or above them, in the width and height of the vehicles that use them."""
+    """One line for each lane with an obstacle within the width and height of the vehicles that use the lane."""
     problems = []
     for lane in town.graph.lanes.values():
         side_m = max(0.0, min(CAR_SIDE_M, lane.width_m / 2 - LANE_EDGE_M))
@@ -49,7 +52,7 @@ def blocked_lanes(town: TownUnderTest) -> list[str]:
 
 
 def blocked_walks(town: TownUnderTest) -> list[str]:
-    """Walks with an obstacle that a person can neither pass nor go around."""
+    """One line for each walk with an obstacle that a person can neither pass nor go around."""
     problems = []
     for walk in town.graph.walks.values():
         for start_m, end_m in pairwise(walk.line.points_m):
@@ -60,7 +63,7 @@ def blocked_walks(town: TownUnderTest) -> list[str]:
 
 
 def _stopped(town: TownUnderTest, start_m: Array, end_m: Array, edge_m: float) -> str:
-    """Name and place of the obstacle that blocks a straight piece of a walk; empty if people can pass."""
+    """Name and position of the obstacle that blocks a straight piece of a walk; empty if people can pass."""
     side_m = max(PERSON_GAP_M, edge_m - PERSON_GAP_M)
     is_short = float(np.linalg.norm(end_m - start_m)) <= WALK_PIECE_M
     if is_short:

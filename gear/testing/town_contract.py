@@ -72,23 +72,23 @@ class TownContract:
     min_agreement: ClassVar[float] = 0.98
 
     def under_test(self) -> TownUnderTest:
-        """The town, compiled once for all checks."""
+        """The town and its scenes, compiled once for all checks."""
         return town_under_test(str(self.town), str(self.scenes))
 
     def test_stock_mujoco_compiles_it(self, record_property: Callable[[str, object], None]) -> None:
-        """Stock MuJoCo compiles the town's file; the report has the seconds that it takes."""
+        """MuJoCo without gear compiles the town's file; the test report has the seconds and the number of triangles."""
         _, model, seconds = self.under_test().compiled
         record_property("compile_s", round(seconds, 2))
         record_property("triangles", int(model.nmeshface))
 
     def test_gear_composes_it(self, record_property: Callable[[str, object], None]) -> None:
-        """Gear composes the world of the first scene; the report has the seconds that it takes."""
+        """Gear composes the world of the first scene; the test report has the seconds that it takes."""
         world, seconds = self.under_test().first_world
         record_property("compose_s", round(seconds, 2))
         assert world.model.ngeom > 0 and world.lanes.lanes
 
     def test_visible_geoms_are_labelled(self) -> None:
-        """The first part of every visible geom's class is a label."""
+        """The class of every visible geom starts with a label, such as `building.brick`."""
         fail_if("visible geoms have no label: their class must start with one, such as `building.brick`", [
             f"geom {geom.name!r} of body {geom.parent.name!r} has class {unprefixed_class(geom.classname.name)!r}"
             for geom in self.under_test().compiled[0].geoms
@@ -126,7 +126,7 @@ class TownContract:
         fail_if("visible geoms are transparent", problems or town_materials.transparent(town.first_world[0].model))
 
     def test_materials_are_physical(self) -> None:
-        """Renderers can show every texture, colours are marked as sRGB, and no surface reflects too much light."""
+        """Renderers can show every texture, colours are marked as sRGB, and no geom reflects too much light."""
         town = self.under_test()
         problems = town_materials.unphysical(town.compiled[1], self.albedo)
         if not problems:
@@ -135,7 +135,7 @@ class TownContract:
         fail_if("materials are not physical", problems)
 
     def test_every_class_of_a_street_is_there(self) -> None:
-        """No class that networks know from streets is missing in the town."""
+        """The town has every label in `expected`, or another label of the same Cityscapes class."""
         there = {
             LABEL_BY_NAME[label].cityscapes_id
             for geom in self.under_test().compiled[0].geoms
@@ -146,34 +146,34 @@ class TownContract:
         fail_if("labels are missing from the town (if it needs none, take them out of `expected`)", missing)
 
     def test_lanes_are_continued(self) -> None:
-        """Every lane is continued by another one, without a gap."""
+        """Every lane, except those in `open_ends`, is continued by another lane without a gap."""
         fail_if("lanes end or tear", town_streets.dead_ends(self.under_test().graph, self.open_ends, self.join_m))
 
     def test_headings_are_continuous(self) -> None:
-        """No lane turns sharply at one point, or into the lane that continues it."""
+        """No lane turns by more than `max_turn_deg` at one point, or into the lane that continues it."""
         fail_if("lanes have kinks", town_streets.kinks(self.under_test().graph, self.max_turn_deg))
 
     def test_widths_and_speeds_are_sane(self) -> None:
-        """Widths and speeds of lanes and walks are those of real roads."""
+        """Widths of lanes and walks and speeds of lanes are within the limits."""
         graph = self.under_test().graph
         fail_if("lanes have odd sizes", town_streets.odd_sizes(graph, self.lane_width_m, self.speed_mps))
 
     def test_neighbours_run_side_by_side(self) -> None:
-        """The neighbours of a lane are on the side that is stated, in the same direction."""
+        """The left and right neighbours of a lane are on that side and have the same direction."""
         fail_if("neighbours are elsewhere", town_streets.lost_neighbours(self.under_test().graph))
 
     def test_lanes_lie_on_the_road(self) -> None:
-        """Ground and visible road are at the height of each lane, along its whole length and the width of a car."""
+        """Collision ground and visible road are at the height of each lane, also below the wheels of a car."""
         fail_if(
             "lanes are off the road", town_streets.lanes_off_the_road(self.under_test(), self.ground_m, self.wheel_m)
         )
 
     def test_lanes_are_clear(self) -> None:
-        """No collision or visible geom is on a lane, in the width and height of the vehicles that use it."""
+        """No collision or visible geom blocks a lane within the width and height of the vehicles that use it."""
         fail_if("lanes are blocked", town_clear.blocked_lanes(self.under_test()))
 
     def test_people_can_walk(self) -> None:
-        """Sidewalks and crosswalks lie on the ground and let people pass; crosswalks join sidewalks across lanes."""
+        """Sidewalks and crosswalks are on the ground and passable; crosswalks cross lanes and end at sidewalks."""
         fail_if("walks are in the air", town_streets.walks_off_the_ground(self.under_test(), self.ground_m))
         fail_if("walks are blocked", town_clear.blocked_walks(self.under_test()))
         fail_if("crosswalks lead nowhere", town_streets.idle_crosswalks(self.under_test().graph))
@@ -187,7 +187,7 @@ class TownContract:
         fail_if("things are out of bounds", town_streets.out_of_bounds(self.under_test().graph))
 
     def test_depth_has_a_range(self) -> None:
-        """Clipping planes are where a car's camera needs them."""
+        """The near and far clipping planes are within the limits `near_m` and `far_m`."""
         model = self.under_test().compiled[1]
         near_m, far_m = (float(v * model.stat.extent) for v in (model.vis.map.znear, model.vis.map.zfar))
         problems = []
@@ -200,26 +200,30 @@ class TownContract:
         )
 
     def test_scenes_belong_to_the_town(self) -> None:
-        """The library names the town, and its boards stand inside of it."""
+        """The scene library names this town, and its boards stand on the ground inside the town's bounds."""
         fail_if("scenes are elsewhere", town_scenes.misplaced(self.under_test()))
 
     def test_every_scene_can_be_planned_with_its_boards_in_view(self) -> None:
-        """Samples of every scene are drawn, and rays from the camera reach the faces."""
+        """Samples of every scene can be planned, and a share `min_visible` of each board is visible in each sample."""
         town = self.under_test()
         names = tuple(town.scenes.scenes) if self.planned_scenes is None else tuple(self.planned_scenes)
         fail_if("scenes cannot be used", town_scenes.unusable(town, names, self.samples, self.min_visible))
 
     def test_the_ground_is_closed(self) -> None:
-        """No pixel shows what lies behind ground or buildings: meshes that meet in a T-junction leave cracks."""
+        """Meshes of ground and buildings have no cracks, through which pixels would show what lies behind."""
         fail_if("there are cracks in the ground", town_scenes.cracks(self.under_test(), self.samples))
 
     def test_ids_and_depth_are_those_of_rays(self) -> None:
-        """The classic renderer and MuJoCo's own rays agree on the first scene."""
+        """Ids and depth of the classic renderer agree with MuJoCo's own rays on the first scene."""
         fail_if("pixels and rays differ", town_scenes.disagreement(self.under_test(), self.min_agreement))
 
 
 def fail_if(what: str, problems: Sequence[str]) -> None:
-    """Fails with a list of problems, if there are any.
+    """Fails a test with a list of problems, if there are any.
+
+    Args:
+        what: title of the problems.
+        problems: one line for each problem.
 
     Raises:
         AssertionError: there are problems.

@@ -1,4 +1,4 @@
-"""A town under test: compiled by stock MuJoCo, composed by gear, and probed with rays."""
+"""A town under test: compiled by MuJoCo alone, composed by gear, and measured with rays."""
 
 from __future__ import annotations
 
@@ -32,27 +32,33 @@ RAY_START_M = 0.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rays:
-    """Casts rays at the geoms of some groups of a model."""
+    """Casts rays at the geoms of some geom groups of a MuJoCo model."""
 
     model: mujoco.MjModel
     data: mujoco.MjData
     groups: tuple[int, ...]
 
     def first_hit(self, start_m: Array, along: Array) -> tuple[float, int]:
-        """Distance to the first geom that a ray hits, in lengths of `along`, and its id; infinity and -1 for no hit."""
+        """Distance to the first geom that a ray hits, as a multiple of `along`, and the geom's id; infinity and -1
+        for no hit.
+
+        Args:
+            start_m: start of the ray in the world, metres.
+            along: direction of the ray.
+        """
         groups, hit = np.zeros(6, np.uint8), np.full(1, -1, np.int32)
         groups[list(self.groups)] = 1
         distance = mujoco.mj_ray(self.model, self.data, start_m, along, groups, 1, -1, hit)
         return (float(distance), int(hit[0])) if distance >= 0 else (np.inf, -1)
 
     def height_m(self, point_m: npt.ArrayLike, above_m: float) -> float:
-        """Height of the first geom below a point, with a ray that starts `above_m` above it; NaN for no hit."""
+        """Height of the first geom below a point, with a ray that starts `above_m` above the point; NaN for no hit."""
         start_m = np.asarray(point_m, dtype=np.float64) - above_m * DOWN
         distance_m, geom = self.first_hit(start_m, DOWN)
         return float(start_m[2] - distance_m) if geom >= 0 else float("nan")
 
     def name(self, geom: int) -> str:
-        """The geom's name in messages."""
+        """The name of a geom in messages; for unnamed geoms its number and its body."""
         return (
             self.model.geom(geom).name or f"number {geom} of body {self.model.body(self.model.geom_bodyid[geom]).name}"
         )
@@ -60,22 +66,22 @@ class Rays:
 
 @dataclass(frozen=True, eq=False)
 class TownUnderTest:
-    """Everything that the contract checks. What takes time is computed at the first use."""
+    """A town and its scenes with everything that the town contract checks; slow parts are computed at first use."""
 
     library: AssetLibrary
     scenes: SceneLibrary
 
     @property
     def path(self) -> Path:
-        """Path of the town's MJCF file."""
+        """The path of the town's MJCF file."""
         return self.library.town
 
     @cached_property
     def compiled(self) -> tuple[mujoco.MjSpec, mujoco.MjModel, float]:
-        """Spec and model by stock MuJoCo, and the seconds that compiling took.
+        """MuJoCo's spec and model of the town, and the seconds that compiling took.
 
         Raises:
-            TownError: MuJoCo cannot compile it.
+            TownError: MuJoCo cannot compile the town.
         """
         began_s = time.perf_counter()
         try:
@@ -87,16 +93,16 @@ class TownUnderTest:
 
     @cached_property
     def graph(self) -> LaneGraph:
-        """Its lanes, walks and parking bays.
+        """The town's lanes, walks and parking bays.
 
         Raises:
-            TownError: one is malformed, or there are no bounds.
+            TownError: a lane, walk or bay is malformed, or the town has no bounds.
         """
         return LaneGraph.from_model(self.compiled[1], self.path)
 
     @cached_property
     def visible(self) -> Rays:
-        """Rays that hit the visible geoms of the town alone."""
+        """Rays that hit only the visible geoms of the town, without boards or actors."""
         model = self.compiled[1]
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
@@ -111,20 +117,20 @@ class TownUnderTest:
 
     @cached_property
     def ground(self) -> Rays:
-        """Rays that hit the ground's collision geoms."""
+        """Rays that hit only the collision geoms of the ground."""
         return self._placement_rays(GROUND_GROUP)
 
     @cached_property
     def obstacles(self) -> Rays:
-        """Rays that hit all other collision geoms, the first scene's boards included."""
+        """Rays that hit the collision geoms other than the ground, with the first scene's boards."""
         return self._placement_rays(OBSTACLE_GROUP)
 
     def world(self, scene: str) -> World:
         """Composes and compiles the world of a scene.
 
         Raises:
-            UnknownNameError: there is no such scene.
-            TownError: gear cannot compose it.
+            UnknownNameError: there is no scene with this name.
+            TownError: gear cannot compose the world.
         """
         if scene not in self.scenes.scenes:
             raise UnknownNameError(f"scene of {self.scenes.town}", scene, self.scenes.scenes)
@@ -139,11 +145,11 @@ class TownUnderTest:
 
 @lru_cache(maxsize=2)
 def town_under_test(town: str, scenes: str) -> TownUnderTest:
-    """A town with its scenes, shared by all checks.
+    """A town with its scenes, shared by all checks of the town contract.
 
     Args:
         town: name of the town, or path of its MJCF.
-        scenes: path of the scene library; empty for gear's own of that town.
+        scenes: path of the scene library; empty for gear's own library of that town.
 
     Raises:
         UnknownNameError: there is no such town or scene library.

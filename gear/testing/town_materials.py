@@ -1,4 +1,4 @@
-"""Checks of a town's materials. Each function returns its findings, one line each."""
+"""Checks of a town's materials. Each function returns the problems that it finds, one line each."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ COLOUR_ROLES = (
 )
 
 LARGEST_PX = 8192
-"""Largest side of a texture. Every Vulkan driver accepts half of it; software drivers accept twice of it."""
+"""Largest allowed side of a texture. All Vulkan drivers accept at least half of it, software drivers twice as much."""
 
 
 def transparent(model: mujoco.MjModel) -> list[str]:
-    """Visible geoms with an alpha below 1, by their material or by themselves."""
+    """One line for each visible geom with an alpha below 1."""
     alpha = effective_rgba(model)[:, 3]
     return [
         f"geom {model.geom(geom).name!r} has an alpha of {alpha[geom]:g}"
@@ -33,12 +33,13 @@ def transparent(model: mujoco.MjModel) -> list[str]:
 
 
 def unphysical(model: mujoco.MjModel, most_albedo: float, faces: Mask | None = None) -> list[str]:
-    """Textures that renderers cannot show or show wrongly, and surfaces that reflect too much light.
+    """One line for each texture that renderers cannot show correctly, and for each geom that reflects too much
+    light.
 
     Args:
-        model: compiled.
+        model: the compiled model of the town or of a scene.
         most_albedo: largest allowed albedo of a geom.
-        faces: (ngeom,) bool, the faces that take patches; they are not checked, since gear makes their textures.
+        faces: (ngeom,) bool mask of the patch surfaces; they are not checked, since gear makes their textures.
     """
     looked_at = (model.geom_group < FIRST_HIDDEN_GROUP) & ~(np.zeros(model.ngeom, bool) if faces is None else faces)
     problems = []
@@ -103,7 +104,7 @@ def _too_bright(model: mujoco.MjModel, most_albedo: float, looked_at: Mask) -> l
 
 
 def _mean(model: mujoco.MjModel, texture: int) -> Array:
-    """(3,) mean of a texture's colours in linear light; a texture of one or two channels is grey by its first."""
+    """The (3,) mean colour of a texture in linear light; textures of one or two channels are grey."""
     channels, start = int(model.tex_nchannel[texture]), int(model.tex_adr[texture])
     count = int(model.tex_width[texture]) * int(model.tex_height[texture]) * channels
     pixels = model.tex_data[start : start + count].reshape(-1, channels)

@@ -1,4 +1,4 @@
-"""Checks of a town's scenes. Each function returns its findings, one line each."""
+"""Checks of a town's scenes. Each function returns the problems that it finds, one line each."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ RIG = Rig(cameras=(CameraMount(name="rgb", width_px=640, height_px=320),))
 FACE_GRID = (9, 5)
 PIXELS = 400
 NOTHING = 255
-"""Code of pixels that show nothing."""
+"""Label code of pixels that show no geom (the sky)."""
 
 CLOSED = frozenset({*GROUND_CODES, LABEL_BY_NAME["building"].code, LABEL_BY_NAME["wall"].code})
-"""Codes of labels whose surfaces have no holes."""
+"""Codes of the labels whose meshes must have no holes: ground, buildings, walls."""
 
 PINHOLES_A_MILLION = 5
-"""Number of such pixels allowed per million, because outlines that meet within a pixel look like cracks as well."""
+"""Number of pinholes allowed per million pixels, because outlines that meet within a pixel look like cracks too."""
 
 SURFACE_RATIO = 1.1
 """Depths of neighbours on one surface differ by less than this factor."""
@@ -48,7 +48,7 @@ BOARD_LOOK_M = 1.2
 
 
 def misplaced(town: TownUnderTest) -> list[str]:
-    """A scene library of another town, and boards outside of the bounds, in the air or in the ground."""
+    """One line if the scene library is that of another town, and for each board out of bounds or not on the ground."""
     problems = []
     if town.scenes.town != town.library.town_name:
         problems.append(f"the scene library is for {town.scenes.town!r}, the town is {town.library.town_name!r}")
@@ -69,7 +69,11 @@ def misplaced(town: TownUnderTest) -> list[str]:
 
 
 def unusable(town: TownUnderTest, names: Sequence[str], samples: int, min_visible: float) -> list[str]:
-    """Scenes that cannot be composed or planned, and boards that are not visible in a planned sample."""
+    """One line for each scene that cannot be composed or planned, and for each board that is hidden in a planned
+    sample.
+
+    A board is hidden if less than the share `min_visible` is visible.
+    """
     problems = []
     for name in names:
         try:
@@ -84,8 +88,11 @@ def unusable(town: TownUnderTest, names: Sequence[str], samples: int, min_visibl
 
 
 def cracks(town: TownUnderTest, samples: int) -> list[str]:
-    """Pixels below the horizon that show nothing though all around them is ground; and pinholes (`pinholes`), where
-    there are more than `PINHOLES_A_MILLION` in a million pixels."""
+    """One line for each crack between meshes in rendered samples of the first scene.
+
+    Cracks are pixels of sky below the horizon that ground surrounds, and the single pixels of `pinholes`. Pinholes are
+    reported only if there are more than `PINHOLES_A_MILLION` in a million pixels.
+    """
     world, _ = town.first_world
     planner = _planner(world, samples)
     problems: list[str] = []
@@ -120,11 +127,11 @@ def cracks(town: TownUnderTest, samples: int) -> list[str]:
 
 
 def pinholes(label_code: npt.NDArray[np.uint8], depth_m: FloatImage) -> npt.NDArray[np.int64]:
-    """Single pixels through which something farther is seen amid one closed surface: cracks between meshes.
+    """Single pixels through which something farther is visible amid one closed surface: cracks between meshes.
 
     Args:
         label_code: (H, W) codes of labels, `NOTHING` for the sky.
-        depth_m: (H, W) planar z, NaN for the sky.
+        depth_m: (H, W) depth along the camera's axis, NaN for the sky.
 
     Returns:
         (N, 2) rows and columns. All eight neighbours of such a pixel have one label of `CLOSED`, and their depths are
@@ -146,7 +153,10 @@ def pinholes(label_code: npt.NDArray[np.uint8], depth_m: FloatImage) -> npt.NDAr
 
 
 def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:
-    """Pixels, away from edges, with another id or depth than a ray through their centre, if there are too many."""
+    """One line if too few pixels of a rendered sample have the id and depth of a ray through their centre.
+
+    Up to 400 random pixels away from edges are compared.
+    """
     world, _ = town.first_world
     record = _planner(world, 1).plan(0)
     placed = world.place(record)
@@ -180,7 +190,7 @@ def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Truth:
-    """Geom ids and depth of one view, as the classic renderer gives them."""
+    """Geom ids and depth of one view, rendered by the classic renderer."""
 
     geom_id: IdImage
     depth_m: FloatImage

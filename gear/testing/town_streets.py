@@ -1,4 +1,4 @@
-"""Checks of a town's lanes, walks and parking bays. Each function returns its findings, one line each."""
+"""Checks of a town's lanes, walks and parking bays. Each function returns the problems that it finds, one line each."""
 
 from __future__ import annotations
 
@@ -28,7 +28,16 @@ CROSSWALK_REACH_M = 3.0
 
 
 def dead_ends(graph: LaneGraph, open_ends: frozenset[str], join_m: float) -> list[str]:
-    """Lanes that no lane continues, and lanes that end away from the start of the lane that continues them."""
+    """One line for each lane that no lane continues, and for each gap between a lane and the lane that continues
+    it.
+
+    Lanes in `open_ends` may end; a name in `open_ends` that is not such a lane is a problem too.
+
+    Args:
+        graph: lanes, walks and parking bays of the town.
+        open_ends: names of lanes that may end.
+        join_m: largest allowed gap.
+    """
     problems = [
         f"{lane.name} is a dead end at {_place(lane.line.points_m[-1])}: nothing in its next="
         for lane in graph.lanes.values()
@@ -45,7 +54,7 @@ def dead_ends(graph: LaneGraph, open_ends: frozenset[str], join_m: float) -> lis
 
 
 def kinks(graph: LaneGraph, most_deg: float) -> list[str]:
-    """Points at which the heading jumps, inside of a lane or between a lane and the next one."""
+    """One line for each point at which the heading jumps by more than `most_deg`, inside or at the end of a lane."""
     problems = []
     for lane in graph.lanes.values():
         turns_deg = np.degrees(np.abs([wrap_angle_rad(float(t)) for t in np.diff(_headings(lane.line))]))
@@ -61,7 +70,7 @@ def kinks(graph: LaneGraph, most_deg: float) -> list[str]:
 
 
 def odd_sizes(graph: LaneGraph, width_m: tuple[float, float], speed_mps: tuple[float, float]) -> list[str]:
-    """Lanes and walks that are too narrow or too wide, and lanes that are too slow or too fast."""
+    """One line for each lane or walk that is too narrow or too wide, and for each lane that is too slow or too fast."""
     problems = []
     for lane in graph.lanes.values():
         if not width_m[0] <= lane.width_m <= width_m[1]:
@@ -75,7 +84,7 @@ def odd_sizes(graph: LaneGraph, width_m: tuple[float, float], speed_mps: tuple[f
 
 
 def lost_neighbours(graph: LaneGraph) -> list[str]:
-    """Lanes whose `left` or `right` neighbour is not on that side, in the same direction."""
+    """One line for each lane whose `left` or `right` neighbour is not on that side or has another direction."""
     problems = []
     for lane in graph.lanes.values():
         middle_m, heading_rad = lane.line.at(lane.line.length_m / 2)
@@ -93,7 +102,7 @@ def lost_neighbours(graph: LaneGraph) -> list[str]:
 
 
 def lanes_off_the_road(town: TownUnderTest, tolerance_m: float, wheel_m: float) -> list[str]:
-    """Lanes without ground at their height, or over a surface that is no road."""
+    """One line for each lane without ground at its height, or over a surface that is no road."""
     label = {geom.id: unprefixed_class(geom.classname.name).partition(".")[0] for geom in town.compiled[0].geoms}
     problems = []
     for lane in town.graph.lanes.values():
@@ -123,7 +132,7 @@ def _wheels_off(town: TownUnderTest, lane: Lane, tolerance_m: float, wheel_m: fl
 
 
 def walks_off_the_ground(town: TownUnderTest, tolerance_m: float) -> list[str]:
-    """Sidewalks and crosswalks without ground at their height."""
+    """One line for each sidewalk or crosswalk without ground at its height."""
     problems = []
     for walk in town.graph.walks.values():
         for point_m, place in _along(walk.line):
@@ -134,7 +143,7 @@ def walks_off_the_ground(town: TownUnderTest, tolerance_m: float) -> list[str]:
 
 
 def idle_crosswalks(graph: LaneGraph) -> list[str]:
-    """Crosswalks that cross no lane, or end far from any sidewalk."""
+    """One line for each crosswalk that crosses no lane, and for each end of a crosswalk far from any sidewalk."""
     lanes = np.concatenate([np.array([p for p, _ in _along(lane.line)]) for lane in graph.lanes.values()])[:, :2]
     pavements = [walk for walk in graph.walks.values() if not walk.is_crossing]
     problems = []
@@ -150,7 +159,7 @@ def idle_crosswalks(graph: LaneGraph) -> list[str]:
 
 
 def bad_bays(town: TownUnderTest, tolerance_m: float) -> list[str]:
-    """Parking bays without ground, with an obstacle in them, or on a lane."""
+    """One line for each parking bay without ground, with an obstacle inside, or on a lane."""
     lanes = np.concatenate([np.array([p for p, _ in _along(lane.line)]) for lane in town.graph.lanes.values()])
     problems = []
     for bay in town.graph.bays:
@@ -174,7 +183,7 @@ def bad_bays(town: TownUnderTest, tolerance_m: float) -> list[str]:
 
 
 def out_of_bounds(graph: LaneGraph) -> list[str]:
-    """Lanes, walks and parking bays that leave `town.bounds`."""
+    """One line for each lane, walk and parking bay that leaves `town.bounds`."""
     xmin, ymin, xmax, ymax = graph.bounds_m
     lines = [(lane.name, lane.line.points_m) for lane in graph.lanes.values()]
     lines += [(walk.name, walk.line.points_m) for walk in graph.walks.values()]
@@ -197,7 +206,9 @@ def _off_ground(ground: Rays, point_m: Array, tolerance_m: float) -> str:
 
 
 def _along(line: Polyline, lateral_m: float = 0.0, step_m: float = STEP_M) -> Iterator[tuple[Array, str]]:
-    """Yields points spread evenly over a line, just inside of its ends, each with its name in messages."""
+    """Yields points spread evenly over a line, just inside of its ends, each with its position as a text for
+    messages.
+    """
     count = max(2, math.ceil(line.length_m / step_m) + 1)
     for s_m in np.linspace(min(0.05, line.length_m / 4), line.length_m - min(0.05, line.length_m / 4), count):
         point = line.at(float(s_m), lateral_m)[0]
