@@ -30,7 +30,7 @@ from gear.values.entry_points import identity, installed_entry_points
 
 DISTRIBUTION = "mujoco-gear"
 GROUP = "gear"
-"""Group of the entry points of plugins."""
+"""Name of the entry-point group in which packages register their gear plugins."""
 
 MOST_SPECS = 1000
 """Largest number of specs per hook; a hook that returns more is considered an endless generator."""

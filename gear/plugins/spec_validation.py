@@ -21,7 +21,7 @@ HOOK_OF: dict[Kind, str] = {
     "defense": "gear_defenses",
     "metric": "gear_metrics",
 }
-"""The name of the hook that returns the specs of a kind."""
+"""Names of the hooks that return specs, by kind of plugin."""
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 COMMON_FIELDS = frozenset(field.name for field in dataclasses.fields(Spec))

@@ -1,7 +1,9 @@
-"""The contract of attacks, as tests. Subclass it in your plugin's tests and set `spec`:
+"""The contract of attacks (what every attack plugin promises), as tests.
 
-class TestMyAttack(AttackContract):
-    spec = my_attack
+Subclass it in your plugin's tests and set `spec`:
+
+    class TestMyAttack(AttackContract):
+        spec = my_attack
 """
 
 from __future__ import annotations
@@ -38,12 +40,12 @@ class Counted:
         self.passes = 0
 
     def predict(self, views: Mapping[str, Any]) -> Any:
-        """The model's prediction for one sample; it counts as one pass."""
+        """The model's prediction for one sample; the call counts as one pass."""
         self.passes += 1
         return self.network.predict(views)
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """The model's outputs, or losses if `targets` are given, for a batch; it counts as one pass."""
+        """The model's outputs, or losses if `targets` are given, for a batch; the call counts as one pass."""
         self.passes += 1
         outputs: Mapping[str, Tensor] = self.network(views, targets)
         return outputs
@@ -196,7 +198,9 @@ class AttackContract:
             assert not difference(resumed, plain, "patches after a resumed run")
 
     def test_the_same_generator_gives_the_same_patch(self) -> None:
-        """All random choices come from `rng`, and earlier runs have no effect."""
+        """Two runs with equal random generators give equal patches, whatever was drawn from torch's generator
+        before.
+        """
         first = self.attack(self.model(), self.dataset())
         torch.rand(3)
         second = self.attack(self.model(), self.dataset())

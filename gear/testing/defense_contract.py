@@ -1,7 +1,9 @@
-"""The contract of defenses, as tests. Subclass it in your plugin's tests and set `spec`:
+"""The contract of defenses (what every defense plugin promises), as tests.
 
-class TestMedian(DefenseContract):
-    spec = median
+Subclass it in your plugin's tests and set `spec`:
+
+    class TestMedian(DefenseContract):
+        spec = median
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""The contract of metric plugins. Subclass it in your plugin's tests and set `spec`:
+"""The contract of metrics (what every metric plugin promises), as tests.
+
+Subclass it in your plugin's tests and set `spec`:
 
     class TestMyMetric(MetricContract):
         spec = my_metric

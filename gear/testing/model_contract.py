@@ -1,8 +1,10 @@
-"""The contract of models, as tests. Subclass it in your plugin's tests and set `spec`:
+"""The contract of models (what every model plugin promises), as tests.
 
-class TestMyNet(ModelContract):
-    spec = my_net
-    options = {"pretrained": False}
+Subclass it in your plugin's tests and set `spec`:
+
+    class TestMyNet(ModelContract):
+        spec = my_net
+        options = {"pretrained": False}
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""The contract of tasks, as tests. Subclass it in your plugin's tests, set `spec`, `options` and `headline`, and
-override `spoil`:
+"""The contract of tasks (what every task plugin promises), as tests.
+
+Subclass it in your plugin's tests, set `spec`, `options` and `headline`, and override `spoil`:
 
     class TestMyTask(TaskContract):
         spec = my_task

@@ -22,7 +22,7 @@ from gear.contracts.specs import ModelSpec
 from gear.values.frames import FloatImage, UInt8Image
 
 LABEL_COUNT = 34
-"""Cityscapes label ids 0..33."""
+"""Number of Cityscapes label ids (0..33)."""
 
 VIEW = "left"
 

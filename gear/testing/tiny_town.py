@@ -1,9 +1,8 @@
-"""A tiny town of boxes in MJCF, which compiles quickly and whose dimensions are round numbers.
+"""A tiny town of boxes in MJCF for tests; it compiles quickly, and its dimensions are round numbers.
 
-One straight road from west to east (lanes at y = -1.75 and 1.75, sidewalks at y = -5 and 7.5, 0.15 m high), one road
-across it at x = 30 that climbs 10 % north of y = 20, two houses, a lamp post, a bench, a traffic light, a stop sign and
-three parking bays.
-It brings its own box-shaped vehicles, people and billboard.
+One straight road leads from west to east (lanes at y = -1.75 and 1.75, sidewalks at y = -5 and 7.5, 0.15 m high).
+Another road crosses it at x = 30 and climbs 10 % north of y = 20. There are two houses, a lamp post, a bench, a traffic
+light, a stop sign and three parking bays. The town has its own box-shaped vehicles, people and billboard.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""The contract of a town, as tests. Subclass it in your own tests, and give it the town and its scenes:
+"""The contract of towns (what gear expects of every town), as tests.
+
+Subclass it in your own tests, and set the town and its scenes:
 
     class TestMyTown(TownContract):
         town = "my/towns/port.xml"
@@ -6,9 +8,11 @@
 
 The town's own file is checked against `docs/reference/mjcf.md`: labels, visible and collision geoms, materials, lanes,
 walks, parking bays, bounds and clipping planes. Then gear composes the town and plans samples of every scene; the
-boards must be in view, and rendered ids and depth must be those of rays. Boards, vehicles and people are checked as far
-as the first scene uses them: whether gear can compose them, and their materials. The fit of collision geoms and the
-number of triangles are not checked. Messages name the geom, the lane or the scene.
+billboards must be in view, and rendered ids and depth must agree with MuJoCo's rays.
+
+Of billboards, vehicles and people, only those in the first scene are checked: whether gear can compose them, and their
+materials. The fit of collision geoms and the number of triangles are not checked. Messages name the geom, the lane or
+the scene.
 """
 
 from __future__ import annotations
@@ -28,7 +32,7 @@ MESSAGES_SHOWN = 12
 STREET = frozenset(
     {"road", "road_marking", "sidewalk", "terrain", "building", "pole", "traffic_light", "traffic_sign", "vegetation"}
 )
-"""Labels that a street must have; another label of the same Cityscapes class counts as well."""
+"""Labels that a town must have by default; another label of the same Cityscapes class counts too."""
 
 PRIMITIVES = ("mjGEOM_PLANE", "mjGEOM_SPHERE", "mjGEOM_CAPSULE", "mjGEOM_CYLINDER", "mjGEOM_BOX")
 
@@ -47,10 +51,11 @@ class TownContract:
         lane_width_m, speed_mps: smallest and largest width and speed of a lane.
         ground_m: largest difference between the height of a lane or walk and its ground.
         wheel_m: half the track of a car; the ground is also checked at this distance from the middle of a lane.
-        near_m, far_m: smallest and largest distance of the near clipping plane, and smallest distance of the far one.
-        min_visible: share of each board that must be visible in each sample.
+        near_m: smallest and largest distance of the near clipping plane.
+        far_m: smallest distance of the far clipping plane.
+        min_visible: share of each billboard that must be visible in each sample.
         albedo: largest albedo of a visible geom in any colour channel.
-        min_agreement: share of pixels, away from edges, whose id and depth must be those of rays.
+        min_agreement: share of rendered pixels, away from edges, that must have the id and depth of a ray.
     """
 
     town: ClassVar[str | Path]

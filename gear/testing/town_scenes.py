@@ -44,7 +44,7 @@ BOARD_GROUND_M = 0.4
 """Largest distance of a board's foot from the ground: footings are partly in the ground, or stand out of it."""
 
 BOARD_LOOK_M = 1.2
-"""Height above a board's foot at which rays to the ground start, as in placement."""
+"""Height above a billboard's foot at which the rays to the ground start."""
 
 
 def misplaced(town: TownUnderTest) -> list[str]:

@@ -102,7 +102,14 @@ def lost_neighbours(graph: LaneGraph) -> list[str]:
 
 
 def lanes_off_the_road(town: TownUnderTest, tolerance_m: float, wheel_m: float) -> list[str]:
-    """One line for each lane without ground at its height, or over a surface that is no road."""
+    """One line for each lane whose ground or visible road is at another height, or that leads over another
+    surface.
+
+    Args:
+        town: the town under test.
+        tolerance_m: largest difference between the height of a lane and its ground.
+        wheel_m: distance from the middle of a lane at which the ground below the wheels is checked too.
+    """
     label = {geom.id: unprefixed_class(geom.classname.name).partition(".")[0] for geom in town.compiled[0].geoms}
     problems = []
     for lane in town.graph.lanes.values():
@@ -132,7 +139,7 @@ def _wheels_off(town: TownUnderTest, lane: Lane, tolerance_m: float, wheel_m: fl
 
 
 def walks_off_the_ground(town: TownUnderTest, tolerance_m: float) -> list[str]:
-    """One line for each sidewalk or crosswalk without ground at its height."""
+    """One line for each sidewalk or crosswalk that is more than `tolerance_m` above or below its ground."""
     problems = []
     for walk in town.graph.walks.values():
         for point_m, place in _along(walk.line):
@@ -159,7 +166,7 @@ def idle_crosswalks(graph: LaneGraph) -> list[str]:
 
 
 def bad_bays(town: TownUnderTest, tolerance_m: float) -> list[str]:
-    """One line for each parking bay without ground, with an obstacle inside, or on a lane."""
+    """One line for each parking bay that is above or below the ground, has an obstacle inside, or lies on a lane."""
     lanes = np.concatenate([np.array([p for p, _ in _along(lane.line)]) for lane in town.graph.lanes.values()])
     problems = []
     for bay in town.graph.bays:

@@ -1,8 +1,9 @@
-"""The scene-specific attack with the settings of the CARLA-GeAR paper, without the defects of its code.
+"""The scene-specific attack with the settings of the CARLA-GeAR paper; known errors of the published code are
+corrected.
 
-The original's step sizes are in the units of each network's input; here they are converted to patches in 0..1. Its
-segmentation networks took normalised pictures, so its step of 0.5 was 0.5 standard deviations of ImageNet. Its
-detectors and depth networks took pictures in 0..1. Its stereo network took 0..255, with a step of 10.
+The step sizes of the published code are in the units of each network's input; here they are converted to patches in
+0..1. Its segmentation networks took normalised pictures, so the step of 0.5 was 0.5 standard deviations of ImageNet.
+Its detectors and depth networks took pictures in 0..1. Its stereo network took pictures in 0..255, with a step of 10.
 """
 
 from __future__ import annotations

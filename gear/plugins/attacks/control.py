@@ -29,8 +29,7 @@ class ControlConfig:
 
     Attributes:
         kind: `noise` draws every value uniformly; `solid` is one colour; `matched` is noise with the mean colour, the
-            covariance of colours and the power spectrum of the patches in `like`, therefore as smooth and as colourful
-            as these, but not optimised.
+            covariance of colours and the power spectrum of the patches in `like`.
         height_px, width_px: size of every patch, pixels; `matched` takes the size of the patches in `like`.
         rgb: colour for `solid`, sRGB in 0..1.
         like: folder of the patches that `matched` imitates, written by `gear attack`.

@@ -1,7 +1,7 @@
 """Targeted attacks on detectors: all objects vanish, or an object appears on the patch.
 
-The ground truth is replaced by the labels that the detector shall predict, and the detector's own training losses
-against these labels are minimised, as in Lee and Kolter (2019) and in DPatch (Liu et al., 2019).
+The ground truth is replaced by the labels that the detector shall predict. The attack then minimises the detector's own
+training losses against these labels, as in Lee and Kolter (2019) and in DPatch (Liu et al., 2019).
 """
 
 from __future__ import annotations

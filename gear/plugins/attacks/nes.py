@@ -1,8 +1,7 @@
-"""A black-box attack that estimates gradients from differences of the objective: NES (Ilyas et al., ICML 2018) or
-SPSA.
+"""A black-box attack that estimates gradients from differences of the objective: NES (Ilyas et al., 2018) or SPSA.
 
-The gradient is estimated on a coarse grid, of which each cell becomes a square of the patch. The same number of queries
-therefore estimates fewer values.
+The gradient is estimated on a coarse grid, and each cell of the grid becomes a square of the patch. Far fewer values
+than pixels must therefore be estimated. NES was published at ICML 2018.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from gear.values.errors import FieldError
 from gear.values.rng import derive_rng
 
 SCHEDULE = ((0.001, 1), (0.005, 2), (0.02, 4), (0.05, 8), (0.1, 16), (0.2, 32), (0.4, 64), (0.6, 128), (0.8, 256))
-"""Pairs of a share of used queries and a divisor; up to that share the squares' area is divided by that divisor."""
+"""Pairs (share of used queries, divisor): up to that share, the first squares' area is divided by the divisor."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

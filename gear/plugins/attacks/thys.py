@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from gear.plugins.attacks.optimisation.loop import Seen
 
 SCORES = ("objectness", "cls_logits")
-"""Names of detectors' raw outputs that become scores by a sigmoid."""
+"""Names of detectors' raw outputs (logits) from which scores are computed by a sigmoid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -247,11 +247,11 @@ class Stereo3dTask:
         """A copy of the sample in which objects and detections inside the left mask are ignored, like DontCare
         regions.
 
-        The box of each connected part of the mask is such a region: a detection that matches no object is ignored if
-        more than the benchmark's share of its own box (0.7 of a car, 0.5 of a person or a cyclist) lies in the region.
-        KITTI's DontCare regions apply only to 2D boxes; these regions also apply to the bird's-eye view and to 3D. An
-        object is ignored if more than half of its visible pixels must lie in the mask, because its box has too few
-        other pixels.
+        The box of each connected part of the mask is such a region. A detection that matches no object is ignored if
+        more than a share of its own box lies in the region: 0.7 for cars, 0.5 for people and cyclists, as in the
+        benchmark. KITTI's DontCare regions apply only to 2D boxes; these regions also apply to the bird's-eye view and
+        to 3D. An object is ignored if more than half of its visible pixels must lie in the mask, because its box has
+        too few other pixels.
         """
         mask = masks[LEFT]
         objects, regions = [], list(part_boxes(mask))

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 STEP = 0.02
-"""Root mean square over the patch's values of the test step, on values in 0..1: about five levels of a byte."""
+"""Size of the test step: root mean square over the patch's values in 0..1, about five levels of 255."""
 
 
 def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequence[Tensor]) -> tuple[float, float]:

@@ -157,9 +157,9 @@ class Seen:
 Direction = Callable[[Tensor, Seen], tuple[Tensor, dict[str, float]]]
 """A function that computes an ascent direction.
 
-It takes (S, 3, h, w) textures that require gradients and a batch that shows them. It returns the direction, with the
-same shape, and scalars for the training curves. The scalars contain `gradient`, the length of the objective's gradient,
-unless nothing in the batch can be harmed any more.
+It takes (S, 3, h, w) textures that require gradients, and a batch of pictures with these textures. It returns the
+direction, with the shape of the textures, and scalars for the training curves. The scalars contain `gradient`, the
+length of the objective's gradient, unless nothing in the batch can be harmed any more.
 """
 
 

@@ -18,7 +18,7 @@ from gear.values.frames import UInt8Image
 
 DefendsBatches = Callable[[Mapping[str, Tensor]], DefendedBatch]
 CleansBatches = Callable[[Mapping[str, Tensor]], Mapping[str, Tensor]]
-"""A function that cleans pictures: from (B, 3, H, W) in 0..1 by camera name to the same."""
+"""A function that cleans pictures; it takes and returns (B, 3, H, W) tensors in 0..1 by camera name."""
 
 
 class Group(nn.Module):

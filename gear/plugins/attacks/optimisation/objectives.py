@@ -64,12 +64,12 @@ def outside(samples: Sequence[Any], view: str, device: torch.device) -> Tensor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SemsegObjective:
-    """Cross-entropy in two terms: over correctly classified pixels (Y) and over misclassified pixels (N).
+    """Cross-entropy in two terms: over the correctly classified pixels (Y) and over the misclassified pixels (N).
 
-    The two terms are those of Rossolini et al. (2022).
+    Y and N are as in Rossolini et al. (2022).
 
     Attributes:
-        gamma: weight of the term of Y; the term of N has the weight 1 - gamma. `dynamic` takes the current share of
+        gamma: weight of the term over Y; the term over N has the weight 1 - gamma. `dynamic` takes the current share of
             correctly classified pixels.
         attacked, target: label ids. Pixels of the class `attacked` (of all classes if None) are pushed to the class
             `target`. If `target` is None, the attack is untargeted.
@@ -90,8 +90,9 @@ class SemsegObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """The terms `correct` (pixels in Y) and `wrong` (pixels in N); for a targeted attack the single term
-        `target`.
+        """The terms `correct` (over correctly classified pixels) and `wrong` (over misclassified pixels).
+
+        A targeted attack has the single term `target` instead.
         """
         logits, labels, counts = self._outputs(model, views, samples)
         if self.target is not None:
@@ -108,9 +109,9 @@ class SemsegObjective:
     def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
         """The harm as one number: the weighted sum of the terms.
 
-        With a fixed `gamma`, the sets Y and N are those of the output without the patch. With the current sets the
-        value would fall while the attack succeeds: a pixel that becomes wrong leaves Y, and the mean over the remaining
-        pixels of Y is smaller.
+        With a fixed `gamma`, the correctly classified pixels are those of the output on the picture without the patch.
+        If they were taken from the current output, the value would fall while the attack succeeds, because every pixel
+        that becomes wrong leaves this set.
         """
         if not self.needs_clean_output:
             terms = [one.weight * one.value for one in self.terms(model, views, samples, indexes).values()]
@@ -167,8 +168,9 @@ class DepthObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """The terms `small` and `large` (errors up to `split_m` and above); with a direction, one term named after
-        it.
+        """The terms `small` (errors up to `split_m`) and `large` (larger errors).
+
+        With a direction there is a single term, named `farther` or `nearer`.
         """
         depth_m, clean, free = self._outputs(model, views, samples, indexes)
         if self._direction != "any":
@@ -178,10 +180,10 @@ class DepthObjective:
         return _split(error, {"small": (small, self._gamma), "large": (free & ~small, 1 - self._gamma)})
 
     def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
-        """The mean error over all pixels, small and large errors together.
+        """The harm as one number: the mean error over all pixels, small and large errors together.
 
-        A weighted sum of the means of small and large errors would fall when an error grows past `split_m`, and one
-        pixel with a large error would count for more than all pixels with small errors.
+        A weighted sum of two means would fall when an error grows past `split_m`. One pixel with a large error would
+        also count for more than all pixels with small errors.
         """
         depth_m, clean, free = self._outputs(model, views, samples, indexes)
         if self._direction != "any":
@@ -283,8 +285,8 @@ def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[
     shrinks.
 
     They are the negative mean of the scores, and the negative mean of the unrounded mask over the visible pixels of the
-    patch, as in the defense-aware attacks of Z-Mask's supplement (Rossolini et al., AAAI 2023). The result is empty for
-    a model without a defense, for a defense that returns neither score nor mask, and for weights of 0.
+    patch. Both come from the defense-aware attacks of Z-Mask's supplement (Rossolini et al., AAAI 2023). The result is
+    empty for a model without a defense, for a defense that returns neither score nor mask, and for weights of 0.
     """
     if not isinstance(member, Defended):
         return {}

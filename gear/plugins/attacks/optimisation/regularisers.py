@@ -33,9 +33,9 @@ COVERS = (0.0, 0.5, 1.0)
 
 
 def smoothness(patch: Tensor) -> Tensor:
-    """Sum of squared differences between neighbouring pixels of a (3, h, w) patch, as in the CARLA-GeAR paper.
+    """Sum of squared differences between neighbouring pixels of a (3, h, w) patch; 0 for a single colour.
 
-    The sum is 0 for a patch of a single colour.
+    It is the smoothness term of the CARLA-GeAR paper.
     """
     down, right = patch[:, 1:] - patch[:, :-1], patch[:, :, 1:] - patch[:, :, :-1]
     return down.square().sum() + right.square().sum()

@@ -10,23 +10,23 @@ from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
 LEAST_CHANGE = 12
-"""A pixel has changed if one of its channels differs by at least this (of 255). Light that a patch throws on its
-surroundings changes them by less.
+"""A pixel counts as changed if one of its channels differs by at least this value (of 255). Light that a patch
+reflects onto its surroundings changes pixels by less.
 """
 
 CLOSING_PX = 5
-"""Largest size in pixels of holes that are filled. There are holes where the patch has the colour of what it covers."""
+"""Largest size in pixels of holes in the mask that are filled; holes arise where patch and background are alike."""
 
 MOST_CHANGED = 0.5
 """If a larger share of the pixels has changed, the pictures are considered different scenes."""
 
 
 def patch_area(clean: UInt8Image, patched: UInt8Image, number: int) -> npt.NDArray[np.bool_]:
-    """The (H, W) bool mask of the pixels that show the patch, from a picture without and the same one with the
+    """The (H, W) bool mask of the pixels that show the patch, from pictures of one scene without and with the
     patch.
 
     Args:
-        clean, patched: (H, W, 3) uint8 pictures of one scene without and with the patch.
+        clean, patched: (H, W, 3) uint8 pictures without and with the patch.
         number: number of the sample, for the error message.
 
     Raises:

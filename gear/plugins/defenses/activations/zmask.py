@@ -74,7 +74,10 @@ class Learnt:
 
 
 class ZMask:
-    """The defense Z-Mask. Its statistics and its fusion block are fitted to pictures of the reference camera."""
+    """The defense Z-Mask: covers regions that over-activate shallow and deep layers of the protected network.
+
+    Its statistics and its fusion block are fitted to pictures of the reference camera.
+    """
 
     def __init__(self, settings: ZMaskConfig) -> None:
         self._settings = settings
@@ -132,7 +135,7 @@ class ZMask:
         return DefenseResult(views=cleaned, mask=masks, score=score)
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Not available, because Z-Mask needs the model and its state; `forward_fitted` takes them.
+        """Always fails, because Z-Mask needs the model and the calibrated state; `forward_fitted` takes both.
 
         Raises:
             ValueError: always.
@@ -215,7 +218,7 @@ class ZMask:
     def _seen(
         self, model: Model, look: Look[UInt8Image], layers: Layers, statistics: Mapping[str, ChannelStatistics]
     ) -> tuple[Tensor, Tensor]:
-        """The heat maps of one input of the model, mirrored back if the input is mirrored."""
+        """The shallow and the deep heat map of one network input, mirrored back if the input is mirrored."""
         grid = self._grid(*look.views[look.camera].shape[:2])
         heats = self._heats(feature_maps(model, look.views, layers.all()), grid, layers, statistics)
         return _flipped(heats) if look.is_mirrored else heats
@@ -227,9 +230,7 @@ class ZMask:
         layers: Layers,
         statistics: Mapping[str, ChannelStatistics],
     ) -> tuple[Tensor, Tensor]:
-        """The shallow and the deep heat map of one camera's features: for each cell the largest value over
-        the layers.
-        """
+        """The shallow and the deep heat map of one camera: for each cell the largest value over the layers."""
         heats = self._layer_heats(maps, grid, layers, statistics)
         first, second = (torch.stack(list(heats[kind].values())).amax(dim=0) for kind in ("shallow", "deep"))
         return first, second

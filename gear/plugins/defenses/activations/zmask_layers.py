@@ -41,7 +41,7 @@ KNOWN = (
     Layers(shallow=("spatial_1x1", "spatial_7x7", "ct2"), deep=("ct1", "ct2", "spatial_1x1")),
     Layers(shallow=("layer1",), deep=("layer1", "layer4")),
 )
-"""Layers of known networks: for DDRNet and BiSeNet those of the supplement, for ResNets those among gear's taps."""
+"""Default layers of known networks: the published layers, for ResNets only those among gear's taps."""
 
 
 def layers_of(model: Model, shallow: Sequence[str], deep: Sequence[str]) -> Layers:

@@ -13,11 +13,11 @@ class ZMaskConfig(AlarmConfig):
     """Options of Z-Mask; the defaults are those of the authors' demonstration (BiSeNet, pictures of 2048 x 1024).
 
     Attributes:
-        shallow, deep: names of the model's feature maps. Empty: the calibration selects those that separate patches
-            best, from the feature maps in the paper, or, for networks that the paper does not name, from the first and
-            the last one.
+        shallow, deep: names of the model's feature maps. If empty, the calibration selects the maps that separate
+            patches best, among those in the paper. For networks that the paper does not name, it selects among the
+            first and the last map.
         rows: number of rows of the grid on which activations are compared.
-        shallow_kernels, deep_kernels: rows of the pooling windows, large ones first; they are twice as wide.
+        shallow_kernels, deep_kernels: rows of the pooling windows, large windows first; windows are twice as wide.
         statistics_pictures: largest number of clean pictures from which statistics are computed.
         learning_pictures: largest number of pictures with patches to which the fusion block is fitted.
         steps: number of training steps; the authors train for 250 passes over 100 pictures, 15 per step.
