@@ -134,9 +134,7 @@ class BaseCompositor:
 
     @abstractmethod
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:
-        """The texels of each patch at all mip levels as a list of colours, (columns, 3) or (B, columns, 3) per
-        patch.
-        """
+        """The texels of each patch at all mip levels as a list of colours, (columns, 3) or (B, columns, 3) each."""
 
     @abstractmethod
     def _composed(self, inner: Sequence[Any], columns: Sequence[Tensor]) -> Tensor:
@@ -180,8 +178,7 @@ class _Paste(torch.autograd.Function):
 
 
 def products(matrices: Sequence[SparseMatrix], columns: Tensor) -> Tensor:
-    """Multiplies the sparse sampling matrix of each view with a patch's texels, which gives the light of the
-    pixels.
+    """Multiplies the sparse sampling matrix of each view with a patch's texels, which gives the light of the pixels.
 
     Args:
         matrices: for each view, a sparse matrix (N_i, columns) of one surface.

@@ -128,9 +128,7 @@ class Pyramid:
         return self.rows[level].shape[0], self.columns[level].shape[0]
 
     def reads(self, level: int) -> tuple[Reads, Reads, int]:
-        """How the texels of a mip level are read: the reads along both axes, and the number of columns per texel
-        row.
-        """
+        """How the texels of a mip level are read: reads along both axes, and the number of columns per texel row."""
         if level < self.folded:
             return _nonzero(self.rows[level]), _nonzero(self.columns[level]), self.width_px
         height, width = self.shape(level)

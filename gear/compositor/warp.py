@@ -13,8 +13,7 @@ from gear.values.geometry import Array
 
 
 def warp_matrix(samples: Samples, pyramid: Pyramid) -> Any:
-    """The sparse matrix of weights with which pixels read a patch's texels: trilinear filtering, repeating
-    texture.
+    """The sparse matrix of weights with which pixels read a patch's texels: trilinear filtering, repeating texture.
 
     Args:
         samples: texture samples of N pixels.

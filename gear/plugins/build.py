@@ -69,8 +69,7 @@ def build(found: PluginEntry, options: Node = NO_OPTIONS) -> Any:
 
 @contextlib.contextmanager
 def blamed(found: PluginEntry, stage: str) -> Iterator[None]:
-    """A context for running a plugin's code: exceptions get the plugin's name, and output to stdout goes to
-    stderr.
+    """A context for running a plugin's code: exceptions get the plugin's name, and output to stdout goes to stderr.
 
     Raises:
         PluginError: code of another package raised something other than a `GearError`. Exceptions of built-in plugins

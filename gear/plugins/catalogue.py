@@ -75,9 +75,7 @@ class Catalogue:
         return tuple(sorted((f for f in self.found if f.kind == kind), key=lambda f: (f.spec.name, f.owner.package)))
 
     def names(self, kind: Kind) -> tuple[str, ...]:
-        """The names by which the plugins of a kind are found: the short name if it is unique, otherwise
-        `package/name`.
-        """
+        """The names for finding the plugins of a kind: the short name if it is unique, otherwise `package/name`."""
         found = self.of_kind(kind)
         short = [f.spec.name for f in found]
         return tuple(f.spec.name if short.count(f.spec.name) == 1 else f.full_name for f in found)
@@ -99,9 +97,7 @@ class Catalogue:
         raise UnknownNameError(kind, name, self.names(kind), self.broken_hint())
 
     def broken_hint(self) -> str:
-        """A text in brackets that names the plugins that failed to load, for messages about unknown names; "" for
-        none.
-        """
+        """A text in brackets with the plugins that failed to load, for messages about unknown names; "" for none."""
         if not self.broken:
             return ""
         names = dict.fromkeys(b.owner.plugin for b in self.broken)

@@ -1,6 +1,4 @@
-"""Discovery of plugins. An error in one plugin is caught and reported with the plugin's name; other plugins are
-loaded.
-"""
+"""Discovery of plugins. An error in a plugin is reported with the plugin's name; other plugins are loaded."""
 
 from __future__ import annotations
 

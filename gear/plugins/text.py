@@ -7,8 +7,7 @@ LONGEST = 200
 
 
 def printable(text: str, longest: int = LONGEST) -> str:
-    """A text as one line of at most `longest` characters; control characters, such as terminal escapes, are
-    escaped.
+    """A text as one line of at most `longest` characters; control characters, such as terminal escapes, are escaped.
 
     Characters that the terminal's encoding lacks are not replaced here, since they depend on where the text is printed.
     """

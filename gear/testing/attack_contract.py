@@ -151,9 +151,7 @@ class AttackContract:
             return float(sum(model.forward({view: pictures}, dataset).values()))
 
     def test_the_spec_can_be_used(self) -> None:
-        """Name, protocol, config and build of the spec are valid; the attack supports the task on which it is
-        tested.
-        """
+        """Name, protocol, config and build of the spec are valid; the attack supports the task of the test."""
         check_spec("attack", self.spec, self.options)
         assert not self.spec.tasks or self.task in self.spec.tasks
         assert self.spec.max_surfaces >= 1
@@ -170,9 +168,7 @@ class AttackContract:
                 assert 0 <= float(patch.rgb.min()) <= float(patch.rgb.max()) <= 1
 
     def test_the_model_is_left_as_it_was(self) -> None:
-        """Parameters, buffers, gradients, `requires_grad` and the mode of every module are the same after
-        the attack.
-        """
+        """The attack restores parameters, buffers, gradients, `requires_grad` and the mode of every module."""
         model = self.model()
         before = state_of(model.network)
         self.attack(model, self.dataset())
@@ -185,9 +181,7 @@ class AttackContract:
         assert not difference(dataset, self.dataset(), "dataset")
 
     def test_it_can_be_watched(self) -> None:
-        """A monitor does not change the patches and receives steps in order; a saved state resumes the attack
-        exactly.
-        """
+        """A monitor receives steps in order and changes no patch; a saved state resumes the attack exactly."""
         dataset, plain = self.dataset(), self.attack(self.model(), self.dataset(), steps=4)
         monitor = RecordingMonitor()
         found = self.attack(self.model(), dataset, steps=4, monitor=monitor)
@@ -198,9 +192,7 @@ class AttackContract:
             assert not difference(resumed, plain, "patches after a resumed run")
 
     def test_the_same_generator_gives_the_same_patch(self) -> None:
-        """Two runs with equal random generators give equal patches, whatever was drawn from torch's generator
-        before.
-        """
+        """Two runs with equal random generators give equal patches, whatever torch's own generator drew before."""
         first = self.attack(self.model(), self.dataset())
         torch.rand(3)
         second = self.attack(self.model(), self.dataset())

@@ -37,8 +37,7 @@ def difference(a: Any, b: Any, where: str = "value") -> str:
 
 
 def share_apart(a: Any, b: Any, tolerance: float) -> float:
-    """The share, 0..1, of the numbers in `a` that differ from `b` by more than a relative tolerance; NaN equals
-    NaN.
+    """The share, 0..1, of the numbers in `a` that differ from `b` by more than a relative tolerance; NaN equals NaN.
 
     The tolerance is a fraction of the largest number of the array in `b`. For containers the result is the largest
     share among their items; it is 1 if shapes, types, names or counts differ.

@@ -111,9 +111,7 @@ class DefenseContract:
             assert picture.dtype == np.uint8
 
     def test_it_leaves_its_input_alone(self) -> None:
-        """The defense works on read-only pictures; each returned picture is the same array or shares no memory
-        with it.
-        """
+        """The defense works on read-only pictures; a returned picture is the same array or shares no memory with it."""
         pictures = self.pictures()
         for picture in pictures.values():
             picture.setflags(write=False)
@@ -131,9 +129,7 @@ class DefenseContract:
         assert first.score == second.score
 
     def test_outputs_are_what_the_spec_declares(self) -> None:
-        """Masks and scores are returned if and only if the spec declares them; values are in 0..1, one mask per
-        camera.
-        """
+        """Masks (one per camera) and scores are returned if and only if the spec declares them; values are in 0..1."""
         result = self.result(self.pictures())
         assert (result.mask is not None) == ("mask" in self.spec.outputs)
         assert (result.score is not None) == ("score" in self.spec.outputs)

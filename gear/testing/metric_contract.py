@@ -91,9 +91,7 @@ class MetricContract:
             assert not difference(dict(self.make().result()), empty)
 
     def test_metrics_are_numbers_by_name(self) -> None:
-        """`update` and `result` return numbers by name; those of `result` include the main metric and are not
-        infinite.
-        """
+        """`update` and `result` return numbers by name; `result` has the main metric and no infinite number."""
         for task in self.spec.tasks:
             evaluator = self.make()
             for sample, prediction in self.pairs(task):

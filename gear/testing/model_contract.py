@@ -124,9 +124,7 @@ class ModelContract:
         assert not difference(self.make().predict(pictures), self.make().predict(pictures), "prediction")
 
     def test_forward_takes_batches(self) -> None:
-        """Every output of `forward` has the batch as its first axis and does not depend on other pictures in the
-        batch.
-        """
+        """Every output of `forward` has the batch as first axis and does not depend on other pictures in the batch."""
         model, samples = self.make(), self.samples(self.spec.tasks[0])
         with torch.no_grad():
             both, one = model.forward(self.batch(samples)), model.forward(self.batch(samples[:1]))

@@ -11,9 +11,7 @@ from gear.plugins.attacks.optimisation.frozen_model import networks_of
 
 
 def state_of(model: Any) -> dict[str, str]:
-    """A snapshot of a model by name: hashes of parameters, gradients and buffers, `requires_grad`, and modules'
-    modes.
-    """
+    """A snapshot of a model: hashes of parameters, gradients and buffers, `requires_grad`, and modes, by name."""
     state: dict[str, str] = {}
     for root, network in networks_of(model):
         for name, module in network.named_modules():

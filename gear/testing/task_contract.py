@@ -106,9 +106,7 @@ class TaskContract:
         assert rig == self.task().rig()
 
     def test_sample_has_images_and_surfaces(self) -> None:
-        """A sample has the rendered picture of every view, and the ground truth of every patch surface in every
-        view.
-        """
+        """A sample has the rendered picture and the ground truth of every patch surface for every view."""
         frame, record = self.frame()
         sample = self.task().ground_truth(frame, record)
         assert sample.record == record
@@ -257,9 +255,7 @@ class TaskContract:
         assert {one.role for one in seen.detections} == {"found"}
 
     def test_reports_are_evaluators(self) -> None:
-        """Each further evaluator of `reports` accepts the task's samples without infinite metrics, and is NaN
-        without samples.
-        """
+        """Evaluators of `reports` accept the task's samples, give no infinite metric, and NaN without samples."""
         task = self.task()
         for name, evaluator in task.reports().items() if isinstance(task, Reports) else ():
             assert all(value != value for value in evaluator.result().values()), name

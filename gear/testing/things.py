@@ -83,8 +83,7 @@ SLOTS = (
 
 
 def board(distance_m: float, left_m: float = 0.0, *, surface: int = 0, bottom_m: float = 0.15) -> Thing:
-    """A billboard in front of an ego car at the origin, facing the car: a 7.4 m x 3.7 m surface on a thicker
-    board.
+    """A billboard in front of an ego car at the origin, facing the car: a 7.4 m x 3.7 m surface on a thicker board.
 
     Args:
         distance_m: distance ahead of the origin.

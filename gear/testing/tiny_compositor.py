@@ -1,5 +1,4 @@
-"""A small compositor for tests: pastes patches by homography onto the corners of their surfaces in the ground
-truth.
+"""A small compositor for tests: pastes patches by homography onto the corners of their surfaces in the ground truth.
 
 It ignores light. Attacks are tested with it without a renderer, whereas gear's exact compositor needs probes (samples
 rendered with each surface black and white).

@@ -39,8 +39,7 @@ class Rays:
     groups: tuple[int, ...]
 
     def first_hit(self, start_m: Array, along: Array) -> tuple[float, int]:
-        """Distance to the first geom that a ray hits, as a multiple of `along`, and the geom's id; infinity and -1
-        for no hit.
+        """Distance to the first geom on a ray, as a multiple of `along`, and the geom's id; infinity and -1 for no hit.
 
         Args:
             start_m: start of the ray in the world, metres.

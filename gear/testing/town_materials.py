@@ -33,8 +33,7 @@ def transparent(model: mujoco.MjModel) -> list[str]:
 
 
 def unphysical(model: mujoco.MjModel, most_albedo: float, faces: Mask | None = None) -> list[str]:
-    """One line for each texture that renderers cannot show correctly, and for each geom that reflects too much
-    light.
+    """One line for each texture that renderers cannot show correctly, and for each geom that reflects too much light.
 
     Args:
         model: the compiled model of the town or of a scene.

@@ -69,8 +69,7 @@ def misplaced(town: TownUnderTest) -> list[str]:
 
 
 def unusable(town: TownUnderTest, names: Sequence[str], samples: int, min_visible: float) -> list[str]:
-    """One line for each scene that cannot be composed or planned, and for each board that is hidden in a planned
-    sample.
+    """One line for each scene that cannot be composed or planned, and for each board hidden in a planned sample.
 
     A board is hidden if less than the share `min_visible` is visible.
     """

@@ -28,8 +28,7 @@ CROSSWALK_REACH_M = 3.0
 
 
 def dead_ends(graph: LaneGraph, open_ends: frozenset[str], join_m: float) -> list[str]:
-    """One line for each lane that no lane continues, and for each gap between a lane and the lane that continues
-    it.
+    """One line for each lane that no lane continues, and for each gap between a lane and the lane that continues it.
 
     Lanes in `open_ends` may end; a name in `open_ends` that is not such a lane is a problem too.
 
@@ -102,8 +101,7 @@ def lost_neighbours(graph: LaneGraph) -> list[str]:
 
 
 def lanes_off_the_road(town: TownUnderTest, tolerance_m: float, wheel_m: float) -> list[str]:
-    """One line for each lane whose ground or visible road is at another height, or that leads over another
-    surface.
+    """One line for each lane whose ground or visible road is at another height, or that leads over another surface.
 
     Args:
         town: the town under test.

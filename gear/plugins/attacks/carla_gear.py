@@ -1,5 +1,4 @@
-"""The scene-specific attack with the settings of the CARLA-GeAR paper; known errors of the published code are
-corrected.
+"""The scene-specific attack with the settings of the CARLA-GeAR paper, without known errors of its code.
 
 The step sizes of the published code are in the units of each network's input; here they are converted to patches in
 0..1. Its segmentation networks took normalised pictures, so the step of 0.5 was 0.5 standard deviations of ImageNet.
@@ -45,8 +44,7 @@ class CarlaGearConfig:
 
 
 class CarlaGear:
-    """The attack `carla_gear`: the gradient of each loss term is scaled to length 1, and the learning rate is
-    constant.
+    """The attack `carla_gear`: the gradient of each loss term is scaled to length 1, and the learning rate is constant.
 
     The weight gamma of the first loss term is 1 for segmentation and 0.8 for depth
     (`gear.plugins.attacks.optimisation.objectives` defines the terms).

@@ -1,6 +1,4 @@
-"""Patches that are not optimised, as a comparison for attacks: noise, one colour, or noise with the statistics
-of another patch.
-"""
+"""Patches without optimisation to compare attacks with: noise, one colour, or noise with a patch's statistics."""
 
 from __future__ import annotations
 
@@ -97,8 +95,7 @@ class Control:
 
 
 def matched(original: Floats, rng: np.random.Generator) -> Floats:
-    """Random noise with the Fourier magnitudes, the mean and the standard deviation of a picture (Galerne et al.,
-    2011).
+    """Random noise with the Fourier magnitudes, mean and standard deviation of a picture (Galerne et al., 2011).
 
     The random phases are the same for all channels, so colours vary together as in the picture. Values outside 0..1 are
     clipped, and mean and standard deviation are restored; this is repeated ten times.
@@ -121,8 +118,7 @@ def matched(original: Floats, rng: np.random.Generator) -> Floats:
 
 
 def read_exact(folder: Path) -> list[Floats]:
-    """The unrounded patches in a folder that `gear attack` wrote: (H, W, 3) in 0..1 each, in the order of the
-    surfaces.
+    """The unrounded patches in a folder that `gear attack` wrote: (H, W, 3) in 0..1 each, in the order of the surfaces.
 
     Raises:
         GearError: the folder has no file with unrounded patches, or the file is damaged.

@@ -24,8 +24,7 @@ Goal = Literal["vanish", "appear"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectionGoal:
-    """The objective of targeted attacks on detectors; `vanish` works for `detect2d` and `stereo3d`, `appear` for
-    `detect2d`.
+    """The objective of targeted attacks on detectors: `vanish` (`detect2d`, `stereo3d`) or `appear` (`detect2d`).
 
     Attributes:
         goal: `vanish`: the detector shall predict no object; `appear`: it shall predict an object on each patch.
@@ -40,17 +39,13 @@ class DetectionGoal:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One term for each loss of the detector: the negative loss against the labels that the detector shall
-        predict.
-        """
+        """One term for each loss of the detector: the negative loss against the labels that it shall predict."""
         wanted = [self.rewritten(sample) for sample in samples]
         losses = model.forward(views, wanted)
         return {name: Term(value=-loss) for name, loss in losses.items() if name not in self.left_out}
 
     def rewritten(self, sample: Any) -> Any:
-        """A copy of the sample with the labels that the detector shall predict: none, or one object on each
-        visible surface.
-        """
+        """A copy of the sample with the labels that shall be predicted: none, or an object on each visible surface."""
         objects = self._on_surfaces(sample) if self.goal == "appear" else ()
         return dataclasses.replace(sample, objects=objects)
 

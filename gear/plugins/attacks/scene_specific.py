@@ -1,5 +1,4 @@
-"""The scene-specific attack with gear's settings: Adam optimises the textures of one scene's surfaces through the
-compositor.
+"""The scene-specific attack with gear's settings: Adam optimises one scene's textures through the compositor.
 
 The method is that of CARLA-GeAR (Nesti et al., 2022), after Nesti et al. (WACV 2022), on patches in 0..1 and with a
 decreasing learning rate.

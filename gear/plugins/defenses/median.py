@@ -44,9 +44,7 @@ class Median(PerPicture):
         return np.asarray(cv2.medianBlur(np.ascontiguousarray(picture), self._side_px), np.uint8), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The median-filtered (B, 3, H, W) pictures; the gradient goes to the pixel of the window that is the
-        median.
-        """
+        """The median-filtered (B, 3, H, W) pictures; the gradient goes to the median pixel of each window."""
         from torch.nn import functional
 
         batch, channels, height, width = pictures.shape

@@ -31,9 +31,7 @@ def build(options: GlpnOptions) -> Model:
 
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
-    """Renames the tensors of a GLPDepth checkpoint, the authors' or that of transformers, to those in gear's
-    network.
-    """
+    """Renames the tensors of a GLPDepth checkpoint (the authors' or transformers') to the names in gear's network."""
     from gear.networks.depth.glpn_official import from_official
 
     return from_official(state)

@@ -180,9 +180,7 @@ class DepthTask:
         return {}
 
     def preview(self, sample: DepthSample) -> Mapping[str, UInt8Image]:
-        """Pictures for people: `image` with outlined surfaces, and `depth` in colours, from red (near) to blue;
-        black is unknown.
-        """
+        """Pictures for people: `image` with outlined surfaces, and `depth` in colours (near red, far blue)."""
         picture = sample.images[VIEW].copy()
         draw_surfaces(picture, sample, VIEW)
         colours = depth_colours(sample.depth_m)

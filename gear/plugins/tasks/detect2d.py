@@ -172,16 +172,12 @@ class Detect2dTask:
         )
 
     def encode(self, sample: Detect2dSample, info: SplitInfo) -> Encoded:
-        """Encodes the picture; the annotations go into the sample's JSON file until `finalise` writes the
-        annotation file.
-        """
+        """Encodes the picture; the annotations go into the sample's JSON file, from which `finalise` reads them."""
         files = {f"images/{info.split}/{_name(sample.record.index)}": encode_rgb(sample.images[VIEW])}
         return Encoded(files=files, facts={"objects": to_json(sample.objects)})
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """Makes the files of a whole split: the annotations, under both usual names, and poses for CARLA-GeAR's
-        loader.
-        """
+        """Makes the files of a whole split: annotations under both usual names, and poses for CARLA-GeAR's loader."""
         description = f"gear {info.town} {info.scene} {info.split}, patch: {info.patch_label}"
         writer = coco.DatasetWriter(description=description, created=info.created)
 
@@ -221,14 +217,11 @@ class Detect2dTask:
         return CocoEvaluator(self._as_shown)
 
     def reports(self) -> Mapping[str, Evaluator[Detect2dSample, tuple[coco.Detection, ...]]]:
-        """Further evaluators by name: `reference` is the AP50 of traffic's categories for objects that are tall
-        enough.
-        """
+        """Further evaluators by name: `reference` is the AP50 of traffic's categories for sufficiently tall objects."""
         return {"reference": TallObjects(self._as_shown)}
 
     def without(self, sample: Detect2dSample, masks: Masks) -> Detect2dSample:
-        """A copy of the sample in which objects and detections inside the mask are ignored, as COCO ignores
-        crowds.
+        """A copy of the sample in which objects and detections inside the mask are ignored, as COCO ignores crowds.
 
         The box of each connected part of the mask is a crowd of every category: a detection that matches no object is
         ignored at an overlap threshold t if a share of at least t of its own box lies in the crowd. An object with more
@@ -271,9 +264,7 @@ class Detect2dTask:
     def encode_prediction(
         self, sample: Detect2dSample, prediction: Sequence[coco.Detection], info: SplitInfo
     ) -> Encoded:
-        """Returns no files: the detections go into the metadata, from which `finalise_predictions` writes the
-        results file.
-        """
+        """Returns no files but the detections as metadata; `finalise_predictions` writes the results file."""
         plain = [
             coco.Detection(
                 category_id=int(one.category_id),
@@ -317,9 +308,7 @@ class Detect2dTask:
         return {"boxes": picture}
 
     def legends(self) -> Mapping[str, Legend]:
-        """The colours of the preview: one for each category that occurs in gear's towns, and grey for ignored
-        objects.
-        """
+        """The colours of the preview: one for each category in gear's towns, and grey for ignored objects."""
         occurring = sorted({label.coco_id for label in LABELS if label.coco_id is not None})
         named = tuple((coco.CATEGORY_NAMES[one], _category_colour(one)) for one in occurring)
         return {"boxes": ColourNames(entries=(*named, ("ignored", IGNORED_COLOUR)))}

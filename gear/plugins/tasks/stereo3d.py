@@ -210,9 +210,7 @@ class Stereo3dTask:
         return {**lists, f"{info.split}/label_2/camera_billboard_info.json": dump(poses)}
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Stereo3dSample:
-        """Reads a sample: both pictures from their files, and the unrounded objects from the sample's JSON file
-        (sidecar).
-        """
+        """Reads a sample: both pictures from their files, and unrounded objects from its JSON file (sidecar)."""
         record, name = sidecar.record, _name(sidecar.record.index)
         facts = expect(sidecar.facts, "baseline_m", "objects", place=root)
         baseline_m = from_json(float, facts["baseline_m"], "baseline_m")
@@ -244,8 +242,7 @@ class Stereo3dTask:
         return {"reference": NearCars(_lines, _ignored)}
 
     def without(self, sample: Stereo3dSample, masks: Masks) -> Stereo3dSample:
-        """A copy of the sample in which objects and detections inside the left mask are ignored, like DontCare
-        regions.
+        """A copy of the sample in which objects and detections inside the left mask are ignored, like DontCare regions.
 
         The box of each connected part of the mask is such a region. A detection that matches no object is ignored if
         more than a share of its own box lies in the region: 0.7 for cars, 0.5 for people and cyclists, as in the
@@ -304,9 +301,7 @@ class Stereo3dTask:
         return {}
 
     def preview(self, sample: Stereo3dSample) -> Mapping[str, UInt8Image]:
-        """Pictures for people: `left` with 3D boxes and ignored regions (dashed, grey), and `right`, both with
-        surfaces.
-        """
+        """Pictures for people: `left` with 3D boxes and (dashed) ignored regions, and `right`; both with surfaces."""
         left = sample.images[LEFT].copy()
         for thing in sample.objects:
             if thing.is_ignored:

@@ -11,8 +11,7 @@ from gear.plugins.attacks.optimisation.settings import Appearance
 
 
 def vary(appearance: Appearance, patch: Tensor, rng: np.random.Generator) -> Tensor:
-    """A random change of a patch's appearance: noise, brightness, contrast and box blur, in this order;
-    differentiable.
+    """A random change of a patch's appearance: noise, brightness, contrast and box blur, in this order; differentiable.
 
     Args:
         appearance: strengths of the changes.

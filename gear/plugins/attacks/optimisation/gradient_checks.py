@@ -12,8 +12,7 @@ STEP = 0.02
 
 
 def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequence[Tensor]) -> tuple[float, float]:
-    """The change of an objective by a small step along its gradient: as the gradient predicts it, and as it is
-    measured.
+    """The change of an objective by a small step along its gradient, as predicted by the gradient and as measured.
 
     If the measured change is far below the predicted one, the gradient is masked: by a defense, by saturation, or by
     arithmetic that is not differentiable.

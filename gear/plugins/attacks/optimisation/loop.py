@@ -61,9 +61,7 @@ class TextureOptimiser:
         self.has_gradient, self.steps_without = bool(saved["has_gradient"]), int(saved["steps_without"])
 
     def note_gradient(self, gradient: float | None) -> None:
-        """Records the length of the objective's gradient in a step; None for a step in which nothing could be
-        harmed.
-        """
+        """Records the length of the objective's gradient in a step; None if nothing could be harmed in the step."""
         self.steps_without = self.steps_without + 1 if gradient == 0 else 0
         self.has_gradient |= (gradient or 0.0) > 0
 
@@ -232,8 +230,7 @@ def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
 
 
 def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -> Direction:
-    """Makes the ascent direction of the scene-specific attack, from the objective's and the regularisers'
-    gradients.
+    """Makes the ascent direction of the scene-specific attack, from the objective's and the regularisers' gradients.
 
     The gradient of each term is scaled to length 1 (with `per_term`) and multiplied by the term's weight; the sum is
     scaled to length 1 again. The gradients of the regularisers, scaled to the lengths in the settings, are subtracted.
@@ -272,8 +269,7 @@ def one_gradient(
     value: Callable[[Tensor, Seen], Mapping[str, Tensor]],
     penalties: Callable[[Tensor], Mapping[str, Tensor]] | None = None,
 ) -> Direction:
-    """Makes the ascent direction of attacks with a single loss: the gradient of the sum of some scalars, without
-    scaling.
+    """Makes the ascent direction of attacks with a single loss: the unscaled gradient of the sum of some scalars.
 
     Args:
         value: function from textures and a batch to the objective's scalars by name; it returns an empty mapping if

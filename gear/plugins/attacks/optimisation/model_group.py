@@ -69,8 +69,7 @@ USUAL_WEIGHTS = DefenseWeights()
 
 
 class Defended(nn.Module):
-    """A model in front of which a defense cleans the pictures, for attacks that know the defense (adaptive
-    attacks).
+    """A model in front of which a defense cleans the pictures, for attacks that know the defense (adaptive attacks).
 
     Args:
         model: the model as the defense's `wrap` returned it.
@@ -121,8 +120,7 @@ class Defended(nn.Module):
         return self.model.forward(self.defended(views).views, targets)
 
     def defended(self, views: Mapping[str, Tensor]) -> DefendedBatch:
-        """The defense's result for a batch of (B, 3, H, W) pictures by camera name: pictures, and scores and masks
-        if any.
+        """The cleaned pictures of a (B, 3, H, W) batch by camera name, with the defense's scores and masks if any.
 
         The last result is cached with its autograd graph.
         """
@@ -137,8 +135,7 @@ class Defended(nn.Module):
 
 
 class Cleaned(Defended):
-    """A model in front of which a defense without gradients cleans the pictures, for attacks that need no
-    gradients.
+    """A model in front of which a defense without gradients cleans the pictures, for attacks that need no gradients.
 
     The defense receives uint8 pictures, one sample at a time.
 

@@ -82,9 +82,7 @@ class SemsegObjective:
 
     @property
     def needs_clean_output(self) -> bool:
-        """Whether `harm` needs the network's output on the picture without the patch, which costs one pass per
-        sample.
-        """
+        """Whether `harm` needs the network's output on the picture without the patch: one more pass per sample."""
         return self.target is None and self.gamma != "dynamic"
 
     def terms(
@@ -146,8 +144,7 @@ class SemsegObjective:
 
 
 class DepthObjective:
-    """Smooth L1 distance from the network's own output on the picture without the patch, in two terms by size of
-    error.
+    """Smooth L1 distance from the network's own output on the picture without the patch, in two terms by size of error.
 
     Args:
         gamma: weight of the term of small errors (at most `split_m`); the term of large errors has the weight 1 -
@@ -193,9 +190,7 @@ class DepthObjective:
     def _outputs(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """(B, H, W) depth in metres with the patch, without the patch, and the bool mask of pixels that show no
-        patch.
-        """
+        """(B, H, W) depth in metres with and without the patch, and the bool mask of pixels that show no patch."""
 
         def said(sample: Any) -> Tensor:
             return _output(model, as_batch([sample.images], list(views)), "depth_m")[0]
@@ -237,8 +232,7 @@ def counted(
     samples: Sequence[Any],
     indexes: Sequence[int],
 ) -> list[Tensor]:
-    """Scalars whose sum is the harm, by which attacks without gradients compare patches; over all members of a
-    group.
+    """Scalars whose sum is the harm, by which attacks without gradients compare patches; over all members of a group.
 
     For each member the harm is the objective's `harm` if it has this method, otherwise its weighted terms. The terms
     against a member's defense are included.
@@ -259,9 +253,7 @@ def weighted(
     samples: Sequence[Any],
     indexes: Sequence[int],
 ) -> list[Tensor]:
-    """The weighted terms of the objective as scalars, over all members of a group, for attacks that maximise their
-    sum.
-    """
+    """The weighted terms of the objective over all members of a group, for attacks that maximise their sum."""
     return [
         term.weight * term.value
         for member in members_of(model).values()
@@ -281,8 +273,7 @@ def all_terms(
 
 
 def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[Any]) -> dict[str, Term]:
-    """The terms against a model's defense: `defense_score` grows as the score falls, `defense_mask` as the mask
-    shrinks.
+    """Terms against a model's defense: `defense_score` grows as the score falls, `defense_mask` as the mask shrinks.
 
     They are the negative mean of the scores, and the negative mean of the unrounded mask over the visible pixels of the
     patch. Both come from the defense-aware attacks of Z-Mask's supplement (Rossolini et al., AAAI 2023). The result is
@@ -308,9 +299,7 @@ def not_finite(what: str, indexes: Sequence[int]) -> GearError:
 
 
 def loss_names(model: Model, sample: Any) -> list[str]:
-    """The names of a model's training losses, in the order in which the model (or each member of a group) returns
-    them.
-    """
+    """The names of a model's training losses, or of those of all members of a group, in the order of `forward`."""
     views = as_batch([sample.images], list(sample.images))
     with torch.no_grad(), frozen(model):
         found = [name for member in members_of(model).values() for name in member.forward(views, [sample])]

@@ -41,14 +41,11 @@ class Oracle:
         self._seen: set[int] = set()
 
     def state(self) -> State:
-        """The arrays for a checkpoint: the remaining queries, and the samples whose output without the patch was
-        counted.
-        """
+        """Arrays for a checkpoint: the remaining queries, and the samples whose output without patch was counted."""
         return {"left": np.array(self.left), "paid": np.array(sorted(self._seen), np.int64)}
 
     def restore(self, state: State) -> None:
-        """Restores the number of queries and the counted samples from a checkpoint that contains the arrays of
-        `state`.
+        """Restores the number of queries and the counted samples from a checkpoint that contains the arrays of `state`.
 
         Raises:
             GearError: the checkpoint lacks these arrays, or they are damaged.

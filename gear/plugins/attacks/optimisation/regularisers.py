@@ -54,8 +54,7 @@ def non_printability(patch: Tensor) -> Tensor:
 
 @functools.cache
 def palette_srgb() -> Tensor:
-    """The printable colours: (27, 3) sRGB in 0..1, all mixtures of cyan, magenta, yellow at 0, 50 and 100 %
-    coverage.
+    """The printable colours: (27, 3) sRGB in 0..1, all mixtures of cyan, magenta, yellow at 0, 50 and 100 % coverage.
 
     Half coverage mixes paper and solid ink by area (Neugebauer's equations with Demichel's areas) in linear light.
     """

@@ -18,8 +18,7 @@ PAPERS_DEEPEST = "ct1"
 
 
 def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[str]) -> dict[str, Tensor]:
-    """Feature maps of one sample: (C, h, w) float32 on the CPU by name of the tap (the layer that is read), no
-    gradients.
+    """Feature maps of one sample: (C, h, w) float32 on the CPU by name of the tap (layer), no gradients.
 
     Args:
         model: model with these taps.

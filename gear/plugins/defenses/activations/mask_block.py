@@ -25,8 +25,7 @@ constant prediction, and its IoU must be at least the second number.
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Example:
-    """A training example of the fusion block: two heat maps and the true mask of one picture, (rows, columns)
-    each.
+    """A training example of the fusion block: two heat maps and the true mask of one picture, (rows, columns) each.
 
     Attributes:
         shallow, deep: heat maps of shallow and of deep layers.
@@ -78,8 +77,7 @@ class MaskBlock:
 
 
 def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> MaskBlock:
-    """Trains a fusion block with Adam on the cross-entropy with the true masks; initial parameters come from U(0,
-    1).
+    """Trains a fusion block with Adam on the cross-entropy with the true masks; initial parameters come from U(0, 1).
 
     Initialisation and loss are the published ones. Each step uses a random subset of each picture's cells, which is
     enough for eight parameters and ten times as fast.

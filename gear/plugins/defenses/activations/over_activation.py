@@ -30,9 +30,7 @@ class ChannelStatistics:
     deviation: Tensor
 
     def z_scores(self, features: Tensor) -> Tensor:
-        """The z-scores of a (C, rows, columns) feature map: each value minus its channel's mean, divided by the
-        deviation.
-        """
+        """The z-scores of a (C, rows, columns) feature map, with the mean and the deviation of each channel."""
         mean, deviation = self.mean[:, None, None], self.deviation[:, None, None]
         return (features - mean) / (deviation + LEAST_DEVIATION)
 
@@ -116,8 +114,7 @@ def cell_auroc(heat: Tensor, truth: Tensor) -> float:
 
 
 def telling_layers(heats: Mapping[str, Sequence[Tensor]], truths: Sequence[Tensor]) -> tuple[str, ...]:
-    """Selects the layers whose common heat map (the largest value in each cell) separates patches from other cells
-    best.
+    """Selects the layers whose common heat map (largest value in each cell) separates patches from other cells best.
 
     The selection starts with the best single layer. The other layers follow in the order of their own AUROC; a layer is
     selected if it raises the mean AUROC of the common map.

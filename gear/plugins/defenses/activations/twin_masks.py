@@ -22,8 +22,7 @@ MOST_CHANGED = 0.5
 
 
 def patch_area(clean: UInt8Image, patched: UInt8Image, number: int) -> npt.NDArray[np.bool_]:
-    """The (H, W) bool mask of the pixels that show the patch, from pictures of one scene without and with the
-    patch.
+    """The (H, W) bool mask of the pixels that show the patch, from pictures of one scene without and with the patch.
 
     Args:
         clean, patched: (H, W, 3) uint8 pictures without and with the patch.

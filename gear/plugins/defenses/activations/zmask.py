@@ -1,5 +1,4 @@
-"""Z-Mask (Rossolini et al., AAAI 2023): covers regions that over-activate both shallow and deep layers of a
-network.
+"""Z-Mask (Rossolini et al., AAAI 2023): covers regions that over-activate both shallow and deep layers of a network.
 
 It follows the authors' code and supplement. Choices that these leave open are options of the plugin.
 """
@@ -67,9 +66,7 @@ class Learnt:
     report: FitReport
 
     def fit_report(self) -> FitReport:
-        """Figures on the calibration: loss and mask IoU of the fusion block on the calibration data, and the alarm
-        level.
-        """
+        """Figures on the calibration: loss and mask IoU of the fusion block on these data, and the alarm level."""
         return self.report
 
 
@@ -117,9 +114,7 @@ class ZMask:
         return Learnt(layers=layers, statistics=statistics, block=block, level=level, report=report)
 
     def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
-        """Covers regions of one sample's pictures that over-activate the network; the score is the highest over
-        the cameras.
-        """
+        """Covers regions of a sample's pictures that over-activate the network; the score is the cameras' maximum."""
         assert model is not None
         masks = {name: np.zeros(picture.shape[:2], np.float32) for name, picture in views.items()}
         score = 0.0
@@ -147,8 +142,7 @@ class ZMask:
         return self.defend_batch(views, model, state).views
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> DefendedBatch:
-        """Cleans (B, 3, H, W) pictures by camera name as `apply` does, and returns masks and scores with
-        gradients.
+        """Cleans (B, 3, H, W) pictures by camera name as `apply` does, and returns masks and scores with gradients.
 
         The gradient of the covered pictures is that of the mask before rounding.
         """

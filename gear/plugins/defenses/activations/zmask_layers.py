@@ -45,8 +45,7 @@ KNOWN = (
 
 
 def layers_of(model: Model, shallow: Sequence[str], deep: Sequence[str]) -> Layers:
-    """The layers that Z-Mask reads: those in the arguments, otherwise the published ones, otherwise first and last
-    tap.
+    """The layers that Z-Mask reads: those in the arguments, otherwise the published ones, otherwise first and last tap.
 
     Args:
         model: the network; its taps are the layers that can be read.
@@ -79,8 +78,7 @@ class Look(Generic[Shown]):
 
 
 def looks(views: Mapping[str, Shown]) -> tuple[Look[Shown], ...]:
-    """The network inputs by which every camera's picture is described by feature maps; the reference camera is
-    first.
+    """The network inputs by which every camera's picture is described by feature maps; the reference camera is first.
 
     The feature maps of a stereo network describe the left picture. In the mirrored pair the right picture becomes the
     left one, so the same network and statistics also describe the right picture. For other rigs only the first camera
