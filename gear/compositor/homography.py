@@ -1,11 +1,12 @@
 """The compositor of the CARLA-GeAR paper: a patch is pasted by homography, with its own colours.
 
-It ignores light, air and occluders; the `transport` compositor models them. It differs from the reference code in three
-points:
-- Its mask is the outline of the surface. The reference code takes all pixels that are not black.
-- It keeps all patches of a picture.
-- It filters patches that are small in the picture (2 x 2 samples per pixel, trilinear). The reference code subsamples
-  them.
+It ignores light, air and occluders, which the `transport` compositor models. It differs from the reference code in
+three points:
+
+- The mask is the outline of the surface. The reference code takes all pixels that are not black.
+- All patches of a picture are pasted.
+- Patches that are small in the picture are filtered (2 x 2 samples per pixel, trilinear). The reference code
+  subsamples such patches.
 
 Source: CARLA-GeAR (Nesti et al., 2022), section on patch generation; Nesti et al., WACV 2022.
 """

@@ -1,10 +1,12 @@
-"""The exact compositor. Light is linear, so two probe renders of a surface determine how any patch on it looks.
+"""The exact compositor: it computes the picture of any patch from two renders of each surface, black and white.
+
+This is possible because light is linear:
 
     picture = response(B + sum over i of (M_i p_i) (W_i - B))
 
-B and W_i are the probes (`gear.dataset.probe_files`): B with all surfaces black, W_i with surface i white. p_i is patch
-i as light, with its mip levels. M_i is a sparse matrix that samples it as the renderer samples its texture. If the
-dataset has sensor noise, the noise of the stored sample is added.
+B and W_i are these renders (probes; `gear.dataset.probe_files`): B with all surfaces black, W_i with surface i white.
+p_i is patch i as light, with its mip levels. M_i is a sparse matrix that samples p_i as the renderer samples a texture.
+If the dataset has sensor noise, the noise of the stored sample is added.
 """
 
 from __future__ import annotations

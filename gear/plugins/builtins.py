@@ -1,4 +1,4 @@
-"""Module names of the built-in plugins, which are registered through the same hooks as other packages' plugins."""
+"""The list of modules with built-in plugins, which use the same hooks as the plugins of other packages."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ that causes one of these during import, in a hook or in the checks of its specs 
 process.
 
 Results are stored in `~/.cache/gear/plugins.json` (`$XDG_CACHE_HOME`), by distribution, version, and time and size of
-the package's files. Failures that occur only later, for example by chance or in `build`, are not found.
+the package's files. Failures that occur only later, for example by chance or in `build`, are not detected.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LIMIT_S = 30.0
 """Time limit in seconds for the import and the hooks of a plugin; importing torch takes far less."""
 
 MOST_FILES = 2000
-"""Largest number of a package's files whose times and sizes are compared."""
+"""Largest number of a package's files whose times and sizes are compared to detect changes."""
 
 MOST_KEPT = 1000
 """Largest number of results in the cache; the newest are stored."""
@@ -128,7 +128,7 @@ sys.path[:] = json.loads(sys.argv[1])
 from gear.plugins.probe_process import main
 main(*sys.argv[2:])
 """
-"""Code of the separate process; it gets this process's import path."""
+"""Python code of the separate process, which receives the import path of this process."""
 
 
 def stamp(entry_point: EntryPoint) -> str:

@@ -30,7 +30,7 @@ UNIT_FACES = np.array(
      [1, 5, 7], [1, 7, 3]],
     dtype=np.int32,
 )  # fmt: skip
-"""Triangles of a box whose corner i has the signs of i's bits: 4 is x, 2 is y, 1 is z."""
+"""The 12 triangles of a box, as corner numbers 0..7: in a number, bit 4 is the sign of x, bit 2 of y, bit 1 of z."""
 
 
 def synthetic_frame(

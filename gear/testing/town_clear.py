@@ -23,7 +23,7 @@ CAR_SIDE_M = 1.3
 
 LANE_EDGE_M = 0.2
 COLLISION_GAP_M, VISIBLE_GAP_M = 0.2, 0.4
-"""Distances between the rays across a lane. Rays to visible geoms cost more, and posts have collision geoms too."""
+"""Distances between neighbouring rays across a lane, for collision geoms and for visible geoms (slower rays)."""
 
 PERSON_HEIGHTS_M = (0.4, 0.8, 1.3, 1.7)
 PERSON_RAYS = 3

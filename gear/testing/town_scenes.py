@@ -34,14 +34,14 @@ PINHOLES_A_MILLION = 5
 """Number of pinholes allowed per million pixels, because outlines that meet within a pixel look like cracks too."""
 
 SURFACE_RATIO = 1.1
-"""Depths of neighbours on one surface differ by less than this factor."""
+"""Depths of neighbouring pixels on one surface differ by less than this factor."""
 
 DEPTH_TOLERANCE = 1e-3
 """Largest relative error of a depth of the classic renderer, whose depth buffer is a float up to a far plane."""
 
 
 BOARD_GROUND_M = 0.4
-"""Largest distance of a board's foot from the ground: footings are partly in the ground, or stand out of it."""
+"""Largest vertical distance of a billboard's foot from the ground, because footings may be sunk or raised."""
 
 BOARD_LOOK_M = 1.2
 """Height above a billboard's foot at which the rays to the ground start."""

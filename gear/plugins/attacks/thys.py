@@ -1,7 +1,7 @@
 """The objectness attack of Thys et al. (CVPR workshops 2019) on a billboard: the detector shall detect nothing.
 
 Loss = mean over pictures of the highest objectness + 0.01 NPS + max(2.5 TV, 0.1), as published, where NPS is the
-non-printability score and TV the total variation. Adam starts from mid-grey noise with learning rate 0.03.
+non-printability score and TV the total variation. Adam starts from uniform noise in 0..1 with learning rate 0.03.
 """
 
 from __future__ import annotations

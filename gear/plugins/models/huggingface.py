@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 SEGMENTER = "AutoModelForSemanticSegmentation"
 DEPTH = "AutoModelForDepthEstimation"
 DETECTOR = "AutoModelForObjectDetection"
-"""Classes of transformers that open the three kinds of networks."""
+"""Names of the classes in transformers that load segmentation, depth and detection networks."""
 
 NORMALISATION = "as the folder's image processor says, ImageNet's without one"
 RECIPE = Recipe(learning_rate=6e-5, weight_decay=1e-2, batch=8, epochs=20, gradient_norm=1.0)

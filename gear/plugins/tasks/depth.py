@@ -1,4 +1,4 @@
-"""Monocular depth: KITTI's 16-bit pictures and exact depth files, in the folders of CARLA-GeAR."""
+"""The task of monocular depth, with KITTI's 16-bit pictures and exact depth files in the folders of CARLA-GeAR."""
 
 from __future__ import annotations
 

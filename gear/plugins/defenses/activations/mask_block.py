@@ -42,7 +42,7 @@ class MaskBlock:
     """Z-Mask's fusion block with its parameters.
 
     Attributes:
-        numbers: (8,) weights and offsets of the gate, of the mask, and of the mask's own gate.
+        numbers: (8,) parameters of the gate (v', c', v, c) and of the mask (w', b', w, b), as in the formula of `mask`.
     """
 
     numbers: Tensor

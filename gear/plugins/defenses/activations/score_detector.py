@@ -28,8 +28,8 @@ from gear.values.frames import UInt8Image
 Views = Mapping[str, UInt8Image]
 
 FOLDS = 4
-"""Number of folds for the scores of clean pictures. Each quarter is scored with the statistics of the others, because
-pictures deviate less from their own statistics than new pictures do.
+"""Number of folds for the scores of clean pictures. Each quarter of the pictures is scored with the statistics of the
+other quarters, because pictures deviate less from their own statistics than new pictures do.
 """
 
 

@@ -39,7 +39,7 @@ LAYER_PICTURES = 12
 """Largest number of patched calibration pictures from which the layers are selected."""
 
 MOSTLY = 0.5
-"""Share of a cell that the patch must cover for the cell to count as patch."""
+"""Smallest share of a grid cell that the patch must cover for the cell to count as patch."""
 
 FILL = np.array([124, 116, 104], np.uint8)
 """Fill colour of covered regions: ImageNet's mean in bytes. A network that normalises by this mean receives 0, as

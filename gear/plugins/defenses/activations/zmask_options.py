@@ -1,4 +1,4 @@
-"""Options of Z-Mask."""
+"""Options of the defense Z-Mask and their checks."""
 
 from __future__ import annotations
 
