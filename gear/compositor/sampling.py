@@ -61,7 +61,7 @@ class SampleScheme:
 
     @staticmethod
     def of(renderer_name: str, quality: Quality, effects: tuple[Effect, ...]) -> SampleScheme:
-        """The rules of a renderer at a quality, with the camera's active effects."""
+        """Makes the sampling rules of a renderer and a quality setting, with the camera's active effects."""
         is_film = quality == "film"
         return SampleScheme(
             supersampled=is_film and renderer_name != "classic",

@@ -1,4 +1,4 @@
-"""The texture samples of all pixels as one sparse matrix, from the texels of a patch's mip levels to pixels."""
+"""Converts the texture samples of all pixels to one sparse matrix, which maps a patch's texels to pixels."""
 
 from __future__ import annotations
 

@@ -198,7 +198,7 @@ class TaskContract:
         assert all(value != value for value in result.values())
 
     def test_predictions_survive_their_files(self, tmp_path: Path) -> None:
-        """Stored predictions are read exactly as they were written, and each has files of its own.
+        """Stored predictions are read exactly as they were written, and no file is written twice.
 
         The test is skipped for tasks that do not store predictions.
         """

@@ -85,7 +85,7 @@ def _stopped(town: TownUnderTest, start_m: Array, end_m: Array, edge_m: float) -
         return ""
     if is_short:
         return named
-    # No straight path leads along the whole piece; a winding one may.
+    # No straight path leads along the whole piece, but a winding path may.
     middle_m = (start_m + end_m) / 2
     return _stopped(town, start_m, middle_m, edge_m) or _stopped(town, middle_m, end_m, edge_m)
 

@@ -48,7 +48,7 @@ BOARD_LOOK_M = 1.2
 
 
 def misplaced(town: TownUnderTest) -> list[str]:
-    """One line if the scene library is that of another town, and for each board out of bounds or not on the ground."""
+    """One line for a scene library of another town, and for each board that is out of bounds or off the ground."""
     problems = []
     if town.scenes.town != town.library.town_name:
         problems.append(f"the scene library is for {town.scenes.town!r}, the town is {town.library.town_name!r}")

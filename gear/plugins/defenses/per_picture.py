@@ -73,7 +73,7 @@ class PerPicture(ABC):
 
 
 def straight_through(pictures: Tensor, cleaned: Tensor) -> Tensor:
-    """The cleaned values with the gradient of the identity (BPDA; Athalye et al., ICML 2018)."""
+    """The cleaned values, whose gradient is that of the unchanged pictures (BPDA; Athalye et al., ICML 2018)."""
     return pictures + (cleaned - pictures).detach()
 
 

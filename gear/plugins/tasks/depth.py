@@ -126,7 +126,7 @@ class DepthTask:
         records = (sidecar.record for sidecar in sidecars)
         poses = billboard_info(records, task="depth", patch_label=info.patch_label, reference=VIEW)
         return {
-            # The original's loader takes the file's numbers for metres, so its list names the float pictures.
+            # CARLA-GeAR's loader takes the file's numbers for metres, so its list names the float pictures.
             f"filenames/{info.split}_list.txt": kitti_depth.file_list([(image, metres) for image, _, metres in paths]),
             f"filenames/{info.split}_list_kitti.txt": kitti_depth.file_list(
                 [(image, units) for image, units, _ in paths]

@@ -299,7 +299,7 @@ def not_finite(what: str, indexes: Sequence[int]) -> GearError:
 
 
 def loss_names(model: Model, sample: Any) -> list[str]:
-    """The names of a model's training losses, or of those of all members of a group, in the order of `forward`."""
+    """The names of the training losses of a model, or of all members of a group, in the order of `forward`."""
     views = as_batch([sample.images], list(sample.images))
     with torch.no_grad(), frozen(model):
         found = [name for member in members_of(model).values() for name in member.forward(views, [sample])]

@@ -30,8 +30,8 @@ class Upright(Sequence[Any]):
         aspect: height of a patch divided by its width.
         share: width of a patch as a share of the picture's width.
         scales: range of the random factor on that width, drawn uniformly.
-        shift: largest shift of a patch from its regular position, as a share of its size. Regular positions divide the
-            picture's width equally.
+        shift: largest shift of a patch from its regular position, as a share of its size. Regular positions are
+            at half the height, evenly spaced over the width.
     """
 
     def __init__(

@@ -57,7 +57,7 @@ def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> d
 
     def keep(name: str) -> Callable[[nn.Module, Any, Any], None]:
         def hook(_: nn.Module, __: Any, output: Any) -> None:
-            # The output is copied, because a later layer may change it in place. Of several runs the first is kept.
+            # The output is copied, because a later layer may change it in place. Of several runs, the first counts.
             if isinstance(output, Tensor):
                 seen.setdefault(name, output[:count].to("cpu", torch.float32, copy=True))
 

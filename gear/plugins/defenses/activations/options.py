@@ -9,7 +9,7 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlarmConfig:
-    """The option that sets the raw score from which on a defense raises an alarm (a score above 0.5).
+    """The option that sets how often a defense raises a false alarm; an alarm is a score above 0.5.
 
     Attributes:
         false_alarms: share of clean calibration pictures whose score may exceed 0.5.
