@@ -78,7 +78,7 @@ class Look(Generic[Shown]):
 
 
 def looks(views: Mapping[str, Shown]) -> tuple[Look[Shown], ...]:
-    """The network inputs by which every camera's picture is described by feature maps; the reference camera is first.
+    """The network inputs whose feature maps describe the cameras' pictures; the reference camera is first.
 
     The feature maps of a stereo network describe the left picture. In the mirrored pair the right picture becomes the
     left one, so the same network and statistics also describe the right picture. For other rigs only the first camera
