@@ -1,4 +1,4 @@
-"""Finds the tensors in a checkpoint that are a network's weights.
+"""Finds the weights of a network in the file of a training checkpoint.
 
 Training code wraps networks: `DataParallel` puts `module.` before every key, `torch.compile` puts `_orig_mod.`, a
 LightningModule puts the name of its attribute. Training code also saves several states in one file (`model` and `ema`,
@@ -20,13 +20,15 @@ from torch import Tensor
 from gear.values.errors import GearError
 
 STATES = ("model", "state_dict", "model_state_dict", "model_state", "net", "network", "weights", "params", "checkpoint")
-"""Names under which checkpoints usually hold the network, the most likely first."""
+"""Usual names of the checkpoint entry that holds the network's tensors, the most likely name first."""
 
 AVERAGED = ("ema", "avg", "average", "swa", "teacher")
-"""Words in names of entries and prefixes that point to averaged weights or a teacher, not to the trained network."""
+"""Words that mark an entry or prefix as averaged weights (EMA, SWA) or a teacher network, not the trained network."""
 
 DEPTH = 4
-"""How deep nested entries are searched, and how many components a prefix may have."""
+"""Largest number of nested levels that are searched for tensors, and largest number of dot-separated parts of a
+prefix.
+"""
 
 LEAST_SHARE = 0.2
 """A prefix is tried if at least this share of an entry's keys starts with it."""
@@ -34,12 +36,12 @@ LEAST_SHARE = 0.2
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Candidate:
-    """Tensors of a checkpoint that may be a network's weights.
+    """Tensors of one checkpoint entry that may be a network's weights, with a prefix removed from their keys.
 
     Attributes:
         entry: path of the entry in the checkpoint, such as `checkpoint.model`; "" for the file's outermost mapping.
         prefix: text that was removed from the start of every key, such as `module.`; "" for nothing.
-        state: tensors by the remaining keys.
+        state: tensors by key, without the prefix.
         left_out: names of the entry's tensors whose keys do not start with the prefix.
     """
 
@@ -50,14 +52,15 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """Entry and prefix as one path, such as `checkpoint.model.module`, by which a user selects it; "" for
-        the whole file.
+        """Entry and prefix as one path, such as `checkpoint.model.module`; users select a candidate by this name.
+        "" for the whole file.
         """
         return ".".join(part for part in (self.entry, self.prefix.rstrip(".")) if part)
 
 
 def entries_of(content: Any, path: Path) -> list[Candidate]:
-    """The mappings in a checkpoint that hold tensors, the most likely network first. Keys are those of the file.
+    """The mappings in a checkpoint that hold tensors, the most likely network first. Keys are unchanged; no prefix
+    is removed.
 
     Raises:
         GearError: the checkpoint holds no tensors.
@@ -81,7 +84,9 @@ def entries_of(content: Any, path: Path) -> list[Candidate]:
 
 
 def candidates_of(entries: list[Candidate]) -> Iterator[Candidate]:
-    """Every entry, first with its own keys, then without each prefix that many of its keys share."""
+    """The candidates for a network's weights: every entry with unchanged keys, then the entry again without each
+    prefix that many of its keys share.
+    """
     for one in entries:
         yield one
         counts: Counter[str] = Counter()

@@ -21,11 +21,11 @@ from gear.networks.weights import read
 from gear.values.errors import GearError
 
 PARALLEL = "module."
-"""Prefix that `DataParallel` puts before every key."""
+"""Prefix that torch's `DataParallel` puts before every key of a state dict."""
 
 _scalar: Any = np.float64(0).__reduce__()[0]
 _array: Any = np.zeros(1).__reduce__()[0]
-"""Functions that pickles of NumPy call to make scalars and arrays; their names differ between versions of NumPy."""
+"""NumPy's functions that make scalars and arrays while a pickle is read; their names differ between NumPy versions."""
 
 PATHS = (
     (PurePosixPath, "PosixPath"),
@@ -46,7 +46,8 @@ PLAIN_GLOBALS: list[Any] = [
     types.SimpleNamespace,
     *((pure, f"{module}.{name}") for module in ("pathlib", "pathlib._local") for pure, name in PATHS),
 ]
-"""Harmless classes and functions that checkpoints often contain besides tensors; reading them runs no foreign code.
+"""Harmless classes and functions that checkpoints often contain besides tensors; loading them runs no code from
+the file.
 
 They are NumPy's numbers and arrays (the best metric so far), the parsed command line, and paths. Paths are read as pure
 paths, which never touch the disk.
@@ -55,10 +56,10 @@ paths, which never touch the disk.
 STATE_DICT_ALONE = "state dict alone (torch.save(model.state_dict(), FILE))"
 
 LOOKED_AT_BYTES = 1 << 20
-"""Number of bytes of a pickle that are searched for the name of the class that it needs."""
+"""Number of bytes at the start of a pickle that are searched for the name of the class that loading requires."""
 
 HARMLESS = ("torch", "collections", "numpy", "argparse")
-"""Packages to which checkpoints usually refer."""
+"""Packages to which checkpoints usually refer; a class of any other package is reported as the obstacle to loading."""
 
 
 def read_published(path: str | Path) -> dict[str, Tensor]:

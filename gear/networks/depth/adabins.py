@@ -1,9 +1,9 @@
-"""AdaBins as a gear network.
+"""AdaBins (monocular depth with adaptive bins) as a gear network.
 
 The position encoding of AdaBins' transformer has room for at most 500 patches of 32 x 32 pixels, and the transformer
-needs at least one token more than it has queries. A picture with more patches (2048 x 1024 has 2048) is reduced and one
-with fewer is enlarged, at its aspect ratio; the predicted depth is resized back. KITTI's 1216 x 352 has 418 patches and
-is not resized.
+needs at least one token more than it has queries. A picture with more patches (2048 x 1024 has 2048) is reduced, a
+picture with fewer patches is enlarged, both at their aspect ratio. The predicted depth is resized back. KITTI's 1216 x
+352 has 418 patches and is not resized.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from gear.networks.network import Normalise
 
 BINS = "bin_centres_m"
 CHAMFER_WEIGHT = 0.1
-"""Weight beta of the loss on bins (equation 6 of the paper)."""
+"""Weight beta of the Chamfer loss on the bin centres (equation 6 of the AdaBins paper)."""
 
 OLD_NAMES = (
     ("adaptive_bins_layer.embedding_conv.", "adaptive_bins_layer.conv3x3."),
@@ -30,7 +30,9 @@ OLD_NAMES = (
         "adaptive_bins_layer.patch_transformer.embedding_convPxP.",
     ),
 )
-"""Names of two layers in the published files, which differ from those in the authors' current code."""
+"""Pairs of key prefixes: the names of two layers in the published files, and their names in the authors' current
+code.
+"""
 
 
 class AdaBins(DepthNetwork):
@@ -46,7 +48,9 @@ class AdaBins(DepthNetwork):
         self._normalise = Normalise().to(self.device).eval()
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """`depth_m` (B, H, W) at the size of the picture, and `bin_centres_m` (B, bins); both in metres."""
+        """The outputs `depth_m` (B, H, W), at the size of the picture, and `bin_centres_m` (B, bins), the centres
+        of the depth bins; all in metres.
+        """
         height, width = (int(side) for side in picture.shape[2:])
         seen = resized(picture, *fitting(height, width, least=self.options.queries + 1))
         half_m, centres_m = self.graph(self._normalise(seen))
@@ -54,8 +58,8 @@ class AdaBins(DepthNetwork):
         return {DEPTH: depth_m[:, 0], BINS: centres_m}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """The two losses of the paper: scale-invariant error of the pixels, and Chamfer distance between bins
-        and true depths.
+        """The two losses of the AdaBins paper: scale-invariant error of the depth, and Chamfer distance between
+        bin centres and true depths.
         """
         cap_m = self.options.max_depth_m
         return {
@@ -64,7 +68,9 @@ class AdaBins(DepthNetwork):
         }
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The feature maps `stem` at 1/2 of the picture's sides, `trunk` at 1/32 and `decoder` at 1/2."""
+        """The modules whose outputs are feature maps: `stem` at 1/2 of the picture's sides, `trunk` at 1/32 and
+        `decoder` at 1/2.
+        """
         return {
             "stem": self.graph.get_submodule("encoder.original_model.blocks.0"),
             "trunk": self.graph.get_submodule("encoder.original_model.conv_head"),
@@ -73,7 +79,7 @@ class AdaBins(DepthNetwork):
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Renames the keys of published weights to those of the graph."""
+    """Renames the keys of AdaBins' published weights to the parameter names of `AdaBinsGraph`."""
     renamed = {}
     for key, tensor in state.items():
         for old, new in OLD_NAMES:

@@ -1,5 +1,5 @@
-"""AdaBins' graph (Bhat et al., CVPR 2021), written from the paper, with the parameter names of the published
-weights.
+"""The torch module of AdaBins (Bhat et al., CVPR 2021), written from the paper, with the parameter names of the
+published weights.
 """
 
 from __future__ import annotations
@@ -15,26 +15,28 @@ from gear.networks.depth.options import AdaBinsOptions
 from gear.networks.depth.packages import need_timm
 
 TAPPED = (0, 1, 2, 4)
-"""Blocks of the encoder whose outputs the decoder uses, at 1/2, 1/4, 1/8 and 1/16 of the picture's sides."""
-
-WIDTH = 128
-"""Number of channels of the feature map and of the transformer's tokens."""
-
-PATCH_PX = 16
-"""Side in cells of the patch of the feature map that becomes one token; the feature map has half the picture's
+"""Indices of the encoder's blocks from whose outputs the decoder reads, at 1/2, 1/4, 1/8 and 1/16 of the picture's
 sides.
 """
 
+WIDTH = 128
+"""Number of channels of the decoder's output and of the transformer's tokens."""
+
+PATCH_PX = 16
+"""Side, in cells of the feature map, of the square patch that becomes one transformer token. The feature map has
+half the picture's height and width.
+"""
+
 MOST_PATCHES = 500
-"""Number of position encodings, and therefore the largest number of tokens."""
+"""Number of position encodings in the transformer, and therefore the largest number of tokens."""
 
 HIDDEN = 256
 LEAST_WIDTH = 0.1
-"""Value added to the width of every bin before normalisation, so that no bin is empty."""
+"""Value added to the width of every depth bin before normalisation; it keeps bins from being empty."""
 
 
 class AdaBinsGraph(nn.Module):
-    """Encoder, decoder, and a small transformer that chooses the depth bins anew for each picture."""
+    """AdaBins: an encoder, a decoder, and a small transformer that chooses the depth bins anew for each picture."""
 
     def __init__(self, options: AdaBinsOptions) -> None:
         super().__init__()
@@ -45,10 +47,11 @@ class AdaBinsGraph(nn.Module):
         self.conv_out = nn.Sequential(nn.Conv2d(options.queries, options.bins, 1), nn.Softmax(dim=1))
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Predicts depth and bins.
+        """Predicts a depth map and the centres of the depth bins.
 
         Args:
-            pictures: (B, 3, H, W), normalised; `patches(H, W)` must lie between queries + 1 and 500.
+            pictures: (B, 3, H, W), normalised; `patches(H, W)`, the number of tokens, must lie between queries + 1 and
+                500.
 
         Returns:
             (B, 1, ceil(H / 2), ceil(W / 2)) depth in metres, and (B, bins) ascending bin centres in metres.
@@ -62,7 +65,7 @@ class AdaBinsGraph(nn.Module):
 
 
 class Encoder(nn.Module):
-    """An EfficientNet of timm without its classifier."""
+    """The encoder of AdaBins: an EfficientNet of timm without its classifier."""
 
     original_model: Any
 
@@ -76,14 +79,14 @@ class Encoder(nn.Module):
         self.original_model.classifier = nn.Identity()
 
     def widths(self) -> list[int]:
-        """Number of channels of each of the five feature maps."""
+        """Number of channels of each of the five feature maps, from the finest to the coarsest."""
         channels = {entry["module"]: entry["num_chs"] for entry in self.original_model.feature_info}
         return [*(channels[f"blocks.{index}"] for index in TAPPED), self.original_model.conv_head.out_channels]
 
     def forward(self, pictures: Tensor) -> list[Tensor]:
-        """The feature maps at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's sides.
+        """The feature maps of (B, 3, H, W) pictures at 1/2, 1/4, 1/8, 1/16 and 1/32 of their sides.
 
-        The last one is taken before its normalisation.
+        The coarsest map is taken before its normalisation layer.
         """
         network = self.original_model
         found = network.bn1(network.conv_stem(pictures))
@@ -96,7 +99,7 @@ class Encoder(nn.Module):
 
 
 class Decoder(nn.Module):
-    """Four upsampling steps; each also receives a feature map of the encoder."""
+    """The decoder of AdaBins: four upsampling steps, each of which also receives a feature map of the encoder."""
 
     def __init__(self, widths: Sequence[int], features: int) -> None:
         super().__init__()
@@ -110,7 +113,9 @@ class Decoder(nn.Module):
         self.conv3 = nn.Conv2d(features // 16, WIDTH, 3, padding=1)
 
     def forward(self, maps: Sequence[Tensor]) -> Tensor:
-        """Features (B, 128, H / 2, W / 2) from the encoder's five feature maps of (B, 3, H, W) pictures."""
+        """The (B, 128, H / 2, W / 2) features of (B, 3, H, W) pictures, computed from the encoder's five feature
+        maps.
+        """
         half, quarter, eighth, sixteenth, deepest = maps
         found = self.up1(self.conv2(deepest), sixteenth)
         found = self.up2(found, eighth)
@@ -120,7 +125,9 @@ class Decoder(nn.Module):
 
 
 class Up(nn.Module):
-    """One upsampling step: interpolation to the size of the encoder's map, then two convolutions over both maps."""
+    """One upsampling step: the coarse map is interpolated to the size of the encoder's map, then two convolutions
+    process both.
+    """
 
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
@@ -130,15 +137,15 @@ class Up(nn.Module):
         )  # fmt: skip
 
     def forward(self, coarse: Tensor, beside: Tensor) -> Tensor:
-        """(B, outputs, h, w) features with the height and width of `beside`, the encoder's map."""
+        """The (B, outputs, h, w) features with the height and width of `beside`, the encoder's map."""
         enlarged = functional.interpolate(coarse, beside.shape[2:], mode="bilinear", align_corners=True)
         found: Tensor = self._net(torch.cat([enlarged, beside], dim=1))
         return found
 
 
 class AdaptiveBins(nn.Module):
-    """The module mini-ViT (Bhat et al., section 3.2): a transformer that predicts the widths of the bins and
-    attention maps.
+    """The mini-ViT of AdaBins (Bhat et al., section 3.2): a transformer that predicts the widths of the depth
+    bins, and attention maps.
     """
 
     def __init__(self, queries: int, bins: int) -> None:
@@ -151,7 +158,9 @@ class AdaptiveBins(nn.Module):
         )
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
-        """(B, bins) widths as shares of the depth range, which sum to 1, and (B, queries, h, w) attention maps."""
+        """The (B, bins) bin widths as shares of the depth range, with sum 1, and the (B, queries, h, w) attention
+        maps.
+        """
         tokens = self.patch_transformer(features)
         widths = functional.relu(self.regressor(tokens[0])) + LEAST_WIDTH
         queries = tokens[1 : self.queries + 1]
@@ -160,7 +169,7 @@ class AdaptiveBins(nn.Module):
 
 
 class PatchTransformer(nn.Module):
-    """A transformer with four layers of attention between the patches of a feature map."""
+    """A transformer encoder with four layers of self-attention over the patches of a feature map."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -170,7 +179,7 @@ class PatchTransformer(nn.Module):
         self.positional_encodings = nn.Parameter(torch.rand(MOST_PATCHES, WIDTH))
 
     def forward(self, features: Tensor) -> Tensor:
-        """Tokens (patches, B, 128) of the patches of a feature map, row by row."""
+        """The (patches, B, 128) tokens of the feature map's patches; patches are ordered row by row."""
         patches = self.embedding_convPxP(features).flatten(2).permute(2, 0, 1)
         tokens: Tensor = self.transformer_encoder(patches + self.positional_encodings[: len(patches), None])
         return tokens
@@ -183,11 +192,12 @@ def patches(height: int, width: int) -> int:
 
 
 def fitting(height: int, width: int, least: int, most: int = MOST_PATCHES) -> tuple[int, int]:
-    """The size nearest to a picture's, at its aspect ratio, that has between `least` and `most` patches.
+    """The height and width nearest to those of a picture, at its aspect ratio, for which `patches` lies between
+    `least` and `most`.
 
     Args:
         height, width: size of the picture.
-        least, most: smallest and largest number of patches.
+        least, most: smallest and largest number of patches (transformer tokens).
 
     Returns:
         Height and width.

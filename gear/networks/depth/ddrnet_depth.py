@@ -1,4 +1,6 @@
-"""gear's fast depth network: the graph of DDRNet-23-slim with one output channel, the logarithm of depth."""
+"""gear's own fast depth network: DDRNet-23-slim with one output channel, from which depth follows as 10 m *
+exp(channel).
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ from gear.networks.network import Normalise
 from gear.networks.segmentation.ddrnet import DDRNet23Slim
 
 MIDDLE_M = 10.0
-"""Depth for a network output of 0, in metres. It is a typical depth in streets, near which training starts."""
+"""Depth in metres that a network output of 0 stands for. It is a typical depth in streets, so training starts near
+it.
+"""
 
 RANGE_M = (0.05, 1000.0)
 """Range to which predicted depths are clamped, in metres, so that all numbers are finite."""
@@ -23,7 +27,7 @@ RANGE_M = (0.05, 1000.0)
 LAST_STD = 0.05
 
 RMS_UNIT_M = 20.0
-"""A root mean square error of this many metres counts as much in the loss as a logarithmic error of 1."""
+"""Unit of the root mean square loss, in metres: an error of this size weighs as much as a logarithmic error of 1."""
 
 
 def ddrnet_depth_graph() -> DDRNet23Slim:
@@ -37,7 +41,9 @@ def ddrnet_depth_graph() -> DDRNet23Slim:
 
 
 class DdrnetDepth(DepthNetwork):
-    """gear's fast depth network: depth = 10 m * exp(channel). The channel is interpolated before the exponential."""
+    """gear's own fast depth network: depth = 10 m * exp(output channel). The channel is interpolated before the
+    exponential.
+    """
 
     multiple_px: ClassVar[int] = 8
     graph: DDRNet23Slim
@@ -47,7 +53,7 @@ class DdrnetDepth(DepthNetwork):
         self._normalise = Normalise().to(self.device).eval()
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """`depth_m` (B, h, w) in metres at the size of the input."""
+        """The output `depth_m`: (B, h, w) depth in metres at the size of the input picture."""
         height, width = (int(side) for side in picture.shape[2:])
         (channel,) = self.graph(self._normalise(picture))
         least, most = (math.log(limit_m / MIDDLE_M) for limit_m in RANGE_M)
@@ -55,7 +61,7 @@ class DdrnetDepth(DepthNetwork):
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
         """Three losses: scale-invariant error, mean relative error, and root mean square error in units of
-        `RMS_UNIT_M`.
+        20 m (`RMS_UNIT_M`).
 
         The scale-invariant error is dominated by outliers; the mean relative error is robust to them.
         """
@@ -67,5 +73,7 @@ class DdrnetDepth(DepthNetwork):
         }
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The feature maps of the graph, with the names of `gear.networks.segmentation.ddrnet`."""
+        """The modules whose outputs are feature maps: `rb1` (1/4 of the sides), `rb2` and `rbb1` (1/8), `rbb2`
+        (1/64), as in `gear.networks.segmentation.ddrnet`.
+        """
         return self.graph.taps()

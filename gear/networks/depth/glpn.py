@@ -1,9 +1,10 @@
-"""GLPDepth (Kim et al., arXiv 2201.07436): a mix transformer as encoder and a light decoder, from transformers.
+"""GLPDepth (Kim et al., arXiv 2201.07436): a mix transformer as encoder and a light decoder, from the package
+transformers.
 
-The network takes RGB in 0..1, without subtraction of a mean. Sides must be multiples of 32. Pictures of other sizes are
-extended by reflection at the top and evenly at the left and right, and the predicted depth is cut back. They are not
-resized, because that would change apparent sizes and therefore depths. The picture stays aligned at the bottom and the
-middle, as in the KITTI crops on which the published weights were trained.
+The network takes RGB in 0..1, without subtraction of a mean. Both sides of its input must be multiples of 32. Pictures
+of other sizes are extended by reflection, at the top and evenly at the left and right, and the predicted depth is
+cropped to the picture. Pictures are not resized, because that would change apparent sizes and therefore depths. Bottom
+and middle of the picture stay where they are in the KITTI crops on which the published weights were trained.
 """
 
 from __future__ import annotations
@@ -27,24 +28,28 @@ LEAST_PX = MULTIPLE_PX // 2 + 1
 
 
 class Glpn(DepthNetwork):
-    """GLPDepth; `graph` is a `GLPNForDepthEstimation` whose output 0..1 is the share of the maximum depth."""
+    """GLPDepth as a gear network; `graph` is a `GLPNForDepthEstimation` whose output is depth as a share (0..1) of
+    the maximum depth.
+    """
 
     options: GlpnOptions
     least_px: ClassVar[int] = LEAST_PX
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """`depth_m` (B, H, W) in metres at the picture's size; both sides must be above 16 pixels."""
+        """The output `depth_m`: (B, H, W) depth in metres at the picture's size; both sides must be above 16 pixels."""
         height, width = (int(side) for side in picture.shape[2:])
         top, left = -height % MULTIPLE_PX, -width % MULTIPLE_PX // 2
         shares = self.graph(mirrored(picture, MULTIPLE_PX)).predicted_depth
         return {DEPTH: self.options.max_depth_m * shares[:, top : top + height, left : left + width].float()}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """The scale-invariant logarithmic loss of the paper (equation 3)."""
+        """The scale-invariant logarithmic loss of the GLPDepth paper (equation 3)."""
         return {"silog": silog(outputs[DEPTH], depth_m, cap_m=self.options.max_depth_m)}
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The feature maps `stem` at 1/4 of the picture's sides, `trunk` at 1/32 and `decoder` at full size."""
+        """The modules whose outputs are feature maps: `stem` at 1/4 of the picture's sides, `trunk` at 1/32 and
+        `decoder` at full size.
+        """
         graph = self.graph
         return {
             "stem": graph.get_submodule("glpn.encoder.patch_embeddings.0.proj"),
@@ -54,11 +59,11 @@ class Glpn(DepthNetwork):
 
 
 def glpn_graph(options: GlpnOptions) -> nn.Module:
-    """The GLPN of transformers with random weights.
+    """The GLPN of transformers with random initial weights.
 
     The encoder is initialised as in SegFormer (Xie et al., NeurIPS 2021), the decoder by torch's default for
-    convolutions. transformers itself draws all layers with a standard deviation of 0.02, which leaves depth-wise
-    convolutions (nine inputs) almost without signal.
+    convolutions. transformers itself draws all weights with a standard deviation of 0.02. With that value the
+    depth-wise convolutions, which have only nine inputs, would pass almost no signal.
     """
     need_transformers()
     from transformers import GLPNConfig, GLPNForDepthEstimation

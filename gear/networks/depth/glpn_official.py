@@ -1,4 +1,4 @@
-"""Translates parameter names of GLPDepth's published checkpoints to those of the GLPN in transformers."""
+"""Renames parameters of GLPDepth's published checkpoints to the names of the GLPN in transformers."""
 
 from __future__ import annotations
 
@@ -28,10 +28,14 @@ NUMBERED: tuple[tuple[str, str], ...] = (
     (r"^glpn\.encoder\.block(\d)\.", "glpn.encoder.block.{}."),
     (r"^glpn\.encoder\.norm(\d)\.", "glpn.encoder.layer_norm.{}."),
 )
-"""Names of stages, which published files count from 1."""
+"""Pairs of a pattern for published keys and the key in transformers. Published files number stages from 1,
+transformers from 0.
+"""
 
 JOINT = ".attn.kv."
-"""Layers that compute keys and values together in published files; the first half of their outputs are the keys."""
+"""Part of the key of layers that compute attention keys and values jointly in published files; the first half of
+their outputs are the keys.
+"""
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:

@@ -11,17 +11,19 @@ from torch import Tensor
 from torch.nn import functional
 
 LEAST_M = 1e-3
-"""Lower limit of depths before taking logarithms, metres; no object is nearer."""
+"""Lower limit, in metres, to which depths are clamped before taking logarithms; no object is nearer."""
 
 LEAST_SQUARE = 1e-12
-"""Value added under a square root, so that its gradient stays finite where the error is 0."""
+"""Value added to the argument of a square root; it keeps the gradient finite where the error is 0."""
 
 CAP_M = 80.0
-"""Greatest depth that counts by default, in metres, as in most training and evaluation on KITTI."""
+"""Greatest true depth that the losses use by default, in metres, as in most training and evaluation on KITTI."""
 
 
 def known(depth_m: Tensor, cap_m: float | None = CAP_M) -> Tensor:
-    """(B, H, W) bool: True for pixels whose true depth is known and at most `cap_m` (None for no limit)."""
+    """The (B, H, W) bool mask of the pixels whose true depth is known and at most `cap_m` metres (None for no
+    limit).
+    """
     is_known = torch.isfinite(depth_m) & (depth_m > LEAST_M)
     return is_known if cap_m is None else is_known & (depth_m <= cap_m)
 
@@ -73,8 +75,13 @@ def log_l1(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M)
 def root_mean_square(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float = CAP_M) -> Tensor:
     """Root mean square error in metres; predictions beyond `cap_m` are set to `cap_m`, as in the evaluation.
 
-    Arguments are those of `silog`. The metric is that of Eigen et al., NeurIPS 2014. Logarithmic errors give near
-    pixels the most weight; this error gives it to far pixels.
+    The metric is that of Eigen et al., NeurIPS 2014. Logarithmic losses give near pixels the most weight; this loss
+    gives far pixels the most weight.
+
+    Args:
+        predicted_m: (B, H, W) predicted depth, above 0.
+        depth_m: (B, H, W) ground truth, NaN where unknown.
+        cap_m: greatest true depth that counts, metres.
     """
     mask = known(depth_m, cap_m)
     errors = torch.where(mask, predicted_m.clamp_max(cap_m) - torch.where(mask, depth_m, 0.0), 0.0)
@@ -86,7 +93,11 @@ def root_mean_square(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float = CAP
 def smooth_l1(predicted_m: Tensor, depth_m: Tensor, *, beta_m: float = 1.0, cap_m: float | None = CAP_M) -> Tensor:
     """Mean smooth L1 error in metres: quadratic below `beta_m`, linear above (Girshick, ICCV 2015).
 
-    Arguments are those of `silog`: (B, H, W) depths in metres, NaN where the truth is unknown.
+    Args:
+        predicted_m: (B, H, W) predicted depth, above 0.
+        depth_m: (B, H, W) ground truth, NaN where unknown.
+        beta_m: error at which the loss changes from quadratic to linear, metres.
+        cap_m: greatest true depth that counts; None for no limit.
     """
     mask = known(depth_m, cap_m)
     target_m = torch.where(mask, depth_m, predicted_m.detach())
@@ -94,11 +105,12 @@ def smooth_l1(predicted_m: Tensor, depth_m: Tensor, *, beta_m: float = 1.0, cap_
 
 
 def bins_chamfer(centres_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
-    """Chamfer distance between bin centres and depths (Fan et al., CVPR 2017; AdaBins, CVPR 2021, equation 5).
+    """Chamfer distance between the centres of depth bins and the true depths (Fan et al., CVPR 2017; AdaBins, CVPR
+    2021, equation 5).
 
-    For each picture it is the sum of two means: over known pixels, the squared distance to the nearest bin; over bins,
-    the squared distance to the nearest known depth. The result is the mean over pictures that have known pixels. In one
-    dimension nearest neighbours are found by sorting, so no table of pixels by bins is needed.
+    The distance of one picture is the sum of two means: over known pixels, the squared distance to the nearest bin
+    centre; over bins, the squared distance to the nearest known depth. The result is the mean over pictures that have
+    known pixels. Nearest neighbours are found by sorting, which needs no table of pixels by bins.
 
     Args:
         centres_m: (B, bins) centres in any order.

@@ -1,4 +1,4 @@
-"""The base class of gear's depth networks: input size, ground truth and predictions."""
+"""The base class of gear's depth networks: it resizes pictures, and converts ground truth and predictions."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class DepthNetwork(Network):
         self.input_scale = input_scale if options.input_scale is None else options.input_scale
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The output `depth_m` (B, H, W) in metres at the picture's size, and further outputs of the network, by
-        name.
+        """The network's outputs by name: `depth_m` (B, H, W), depth in metres at the picture's size, and the
+        further outputs of `estimate`.
         """
         picture = pictures[VIEW]
         height, width = (int(side) for side in picture.shape[2:])
@@ -57,12 +57,12 @@ class DepthNetwork(Network):
         return outputs
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The losses of the network's outputs against the samples' `depth_m`, by name."""
+        """The scalar losses by name, computed from the network's outputs and the samples' ground truth `depth_m`."""
         depth_m = torch.from_numpy(np.stack([target.depth_m for target in targets])).to(outputs[DEPTH])
         return self.depth_losses(outputs, depth_m)
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
-        """(H, W) float32 depth in metres for each picture."""
+        """The predicted depth of each picture: (H, W) float32 in metres."""
         return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
 
     def _seen(self, side_px: int) -> int:
@@ -71,18 +71,18 @@ class DepthNetwork(Network):
 
     @abstractmethod
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """Runs the graph; subclasses implement this.
+        """Runs the graph (the torch module) on pictures; subclasses implement this method.
 
         Args:
             picture: (B, 3, H, W) in 0..1.
 
         Returns:
-            `depth_m` (B, h, w) of any size, and further outputs that the losses need.
+            `depth_m` (B, h, w) in metres, of any size, and further outputs that the losses need.
         """
 
     @abstractmethod
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """Losses by name; subclasses implement this.
+        """Computes the scalar losses by name; subclasses implement this method.
 
         Args:
             outputs: result of `run`.
@@ -91,8 +91,8 @@ class DepthNetwork(Network):
 
 
 def resized(maps: Tensor, height: int, width: int) -> Tensor:
-    """Resizes (B, C, H, W) maps bilinearly; reducing averages (anti-aliasing). Maps of the wanted size are
-    returned unchanged.
+    """Resizes (B, C, H, W) maps to `height` and `width`: bilinearly, with anti-aliasing when reducing. Maps that
+    have this size already are returned unchanged.
     """
     if tuple(maps.shape[2:]) == (height, width):
         return maps

@@ -12,7 +12,9 @@ STAGES = 4
 """Number of stages of a mix transformer."""
 
 HEADS = (1, 2, 5, 8)
-"""Number of attention heads in each stage of a mix transformer, which is the same for all sizes."""
+"""Number of attention heads in each of the four stages of a mix transformer; all sizes (b0 to b5) have the same
+numbers.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Imports the optional packages of depth networks; a missing package gives a clear error."""
+"""Imports the optional packages of depth networks; the error for a missing package states what to install."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gear.values.errors import GearError
 
 
 def need_transformers() -> None:
-    """Imports the package transformers.
+    """Imports the optional package transformers.
 
     Raises:
         GearError: transformers is not installed.
@@ -19,7 +19,7 @@ def need_transformers() -> None:
 
 
 def need_timm() -> None:
-    """Imports the package timm.
+    """Imports the optional package timm.
 
     Raises:
         GearError: timm is not installed, or torchvision is not, which timm imports.

@@ -1,4 +1,4 @@
-"""Faster R-CNN (Ren et al., 2015) with a feature pyramid, on the model of torchvision."""
+"""Faster R-CNN (Ren et al., 2015) with a feature pyramid, built on the implementation of torchvision."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ OBJECTNESS, RPN_DELTAS, ANCHORS_PX = "objectness", "rpn_bbox_regression", "ancho
 PROPOSALS, LOGITS, DELTAS = "proposals_px", "class_logits", "box_regression"
 
 MAPS = ("0", "1", "2", "3", "pool")
-"""Names that torchvision gives to the feature maps at 1/4 to 1/64 of the graph's input."""
+"""Names that torchvision gives to the feature maps at 1/4 to 1/64 of the sides of the graph's input."""
 
 SURE_BACKGROUND = 20.0
-"""Background logit of the empty proposals that fill up a picture's list."""
+"""Background logit of the empty proposals with which a picture's list of proposals is padded to a fixed length."""
 
 
 class FasterRcnnDetector(Detector):
@@ -39,18 +39,18 @@ class FasterRcnnDetector(Detector):
 
     Outputs of the region proposal network, for N anchors: `objectness` (B, N), `rpn_bbox_regression` (B, N, 4) and
     `anchors_px` (B, N, 4). Outputs of the second stage, for R proposals: `class_logits` (B, R, 91), `box_regression`
-    (B, R, 364) and `proposals_px` (B, R, 4). R is fixed; a picture with fewer proposals is filled up with empty boxes
-    of background. Boxes are left, top, right, bottom in edge pixels of the picture. Losses are `loss_classifier`,
-    `loss_box_reg`, `loss_objectness` and `loss_rpn_box_reg`.
+    (B, R, 364) and `proposals_px` (B, R, 4). R is fixed; the proposals of a picture with fewer are padded with empty
+    boxes of class background. Boxes are left, top, right, bottom in edge pixels of the picture. Losses are
+    `loss_classifier`, `loss_box_reg`, `loss_objectness` and `loss_rpn_box_reg`.
     """
 
     generator = "rpn.anchor_generator"
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Outputs of the region proposal network and of the second stage.
+        """Outputs of the region proposal network and of the second stage, by name.
 
-        Pictures are processed one by one. Convolutions over a batch round differently from those over one picture, and
-        the smallest difference may change which proposals are kept, and with them all further outputs.
+        Pictures are processed one by one, because convolutions over a batch round differently from convolutions over a
+        single picture. The smallest difference may change which proposals are kept, and thereby all further outputs.
         """
         each = [self._run_one(picture[None]) for picture in pictures[VIEW]]
         return {name: torch.cat([outputs[name] for outputs in each]) for name in each[0]}
@@ -74,7 +74,7 @@ class FasterRcnnDetector(Detector):
         }
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The inputs of `losses`: feature maps, outputs of the region proposal network, anchors in pixels of the
+        """The input of `losses`: feature maps, outputs of the region proposal network, anchors in pixels of the
         graph's input, and the picture's size.
         """
         from torchvision.models.detection.rpn import concat_box_prediction_layers
@@ -93,9 +93,10 @@ class FasterRcnnDetector(Detector):
         }
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The losses of torchvision; background that lies mostly inside ignored objects is never sampled.
+        """The four losses of torchvision by name. Background that lies mostly inside ignored objects is never
+        sampled.
 
-        Anchors and proposals are sampled with `options.seed`, so each call samples the same ones. In training mode
+        Anchors and proposals are sampled with `options.seed`, so each call samples the same ones. In training mode,
         torch's own generator samples them.
         """
         wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]

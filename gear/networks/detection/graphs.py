@@ -16,30 +16,38 @@ from gear.networks.efficientnet_lite0 import CHANNELS as LITE0_CHANNELS
 from gear.networks.efficientnet_lite0 import OnLite0, features_of_lite0
 
 TRAINABLE_STAGES = 3
-"""Number of trainable stages of the published detectors; the stem and the first stage keep their ImageNet weights."""
+"""Number of trainable stages of the published detectors' backbone; its stem and its first stage keep their
+ImageNet weights.
+"""
 
 CHANNELS = 128
-"""Number of channels of the pyramid and the heads of gear's reference detectors."""
+"""Number of channels of the feature pyramid and the heads of gear's reference detectors."""
 
 GROUPS = 32
 
 STRIDES_PX = (8, 16, 32, 64, 128)
 ANCHOR_STRIDES = 1.5
-"""Side of the smallest anchor of a feature map, in strides of the map; it is 4 in the published networks."""
+"""Side of the smallest anchor of a feature map, in strides of that map; the published networks use 4."""
 
 OCTAVES = (1.0, 2 ** (1 / 3), 2 ** (2 / 3))
 ASPECT_RATIOS = (0.5, 1.0, 2.0)
-"""Height divided by width of the anchors."""
+"""Aspect ratios of the anchors: height divided by width."""
 
 LITE0_LEVELS = (2, 3, 4)
-"""Indices in `gear.networks.efficientnet_lite0.LEVELS` of the feature maps at 1/8, 1/16 and 1/32."""
+"""Levels of EfficientNet-Lite0 that feed the pyramid: the feature maps at 1/8, 1/16 and 1/32 (indices into
+`gear.networks.efficientnet_lite0.LEVELS`).
+"""
 
 LITE0_HEAD_DEPTH = 2
-"""Number of convolutions in each head on EfficientNet-Lite0; RetinaNet's four would take half of each step on a CPU."""
+"""Number of convolutions in each head on EfficientNet-Lite0. RetinaNet's four would take half of the time of a
+training step on a CPU.
+"""
 
 
 def fasterrcnn_r50_fpn(least_score: float) -> nn.Module:
-    """Faster R-CNN on ResNet-50 with a feature pyramid, as published: FrozenBatchNorm2d with eps 0, 91 classes."""
+    """Faster R-CNN on ResNet-50 with a feature pyramid, as in the published weights: FrozenBatchNorm2d with eps 0,
+    91 classes.
+    """
     torchvision_import.need()
     from torchvision.models.detection import FasterRCNN
     from torchvision.models.detection._utils import overwrite_eps
@@ -51,7 +59,9 @@ def fasterrcnn_r50_fpn(least_score: float) -> nn.Module:
 
 
 def retinanet_r50_fpn(least_score: float) -> nn.Module:
-    """RetinaNet on ResNet-50 with a feature pyramid, as published: FrozenBatchNorm2d with eps 0, 91 classes."""
+    """RetinaNet on ResNet-50 with a feature pyramid, as in the published weights: FrozenBatchNorm2d with eps 0, 91
+    classes.
+    """
     torchvision_import.need()
     from torchvision.models.detection import RetinaNet
     from torchvision.models.detection._utils import overwrite_eps
@@ -64,7 +74,9 @@ def retinanet_r50_fpn(least_score: float) -> nn.Module:
 
 
 def retinanet_r18_fpn(classes: int, least_score: float) -> nn.Module:
-    """RetinaNet on ResNet-18, all layers trainable; see `reference_retinanet`."""
+    """RetinaNet on ResNet-18, all layers trainable, with narrow heads, group normalisation and small anchors
+    (`reference_retinanet`).
+    """
     torchvision_import.need()
     from torchvision.models import resnet18
     from torchvision.models.detection.backbone_utils import BackboneWithFPN
@@ -81,7 +93,9 @@ def retinanet_r18_fpn(classes: int, least_score: float) -> nn.Module:
 
 
 def retinanet_lite0_fpn(classes: int, least_score: float) -> nn.Module:
-    """RetinaNet on EfficientNet-Lite0, all layers trainable; see `reference_retinanet`."""
+    """RetinaNet on EfficientNet-Lite0, all layers trainable, with narrow heads, group normalisation and small
+    anchors (`reference_retinanet`).
+    """
     graph = reference_retinanet(LitePyramid(), classes, least_score)
     heads: Any = graph.head
     for head in (heads.classification_head, heads.regression_head):
@@ -90,10 +104,10 @@ def retinanet_lite0_fpn(classes: int, least_score: float) -> nn.Module:
 
 
 def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -> nn.Module:
-    """RetinaNet of torchvision with narrower heads, group normalisation and smaller anchors.
+    """torchvision's RetinaNet with narrower heads, group normalisation and smaller anchors.
 
-    The network receives pictures at about half their size, where a person of 32 pixels height is 16 pixels high and 6
-    wide.
+    Anchors are small because the network receives pictures at about half their size: a person of 32 pixels height is
+    then only 16 pixels high and 6 wide.
 
     Args:
         backbone: trunk with a feature pyramid.
@@ -117,7 +131,7 @@ def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -
 
 
 class LitePyramid(OnLite0):
-    """EfficientNet-Lite0 with a feature pyramid, instead of torchvision's `BackboneWithFPN`."""
+    """A backbone: EfficientNet-Lite0 with a feature pyramid. It takes the place of torchvision's `BackboneWithFPN`."""
 
     out_channels = CHANNELS
 
@@ -132,14 +146,14 @@ class LitePyramid(OnLite0):
         self.fpn = FeaturePyramidNetwork(channels, CHANNELS, extra_blocks=LastLevelP6P7(CHANNELS, CHANNELS))
 
     def lite0(self) -> nn.Module:
-        """The trunk, an EfficientNet-Lite0."""
+        """The trunk, an EfficientNet-Lite0 whose outputs feed the pyramid."""
         return self.body
 
     def forward(self, pictures: Tensor) -> Mapping[str, Tensor]:
-        """Feature maps by level, with torchvision's names.
+        """The pyramid's feature maps by level, under torchvision's names.
 
-        They are in channels-last memory format. In the other format, gradients of depth-wise convolutions take up to
-        ten times as long on a CPU, and a whole training step takes a seventh longer.
+        The maps are in channels-last memory format. In the default format, gradients of depth-wise convolutions take up
+        to ten times as long on a CPU, and a whole training step takes a seventh longer.
         """
         stages = self.body(pictures.contiguous(memory_format=torch.channels_last))
         maps: Mapping[str, Tensor] = self.fpn(OrderedDict((str(i), each) for i, each in enumerate(stages)))

@@ -1,8 +1,8 @@
-"""The base class of gear's 2D detectors: input size, ground truth and predictions.
+"""The base class of gear's 2D detectors: it resizes pictures, and converts ground truth and predictions.
 
-Outputs are in pixels of the picture, at whatever size the network runs. Losses are in pixels of the graph's input, like
-those of torchvision: there, all anchors that contain an object completely have exactly equal overlaps, and all of them
-are trained on the object. In other units rounding would make the overlaps unequal.
+Outputs are in pixels of the picture, whatever the size of the network's input. Losses are in pixels of the graph's
+input, as in torchvision: in this unit all anchors that contain an object completely have exactly equal overlaps, and
+all of them are trained on the object. In other units rounding would make the overlaps unequal.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from gear.networks.network import IMAGENET_MEAN, IMAGENET_STD, Network, Normalis
 
 VIEW = "left"
 DIVISOR_PX = 32
-"""The sides of the graph's input are padded to multiples of this, as in torchvision."""
+"""The sides of the graph's input are padded to multiples of this number of pixels, as in torchvision."""
 
 ANCHORS, PICTURE = "anchors", "picture_px"
-"""Names of two further inputs of the losses: anchors (B, N, 4) in pixels of the graph's input, and the pictures'
-height and width (B, 2).
+"""Names of two further inputs of the losses: the anchors, (B, N, 4) in pixels of the graph's input, and the height
+and width of the pictures, (B, 2).
 """
 
 MOSTLY = 0.5
-"""Background is not used in training if at least this share of its area lies inside ignored objects."""
+"""Share of its area, 0..1, from which a background box inside ignored objects is left out of training."""
 
 Size = tuple[int, int]
 """Height and width in pixels."""
@@ -37,11 +37,11 @@ Size = tuple[int, int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sizing:
-    """How a picture is converted to the graph's input.
+    """How a picture is converted to the input of the graph (the torch module): its size and its normalisation.
 
     Attributes:
-        inner_px: function from height and width of the picture to those of the graph's input.
-        smooth: whether reducing averages (anti-aliasing); torchvision's detectors do not.
+        inner_px: function from height and width of the picture to height and width of the graph's input.
+        smooth: whether pictures are reduced with anti-aliasing; torchvision's detectors do without.
         mean, std: normalisation of the three channels.
     """
 
@@ -53,7 +53,7 @@ class Sizing:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Targets:
-    """Ground truth of one picture, in pixels of the graph's input.
+    """Ground truth of one picture for the losses, in pixels of the graph's input.
 
     Attributes:
         boxes: (N, 4) float32 left, top, right, bottom.
@@ -66,17 +66,17 @@ class Targets:
     ignored: Tensor
 
     def as_torchvision(self) -> dict[str, Tensor]:
-        """The dictionary that the losses of torchvision expect."""
+        """The same ground truth as the dictionary that the losses of torchvision expect: `boxes` and `labels`."""
         return {"boxes": self.boxes, "labels": self.labels}
 
 
 class Detector(Network):
-    """A detection model of torchvision as a gear network; predictions have COCO's categories."""
+    """Base class of gear networks that wrap a detection model of torchvision; predictions have COCO's categories."""
 
     options: DetectorOptions
     has_quick_copy = True
     generator: ClassVar[str] = "anchor_generator"
-    """Name of the graph's attribute that holds its anchor generator."""
+    """Name of the attribute under which the graph holds its anchor generator."""
 
     def __init__(
         self, graph: nn.Module, options: DetectorOptions, *, sizing: Sizing, categories: Sequence[int | None]
@@ -95,15 +95,15 @@ class Detector(Network):
         self.normalise = Normalise(sizing.mean, sizing.std).to(self.device).eval()
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The feature maps at the ends of the backbone's stages, `layer1` (1/4 of the graph's input) to `layer4`
-        (1/32).
+        """The modules whose outputs are feature maps: the ends of the backbone's stages, `layer1` (1/4 of the
+        graph's input) to `layer4` (1/32).
         """
         body = self.graph.get_submodule("backbone.body")
         return {name: body.get_submodule(name) for name in ("layer1", "layer2", "layer3", "layer4")}
 
     def seen(self, pictures: Tensor) -> Tensor:
-        """(B, 3, h, w) input of the graph: the pictures resized, normalised, and padded with zeros at the bottom
-        and the right.
+        """The (B, 3, h, w) input of the graph: the pictures resized, normalised, and padded with zeros at the
+        bottom and the right.
         """
         size = size_of(pictures)
         inner, (height, width) = self.sizing.inner_px(size), self.seen_px(size)
@@ -115,12 +115,14 @@ class Detector(Network):
         return functional.pad(pixels, (0, width - inner[1], 0, height - inner[0]))
 
     def seen_px(self, picture_px: Size) -> Size:
-        """Height and width of the graph's input for a picture, including the padding."""
+        """Height and width, including the padding, of the graph's input for a picture of height and width
+        `picture_px`.
+        """
         height, width = self.sizing.inner_px(picture_px)
         return height + -height % DIVISOR_PX, width + -width % DIVISOR_PX
 
     def anchors(self, picture_px: Size, grids: Sequence[Size]) -> Tensor:
-        """(N, 4) anchors in pixels of the graph's input.
+        """The (N, 4) anchors of all feature maps: left, top, right, bottom in pixels of the graph's input.
 
         Args:
             picture_px: height and width of the picture.
@@ -135,16 +137,16 @@ class Detector(Network):
         return found
 
     def shrinkage(self, picture_px: Size) -> Tensor:
-        """(4,) factors from box coordinates in the picture to box coordinates in the graph's input."""
+        """The (4,) factors that convert box coordinates in the picture to box coordinates in the graph's input."""
         height, width = self.sizing.inner_px(picture_px)
         inner = torch.tensor([width, height] * 2, dtype=torch.float32, device=self.device)
         return inner / torch.tensor([picture_px[1], picture_px[0]] * 2, dtype=torch.float32, device=self.device)
 
     def targets(self, sample: Any, picture_px: Size) -> Targets:
-        """Ground truth of a sample.
+        """The ground truth of a sample for the losses, in pixels of the graph's input.
 
-        Objects of classes that the network does not have are ignored. So are boxes without area, because the logarithms
-        of their sides cannot be learnt.
+        Objects of classes that the network does not have are ignored. Boxes without area are ignored as well, because
+        the logarithms of their sides cannot be learnt.
         """
         shrinkage = self.shrinkage(picture_px)
         number = {category: index for index, category in enumerate(self.categories) if category is not None}
@@ -162,10 +164,11 @@ class Detector(Network):
         )
 
     def detections(self, found: Mapping[str, Tensor]) -> tuple[Detection, ...]:
-        """The detections of one picture; classes without a COCO category are left out.
+        """The detections of one picture with COCO's categories; detections of classes without a COCO category are
+        left out.
 
         Args:
-            found: torchvision's result for the picture: `boxes`, `scores` and `labels`.
+            found: torchvision's raw output for the picture: `boxes`, `scores` and `labels`.
         """
         columns = (found["boxes"].tolist(), found["labels"].tolist(), found["scores"].tolist())
         return tuple(
@@ -181,7 +184,9 @@ class Detector(Network):
 
 OFFICIAL_CLASSES = 91
 OFFICIAL_CATEGORIES = tuple(number if number in CATEGORY_NAMES else None for number in range(OFFICIAL_CLASSES))
-"""Classes of the published detectors: their numbers are COCO's category ids, with gaps; 0 is the background."""
+"""COCO category id of each class number of the published detectors, which are equal; None for the background (0)
+and for the gaps in COCO's ids.
+"""
 
 
 def size_of(pictures: Tensor) -> Size:
@@ -190,17 +195,17 @@ def size_of(pictures: Tensor) -> Size:
 
 
 def picture_size(outputs: Mapping[str, Tensor]) -> Size:
-    """Height and width of a batch's pictures, read from the inputs of `losses`."""
+    """Height and width of a batch's pictures, read from the inputs of `losses` (entry `picture_px`)."""
     height, width = outputs[PICTURE][0].tolist()
     return int(height), int(width)
 
 
 def fitted(min_size_px: int, max_size_px: int) -> Callable[[Size], Size]:
     """torchvision's rule for the input size: the shorter side becomes `min_size_px`, unless the longer side would
-    exceed `max_size_px`.
+    then exceed `max_size_px`.
 
     Returns:
-        Function from (height, width) of the picture to those of the input.
+        Function from (height, width) of the picture to (height, width) of the network's input.
     """
 
     def inner_px(size: Size) -> Size:
@@ -211,16 +216,19 @@ def fitted(min_size_px: int, max_size_px: int) -> Callable[[Size], Size]:
 
 
 def scaled(scale: float) -> Callable[[Size], Size]:
-    """Rule for the input size: both sides times `scale`, rounded."""
+    """A rule for the input size: a function that multiplies the picture's height and width by `scale` and rounds
+    them.
+    """
     return lambda size: (max(1, round(size[0] * scale)), max(1, round(size[1] * scale)))
 
 
 def share_inside(boxes: Tensor, ignored: Tensor) -> Tensor:
-    """(N,) for each box, the largest share of its area, 0..1, that lies inside a single ignored box; 0 if M is 0.
+    """The (N,) largest share of each box's area, 0..1, that lies inside a single ignored box; 0 where there are no
+    ignored boxes.
 
     Args:
         boxes: (N, 4) left, top, right, bottom.
-        ignored: (M, 4).
+        ignored: (M, 4) ignored boxes, in the same format.
     """
     if not len(ignored):
         return boxes.new_zeros(len(boxes))

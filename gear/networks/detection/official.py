@@ -15,8 +15,8 @@ OLD_NAMES = (
     (r"(head\.\w+_head\.conv)\.4\.(weight|bias)", r"\1.2.0.\2"),
     (r"(head\.\w+_head\.conv)\.6\.(weight|bias)", r"\1.3.0.\2"),
 )
-"""Key names in files of 2019 and 2020: they lack the block around a convolution, and they number activations as
-layers.
+"""Pairs of a pattern for keys in weights files of 2019 and 2020, and the current key. The old keys lack the block
+around a convolution and count activations as layers.
 """
 
 

@@ -1,4 +1,4 @@
-"""RetinaNet (Lin et al., Focal Loss for Dense Object Detection, 2017), on the model of torchvision."""
+"""RetinaNet (Lin et al., Focal Loss for Dense Object Detection, 2017), built on the implementation of torchvision."""
 
 from __future__ import annotations
 
@@ -39,14 +39,16 @@ class RetinaNetDetector(Detector):
     """
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Outputs of both heads, and the anchors in pixels of the picture."""
+        """The outputs by name: those of the classification and the box head, and the anchors in pixels of the
+        picture.
+        """
         outputs = self.run_for_losses(pictures)
         anchors_px = outputs[ANCHORS] / self.shrinkage(picture_size(outputs))
         return {LOGITS: outputs[LOGITS], DELTAS: outputs[DELTAS], ANCHORS_PX: anchors_px}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The inputs of `losses`: outputs of both heads, the anchors in pixels of the graph's input, and the
-        picture's size.
+        """The input of `losses`: outputs of the classification and the box head, anchors in pixels of the graph's
+        input, and the picture's size.
         """
         picture = pictures[VIEW]
         features = list(self.graph.get_submodule("backbone")(self.seen(picture)).values())
@@ -59,7 +61,9 @@ class RetinaNetDetector(Detector):
         }
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The losses of torchvision, without background anchors that lie mostly in ignored objects."""
+        """The two losses of torchvision by name; background anchors that lie mostly inside ignored objects do not
+        count.
+        """
         wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
         graph: Any = self.graph
         matches = []
@@ -106,11 +110,11 @@ class RetinaNetDetector(Detector):
 
 
 class LiteRetinaNetDetector(RetinaNetDetector):
-    """RetinaNet with an EfficientNet of timm as backbone."""
+    """RetinaNet with EfficientNet-Lite0 of timm as backbone."""
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The feature maps at the ends of the backbone's stages, `layer1` (1/4 of the graph's input) to `layer4`
-        (1/32).
+        """The modules whose outputs are feature maps: the ends of the backbone's stages, `layer1` (1/4 of the
+        graph's input) to `layer4` (1/32).
         """
         blocks = self.graph.get_submodule("backbone.body.blocks")
         return {f"layer{i}": blocks.get_submodule(str(stage)) for i, stage in enumerate(LITE_TAPS, start=1)}
