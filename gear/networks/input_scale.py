@@ -1,4 +1,6 @@
-"""The factor by which pictures are resized before a network: from the user's options, or from the weights file."""
+"""Finds the factor by which pictures are resized before a network: from the user's options, or from the weights
+file.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from gear.values.errors import GearError
 OPTION = "input_scale"
 
 NEGLIGIBLE = 0.02
-"""Pictures whose widths differ by at most this share count as equally large."""
+"""Largest relative difference between two widths of pictures that count as equal."""
 
 
 def width_share(width_px: int, usual_px: int) -> float:
@@ -26,7 +28,7 @@ class Scaled(Protocol):
 
     @property
     def weights(self) -> str:
-        """Source of the weights, see `gear.networks.options.NetworkOptions`."""
+        """Source of the weights: `shipped`, `none`, or the path of a file (`gear.networks.options.NetworkOptions`)."""
         ...
 
     @property

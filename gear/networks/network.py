@@ -25,14 +25,14 @@ IMAGENET_STD = (0.229, 0.224, 0.225)
 
 
 class Network(nn.Module, ABC):
-    """A torch module with its normalisation, losses and predictions.
+    """Base class of gear's networks: a torch module with its normalisation, losses and predictions.
 
     Attributes:
-        graph: the torch module itself, with the parameter names of the published weights.
+        graph: the torch module that computes the outputs, with the parameter names of the published weights.
         options: options that the user gave.
         device: torch device on which the graph runs.
-        has_quick_copy: whether predictions on a CPU use a copy of the graph that `gear.networks.fused_inference` makes.
-            Only allowed if the output of each convolution goes to its normalisation and nowhere else.
+        has_quick_copy: whether predictions on a CPU use a faster copy of the graph (`gear.networks.fused_inference`).
+            True is allowed only if the output of each convolution goes to its normalisation and nowhere else.
     """
 
     has_quick_copy: ClassVar[bool] = False
@@ -53,14 +53,14 @@ class Network(nn.Module, ABC):
         return self.graph
 
     def forward(self, views: Mapping[str, Tensor], targets: Sequence[Any] | None = None) -> Mapping[str, Tensor]:
-        """Outputs by name for a batch of pictures; or the losses by name, if `targets` are given.
+        """Runs the network on a batch of pictures, and computes the losses if `targets` are given.
 
         Args:
             views: (B, 3, H, W) pictures in 0..1 by camera, on any device.
             targets: the samples of the batch, with ground truth; None for outputs.
 
         Returns:
-            float32 tensors on the network's device.
+            Outputs by name, or scalar losses by name: float32 tensors on the network's device.
         """
         if targets is None:
             return self._outputs(self.run, views)
@@ -73,7 +73,7 @@ class Network(nn.Module, ABC):
         return {name: tensor.float() for name, tensor in raw.items()}
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The modules whose outputs are named feature maps (for defenses and attacks); none by default."""
+        """The modules, by name, whose outputs are feature maps that defenses and attacks read; none by default."""
         return {}
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
@@ -81,7 +81,9 @@ class Network(nn.Module, ABC):
         return self.predict_many([views])[0]
 
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[Any]:
-        """The predictions for several samples. Pictures of equal size go through the graph as one batch."""
+        """The predictions for several samples, in their order. Pictures of equal size go through the graph as one
+        batch.
+        """
         sizes = [sample[self._views[0]].shape[:2] for sample in samples]
         answers: list[Any] = [None] * len(samples)
         for size in dict.fromkeys(sizes):
@@ -95,7 +97,10 @@ class Network(nn.Module, ABC):
         return answers
 
     def for_predictions(self, batch: Mapping[str, Tensor]) -> Network:
-        """A faster network with the same predictions up to rounding: on a CPU it uses a quick copy of the graph.
+        """Returns the network to use for predictions: on a CPU an equivalent with a faster copy of the graph,
+        otherwise itself.
+
+        Predictions are the same up to rounding.
 
         Args:
             batch: (B, 3, H, W) pictures in 0..1 by camera; a new copy is traced with the first sample.
@@ -116,15 +121,15 @@ class Network(nn.Module, ABC):
 
     @abstractmethod
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Outputs by name for pictures in 0..1 on the network's device; subclasses implement this."""
+        """The outputs by name for (B, 3, H, W) pictures in 0..1 on the network's device; subclasses implement this."""
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `losses`: the outputs, and more for networks with heads that only training uses."""
+        """The input of `losses`: the outputs, and further tensors of networks with heads that only training uses."""
         return self.run(pictures)
 
     def run_for_predictions(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `predictions`: the outputs, or something smaller for networks that can predict faster
-        from it.
+        """The input of `predictions`: the outputs, or a smaller intermediate result for networks that predict
+        faster from it.
         """
         return self.run(pictures)
 
@@ -134,7 +139,8 @@ class Network(nn.Module, ABC):
 
     @abstractmethod
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
-        """The predictions for each picture, in the form that the task defines; subclasses implement this.
+        """Converts the result of `run_for_predictions` to one prediction for each picture, in the form that the
+        task defines; subclasses implement this.
 
         Args:
             outputs: result of `run_for_predictions`.
@@ -161,7 +167,7 @@ class Normalise(nn.Module):
 def as_batch(
     samples: Sequence[Mapping[str, UInt8Image]], views: Sequence[str], device: torch.device | None = None
 ) -> dict[str, Tensor]:
-    """Stacks pictures of one size to the input of `Model.forward`: (B, 3, H, W) float32 in 0..1 by camera name.
+    """Stacks pictures of one size into the input of `Model.forward`: (B, 3, H, W) float32 in 0..1 by camera name.
 
     If a device is given, the pictures are copied to it as bytes and converted to float32 there.
     """

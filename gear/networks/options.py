@@ -1,4 +1,4 @@
-"""Options that all of gear's networks have. The module does not import torch, so that plugin specs load quickly."""
+"""Options that every network of gear has. The module does not import torch, so plugin specs load quickly."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SHIPPED = "shipped"
 NONE = "none"
 
 CIRCUMSTANCES = ("weights", "device", "precision", "seed")
-"""Options that do not affect what a network computes with its weights, such as the device."""
+"""Names of the options that do not change what a network with given weights computes, such as the device."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Settings of CPU and GPU in one place: memory allocator, threads, devices, precision, seeds of random weights."""
+"""Settings of CPU and GPU: memory allocator, threads, devices, precision, and seeds of random weights."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ TOP_PAD_BYTES = 256 << 20
 def prepare(threads: int = 0) -> None:
     """Sets the memory allocator and the number of threads; further calls in a process do nothing.
 
-    glibc gives the memory of large activations back to the kernel after every step and requests it again. Keeping it
-    makes a step of an attack up to twice as fast. Results do not change. On systems without glibc the allocator is not
-    touched.
+    By default glibc returns the memory of large activations to the kernel after every step and requests it again. With
+    this setting glibc keeps that memory, which makes a step of an attack up to twice as fast. Results do not change. On
+    systems without glibc the allocator is not touched.
 
     Args:
         threads: number of torch's threads; 0 for torch's own choice (`OMP_NUM_THREADS`, or an earlier setting), but at
@@ -41,7 +41,7 @@ def prepare(threads: int = 0) -> None:
 
 
 def device_of(wish: Literal["auto", "cpu", "cuda"]) -> torch.device:
-    """The torch device for the option `device`.
+    """The torch device that the option `device` names: `auto` is a GPU if there is one, otherwise the CPU.
 
     Raises:
         GearError: the machine has no such device.
@@ -54,7 +54,7 @@ def device_of(wish: Literal["auto", "cpu", "cuda"]) -> torch.device:
 
 
 def is_quick_in_half(device: torch.device) -> bool:
-    """Whether a device has instructions for bfloat16; without them bfloat16 is slower than float32."""
+    """Whether a device has instructions for bfloat16. On a device without them, bfloat16 is slower than float32."""
     if device.type == "cuda":
         return bool(torch.cuda.is_bf16_supported(including_emulation=False))
     known = ("_is_avx512_bf16_supported", "_is_amx_tile_supported")
@@ -68,8 +68,9 @@ def autocast(device: torch.device, precision: Literal["auto", "float32", "bfloat
 
 @contextlib.contextmanager
 def seeded(seed: int) -> Iterator[None]:
-    """Context in which layers draw their initial weights with `seed`; afterwards torch's generators have their old
-    state.
+    """A context in which layers draw their initial weights with `seed`. Afterwards torch's random generators have
+    the
+    state that they had before.
 
     Raises:
         GearError: torch does not accept the seed.

@@ -21,8 +21,8 @@ CAP_M = 80.0
 
 
 def known(depth_m: Tensor, cap_m: float | None = CAP_M) -> Tensor:
-    """The (B, H, W) bool mask of the pixels whose true depth is known and at most `cap_m` metres (None for no
-    limit).
+    """The (B, H, W) bool mask of the pixels whose true depth is known, above 1 mm and at most `cap_m` metres (None
+    for no limit).
     """
     is_known = torch.isfinite(depth_m) & (depth_m > LEAST_M)
     return is_known if cap_m is None else is_known & (depth_m <= cap_m)

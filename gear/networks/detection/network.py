@@ -184,8 +184,8 @@ class Detector(Network):
 
 OFFICIAL_CLASSES = 91
 OFFICIAL_CATEGORIES = tuple(number if number in CATEGORY_NAMES else None for number in range(OFFICIAL_CLASSES))
-"""COCO category id of each class number of the published detectors, which are equal; None for the background (0)
-and for the gaps in COCO's ids.
+"""COCO category id for each class number of the published detectors (the same number); None for the background,
+class 0, and for the gaps in COCO's ids.
 """
 
 

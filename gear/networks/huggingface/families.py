@@ -1,4 +1,4 @@
-"""Image processors of transformers that gear implements in torch, with the default values of their classes."""
+"""Classes of image processors of transformers that gear implements in torch, with the default values of each class."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HALF = (0.5, 0.5, 0.5)
 STEPS = ("do_resize", "do_rescale", "do_normalize", "do_pad", "do_center_crop")
 
 FOR_LABELS_OR_OTHER_FILES = ("do_reduce_labels", "do_convert_annotations", "do_convert_rgb")
-"""Steps that do not change gear's pictures: conversion to RGB, and steps for labels."""
+"""Keys of image processors that do not change gear's pictures: the conversion to RGB, and steps for labels."""
 
 EVERYWHERE: Mapping[str, Any] = MappingProxyType(
     {"do_resize": True, "do_rescale": True, "rescale_factor": 1 / 255, "do_normalize": True, "do_pad": False,
@@ -27,21 +27,23 @@ EVERYWHERE: Mapping[str, Any] = MappingProxyType(
 NEEDED_PX: Mapping[str, int] = MappingProxyType(
     {"glpn": 32, "rt_detr": 32, "rt_detr_v2": 32, "d_fine": 32, "deimv2": 32}
 )
-"""By `model_type`: number of which the sides must be multiples, so that feature maps of several scales fit together."""
+"""Number of pixels of which the input's sides must be multiples, by `model_type`; other sizes would make feature
+maps of several scales mismatch.
+"""
 
 IN_PATCHES = ("beit", "data2vec-vision", "depth_anything", "dpt", "yolos", "zoedepth")
-"""By `model_type`: networks that process only whole patches of this many pixels. They do not see the remainder
-at the right and the bottom; their output covers the rest of the picture.
+"""Values of `model_type` of the networks that split the picture into whole patches. Such a network ignores the
+incomplete patches at the right and the bottom, so its output covers a smaller part of the picture.
 """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
-    """One class of image processors.
+    """One class of image processors of transformers, such as DPTImageProcessor.
 
     Attributes:
-        defaults: default values of the keys in its file, where they differ from `EVERYWHERE`.
-        networks: `model_type` of the networks that use this class when their folder does not name one.
+        defaults: default values of the keys of preprocessor_config.json, where they differ from `EVERYWHERE`.
+        networks: values of `model_type` of the networks that use this class when their folder names no class.
         is_square: meaning of a `size` of one number: True for height and width, False for the shorter edge.
     """
 
@@ -50,11 +52,15 @@ class Family:
     is_square: bool = True
 
     def facts(self, said: Mapping[str, Any]) -> dict[str, Any]:
-        """The values in a file, completed with the defaults of the class; null values are left out."""
+        """The values in a preprocessor_config.json (`said`), completed with the defaults of the class; null values
+        are left out.
+        """
         return {**EVERYWHERE, **self.defaults, **{key: value for key, value in said.items() if value is not None}}
 
     def steps(self) -> frozenset[str]:
-        """Keys `do_…` that gear accepts: steps that it implements, and steps that do not change the picture."""
+        """Names of the keys `do_…` that gear accepts: steps that gear implements, and steps that do not change the
+        picture.
+        """
         return frozenset((*STEPS, *FOR_LABELS_OR_OTHER_FILES, *(key for key in self.defaults if key.startswith("do_"))))
 
 
@@ -116,10 +122,10 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
 
 
 def family_of(said: Mapping[str, Any], model_type: str, path: Path) -> str:
-    """The name in `FAMILIES` of a folder's image processor.
+    """The key in `FAMILIES` of the image processor class that a network's folder uses.
 
     Args:
-        said: content of preprocessor_config.json.
+        said: content of preprocessor_config.json, by key.
         model_type: type of the folder's network, for files that name no class.
         path: path of the file, for error messages.
 

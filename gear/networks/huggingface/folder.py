@@ -22,17 +22,19 @@ from gear.values.errors import GearError
 ADAPTER = "write an adapter (docs/how-to/write-a-model.md)"
 
 SHOWN = 240
-"""Largest number of characters of a message of transformers that an error quotes."""
+"""Largest number of characters that an error message quotes from a message of transformers."""
 
 OF_TIMM = {"in_chans": "num_channels", "out_indices": "out_indices", "output_stride": "output_stride"}
-"""Keys of `backbone_kwargs` for a backbone of timm in files from before transformers 5, and their current names."""
+"""Keys of `backbone_kwargs` in config files written before transformers 5, for backbones of timm, and the current
+names of these keys.
+"""
 
 DILATED_STRIDE_PX = 16
-"""Stride of the last feature map of a dilated backbone if the config states none."""
+"""Stride in pixels of the last feature map of a dilated backbone whose config states none."""
 
 
 def open_folder(options: FolderOptions, auto: str) -> nn.Module:
-    """Makes the network of a folder, in float32.
+    """Makes the network that a folder of transformers holds, in float32.
 
     Args:
         options: options of the network, which name the folder.
@@ -60,11 +62,11 @@ def open_folder(options: FolderOptions, auto: str) -> nn.Module:
 
 
 def start_from(folder_network: Any, auto: str) -> None:
-    """Loads the weights in a folder into a network that was made from it (`gear train --init folder`).
+    """Loads the weights of a folder into the network that was made from this folder (`gear train --init folder`).
 
     Args:
         folder_network: a `gear.networks.huggingface.network.FolderNetwork`.
-        auto: as for `open_folder`.
+        auto: name of the class of transformers that opens this kind of network, such as `AutoModelForDepthEstimation`.
 
     Raises:
         GearError: the folder has no weights that fit.
@@ -155,7 +157,7 @@ def _refused(folder: Path, auto: str, error: Exception) -> GearError:
 
 
 def in_one_line(error: Exception) -> str:
-    """An exception's type and the start of its text, in one line."""
+    """The type of an exception and the start of its message, in one line."""
     said = " ".join(str(error).split())
     return f"{type(error).__name__}: {said if len(said) <= SHOWN else said[:SHOWN] + '...'}"
 

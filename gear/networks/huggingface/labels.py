@@ -12,20 +12,24 @@ SYNONYMS = {
     "pottedplant": "potted plant", "route": "road", "signboard": "traffic sign", "sofa": "couch", "tree": "vegetation",
     "tvmonitor": "tv", "van": "car",
 }  # fmt: skip
-"""Synonyms from Pascal VOC, ADE20K and similar data sets; they are used for names that gear does not know."""
+"""Class names of Pascal VOC, ADE20K and similar data sets, and gear's names for the same classes; used for names
+that gear does not know.
+"""
 
 
 def match(names: Mapping[int, str], known: Mapping[str, int]) -> tuple[dict[int, int], tuple[str, ...]]:
     """Matches the classes of a network with gear's classes by name.
 
-    A name may list several names, separated by commas or semicolons, as in ADE20K; the first known one is used.
+    A class may have several names, separated by commas or semicolons, as in ADE20K; the first name that gear knows is
+    used.
 
     Args:
         names: class names of the network, by its class number.
         known: gear's class numbers by name, in lower case.
 
     Returns:
-        gear's class numbers by those of the network, and the names without a match in the network's order.
+        gear's class number for each matched class number of the network, and the unmatched names in the network's
+        order.
     """
     found = {}
     for index, name in names.items():

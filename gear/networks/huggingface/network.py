@@ -1,4 +1,6 @@
-"""Networks of Hugging Face's `transformers` from a local folder, as gear networks."""
+"""Segmentation, depth and detection networks of Hugging Face's `transformers`, opened from a local folder, as gear
+networks.
+"""
 
 from __future__ import annotations
 
@@ -33,21 +35,24 @@ VIEW = "left"
 LOGITS, DEPTH, BOXES, PICTURE = "logits", "depth_m", "pred_boxes", "picture"
 
 UNKNOWN_LOGIT = -50.0
-"""Logit of the classes that the network does not have."""
+"""Logit of the task's classes that the network does not have; their probability is practically 0."""
 
 NEAREST_M = 1e-3
 
 METRIC_TYPES = ("glpn", "zoedepth")
-"""Model types that always predict metres; other depth networks state it in `depth_estimation_type`."""
+"""Values of `model_type` of depth networks that always predict metres. The configs of other networks state this in
+`depth_estimation_type`.
+"""
 
 logger = logging.getLogger(__name__)
 
 
 class FolderNetwork(Network):
-    """Base class of networks from a folder; pictures pass the image processor of the folder.
+    """Base class of networks of transformers from a local folder. Pictures pass the folder's image processor
+    first.
 
     Attributes:
-        unmatched: names of the network's classes that the task does not have.
+        unmatched: class names of the network without a counterpart among the task's classes.
     """
 
     options: FolderOptions
@@ -59,18 +64,18 @@ class FolderNetwork(Network):
         self.processor = read_processor(Path(options.folder), resizes=resizes, config=graph.config)
 
     def seen(self, pictures: Mapping[str, Tensor]) -> Tensor:
-        """(B, 3, h, w) input of the graph: (B, 3, H, W) pictures in 0..1 after the image processor."""
+        """The (B, 3, h, w) input of the graph: the (B, 3, H, W) pictures in 0..1 after the image processor."""
         return self.processor.apply(pictures[VIEW])
 
     def said(self, seen: Tensor, **labels: Any) -> Any:
-        """Runs the graph.
+        """Runs the graph (the network of transformers) and returns its raw output.
 
         Args:
             seen: (B, 3, h, w) pictures after the image processor, as the method `seen` returns them.
             **labels: labels, for graphs that compute their own losses.
 
         Raises:
-            GearError: the graph fails, as with a config.json whose sizes can be built but do not fit each other.
+            GearError: the graph fails, for example because sizes in config.json do not fit each other.
         """
         try:
             return self.graph(pixel_values=seen, **labels)
@@ -83,7 +88,8 @@ class FolderNetwork(Network):
             ) from error
 
     def restored(self, maps: Tensor, pictures: Mapping[str, Tensor], mode: str) -> Tensor:
-        """Maps at the size of the pictures: margins of the network's input are cut off and the rest is resized.
+        """Converts maps over the graph's input to maps over the pictures: the margins are cut off, the rest is
+        resized.
 
         Args:
             maps: (B, C, h, w) output of the graph.
@@ -91,13 +97,13 @@ class FolderNetwork(Network):
             mode: interpolation mode of torch.
 
         Returns:
-            (B, C, H, W).
+            (B, C, H, W) maps of the pictures' height and width.
         """
         size = (int(pictures[VIEW].shape[2]), int(pictures[VIEW].shape[3]))
         return self.processor.restore(maps, size, mode)
 
     def matched(self, known: Mapping[str, int], whose: str) -> dict[int, int]:
-        """gear's class numbers by those of the network, matched by name.
+        """The task's class number for each class number of the network, matched by name.
 
         Names without a match are stored in `unmatched` and logged.
 
@@ -124,7 +130,8 @@ class FolderNetwork(Network):
 
 
 class FolderSegmenter(FolderNetwork):
-    """Semantic segmentation: the output is `logits` (B, 19, H, W) over Cityscapes train ids.
+    """A semantic segmentation network from a folder: the output is `logits` (B, 19, H, W) over Cityscapes train
+    ids.
 
     If several classes of the network belong to one class of Cityscapes, their probabilities are added. Classes that the
     network does not have get a logit of -50 and do not count in the loss.
@@ -146,16 +153,17 @@ class FolderSegmenter(FolderNetwork):
         return {LOGITS: self.restored(torch.stack(ours, dim=1), pictures, "bilinear")}
 
     def their_logits(self, seen: Tensor) -> Tensor:
-        """(B, classes, h, w) logits over the network's own classes.
+        """The (B, classes, h, w) logits over the network's own classes, before they are converted to Cityscapes'
+        classes.
 
         Args:
-            seen: (B, 3, h, w) input of the graph, from `seen`.
+            seen: (B, 3, h, w) input of the graph, as the method `seen` returns it.
         """
         logits: Tensor = self.said(seen).logits
         return logits
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Cross-entropy over the pixels whose true class the network has."""
+        """The mean cross-entropy over the pixels whose true class the network has, by name."""
         ids = train_ids(targets, self.device)
         known = torch.tensor([train_id for train_id, indexes in enumerate(self._indexes) if indexes])
         is_known = torch.isin(ids, known.to(self.device))
@@ -163,13 +171,13 @@ class FolderSegmenter(FolderNetwork):
         return {"cross_entropy": (each * is_known).sum() / is_known.sum().clamp_min(1)}
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
-        """(H, W) uint8 Cityscapes label ids for each picture."""
+        """The predicted (H, W) uint8 Cityscapes label ids of each picture."""
         labels = np.array(LABEL_ID_OF_TRAIN_ID, dtype=np.uint8)
         return [labels[best_class(logits)] for logits in outputs[LOGITS]]
 
 
 class FolderDepth(FolderNetwork):
-    """Monocular depth: the output is `depth_m` (B, H, W) in metres."""
+    """A monocular depth network from a folder: the output is `depth_m` (B, H, W) in metres."""
 
     options: DepthFolderOptions
 
@@ -198,19 +206,21 @@ class FolderDepth(FolderNetwork):
         return {DEPTH: said.clamp(min=NEAREST_M)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Mean absolute difference between the logarithms of depth, over pixels with ground truth."""
+        """The mean absolute difference between the logarithms of predicted and true depth, over the pixels with
+        ground truth.
+        """
         truth = torch.from_numpy(np.stack([sample.depth_m for sample in targets])).to(self.device)
         is_known = torch.isfinite(truth)
         error = (outputs[DEPTH].log() - truth.where(is_known, 1.0).log()).abs()
         return {"log_l1": (error * is_known).sum() / is_known.sum().clamp_min(1)}
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
-        """(H, W) float32 depth in metres for each picture."""
+        """The predicted depth of each picture: (H, W) float32 in metres."""
         return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
 
 
 class FolderDetector(FolderNetwork):
-    """DETR, RT-DETR, YOLOS and similar detectors, with N object queries.
+    """A detector from a folder, such as DETR, RT-DETR or YOLOS, with N object queries.
 
     Outputs are `logits` (B, N, classes) and `pred_boxes` (B, N, 4): centre x, centre y, width and height as shares of
     the picture's width and height.
@@ -225,17 +235,19 @@ class FolderDetector(FolderNetwork):
         self._categories = self.matched({name: number for number, name in CATEGORY_NAMES.items()}, "COCO")
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The outputs `logits` and `pred_boxes`, with one row for each of the N object queries."""
+        """The outputs `logits` (B, N, classes) and `pred_boxes` (B, N, 4), one entry for each of the N object
+        queries.
+        """
         said = self.said(self.seen(pictures))
         return {LOGITS: said.logits, BOXES: said.pred_boxes}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The inputs of `losses`: the graph's input and the picture's size."""
+        """The input of `losses`: the graph's input and the picture's height and width."""
         size = torch.tensor(pictures[VIEW].shape[2:], device=self.device)
         return {"seen": self.seen(pictures), PICTURE: size.expand(len(pictures[VIEW]), -1)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The set loss of the network itself, in float32.
+        """The set loss that transformers defines for this network, computed in float32.
 
         Only objects of classes that the network has are targets; other objects are ignored.
         """

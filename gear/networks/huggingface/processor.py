@@ -18,19 +18,19 @@ Channels = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Processor:
-    """Resizing, normalisation and margins of pictures before a network.
+    """The image processor of a network: resizing, normalisation and margins of pictures.
 
     Attributes:
         mean, std: normalisation of the three channels of a picture in 0..1.
-        size: as in the file: `height` and `width`, or `shortest_edge` and optionally `longest_edge`; empty for no
-            resizing.
+        size: size after resizing, in the keys of preprocessor_config.json: `height` and `width`, or `shortest_edge` and
+            optionally `longest_edge`; empty for no resizing.
         mode: interpolation mode of torch.
-        multiple_px: sides are multiples of this, which may be a fraction.
+        multiple_px: number of pixels of which sides are multiples; it may be a fraction.
         keeps_ratio: whether `height` and `width` only limit the size: the picture keeps its aspect ratio and is scaled
             by whichever of the two factors changes it less.
-        rounds_down: whether sides are rounded down to a multiple; otherwise to the nearest.
-        pads_to_px: after all other steps, the picture is padded with zeros on all sides to a multiple of this; 0 for no
-            padding.
+        rounds_down: whether sides are rounded down to a multiple; False rounds to the nearest multiple.
+        pads_to_px: number of pixels of which the sides are made multiples by zeros on all sides, after all other steps;
+            0 for no padding.
         has_margin: whether the picture is first extended by reflection.
         aligns_corners: whether the interpolation aligns corners; such an interpolation has no anti-aliasing.
         is_bgr: whether the network takes channels in the order blue, green, red.
@@ -72,8 +72,8 @@ class Processor:
         return functional.pad(seen, (left, right, top, bottom))
 
     def restore(self, maps: Tensor, picture_px: Size, mode: str) -> Tensor:
-        """Converts (B, C, h, w) maps over the network's input to (B, C, H, W) maps over the picture, without the
-        margins.
+        """Converts (B, C, h, w) maps over the network's input to (B, C, H, W) maps over the picture; margins are
+        cut off.
         """
         rows, columns = self._margin(picture_px)
         wide = (picture_px[0] + 2 * rows, picture_px[1] + 2 * columns)

@@ -16,26 +16,28 @@ from gear.values.regular_file import read_regular
 FILE = "preprocessor_config.json"
 
 RESAMPLING = {0: "nearest-exact", 2: "bilinear", 3: "bicubic"}
-"""torch's interpolation modes by Pillow's numbers."""
+"""Interpolation modes of torch by the number that Pillow gives to the same mode."""
 
 MOST_PX = 1 << 15
-"""Upper limit of sizes in the file; larger pictures would not fit into memory."""
+"""Upper limit of picture sizes in preprocessor_config.json; larger pictures would not fit into memory."""
 
 YOLOS_PATCH_PX = 16
 
 DETR_LONGEST_PX = 1333
-"""Longest edge in pixels for files of DETRs that state no `longest_edge` (older files state `max_size` or nothing)."""
+"""Longest edge in pixels for DETRs whose file states no `longest_edge`; older files state `max_size`, or no limit."""
 
 
 def read_processor(folder: Path, *, resizes: bool = True, config: object = None) -> Processor:
-    """The image processor of a folder. If the folder has no file for it, pictures are normalised as for ImageNet and
-    not resized.
+    """Reads the image processor of a network's folder.
+
+    If the folder has no preprocessor_config.json, pictures are normalised with ImageNet's mean and deviation and not
+    resized.
 
     Args:
         folder: folder of the network.
         resizes: whether pictures are resized as the file says. Changes of size that the network requires are made in
             any case.
-        config: configuration object of transformers, for the network's patch size.
+        config: configuration object of transformers, from which the network's patch size is read.
 
     Raises:
         GearError: the file is not JSON, or contains a step that gear does not implement.
@@ -53,7 +55,7 @@ def read_processor(folder: Path, *, resizes: bool = True, config: object = None)
 
 
 def read_mapping(path: Path) -> dict[str, Any]:
-    """Reads a JSON file that must contain a mapping.
+    """Reads a JSON file whose outermost value must be a mapping (a JSON object).
 
     Raises:
         GearError: the file contains no mapping.

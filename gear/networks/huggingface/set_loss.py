@@ -1,4 +1,6 @@
-"""Set losses of transformers' detectors, computed in float32 and without background inside ignored objects."""
+"""Set losses of transformers' detectors, computed in float32. Queries inside ignored objects do not count as
+background.
+"""
 
 from __future__ import annotations
 
@@ -18,38 +20,44 @@ PAIRS = (
     ("enc_topk_logits", "enc_topk_bboxes"),
     ("enc_outputs_class", "enc_outputs_coord"),
 )
-"""Names of the losses' arguments that hold classes and boxes of queries: of the last layer, of all layers, of
-the encoder.
+"""Pairs of names of the losses' arguments: class logits and boxes of the queries of the last layer, of all layers,
+and of the encoder.
 """
 
 BATCH_FIRST = "enc_topk_logits"
-"""Losses that have this argument expect queries of all layers as (B, layers, …); other losses expect (layers, B, …)."""
+"""Name of an argument. Losses that have it expect the queries of all layers as (B, layers, …), other losses as
+(layers, B, …).
+"""
 
 DENOISING, NOTHING_NOISED = "denoising_meta_values", {"dn_num_split": (0,)}
 NOISED = ("logits", "outputs_class")
-"""In training, the queries of these losses start with noised boxes of the objects; such queries are always used."""
+"""Names of arguments with class logits. In training they also hold denoising queries, which start with noised
+boxes of the objects and are always used.
+"""
 
 IGNORED = "ignored"
-"""Key of the labels for boxes that are neither targets nor background; targets are under `boxes`."""
+"""Key of the labels for boxes that are neither targets nor background; boxes of targets have the key `boxes`."""
 
 NEAR = 0.4
-"""A query whose IoU with a target's box exceeds this belongs to that target, as with RetinaNet's anchors."""
+"""IoU with a target's box above which a query belongs to this target, as with RetinaNet's anchors."""
 
 SURE, FAR = 50.0, 10.0
-"""Background logit and box centre (in sides of the picture) given to queries that the loss must not use."""
+"""Values for queries that the loss must not use: the background logit, and the box centre in units of the
+picture's sides (far outside).
+"""
 
 
 def set_loss(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any) -> Any:
     """Calls a loss of transformers in float32, whatever the precision of the network's output.
 
-    Queries that lie mostly inside ignored objects and near no target are replaced by certain background far away. They
-    are then matched with no target and nothing is learnt from them. If too few other queries would be left for the
-    objects of a picture, all of its queries are used. Losses that match queries in groups get this treatment for each
-    group.
+    Queries that lie mostly inside ignored objects and near no target are replaced by certain background far outside the
+    picture. The loss then matches such queries with no target and learns nothing from them. If too few other queries
+    would remain for the objects of a picture, all of its queries are used. In losses that match queries in groups, the
+    queries of each group are replaced in this way.
 
     Args:
         loss: loss function of transformers.
-        device_type: type of the torch device.
+        device_type: type of the torch device, such as `cpu`.
         *said: arguments of the loss.
         **more: keyword arguments of the loss.
     """
@@ -68,7 +76,7 @@ def set_loss(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any
 
 
 def is_hidden(boxes: Tensor, labels: Mapping[str, Tensor]) -> Tensor:
-    """(…, N) bool: which queries of a picture the loss must not use.
+    """The (…, N) bool mask of the queries of a picture that the loss must not use.
 
     Args:
         boxes: (…, N, 4) boxes of the queries: centre and size as shares of the picture's size.

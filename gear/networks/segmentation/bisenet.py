@@ -37,8 +37,8 @@ class SpatialPath(nn.Module):
 
 
 class AttentionRefinement(nn.Module):
-    """Attention refinement module: a 3x3 convolution; a factor for each output channel is computed from the
-    channels' global averages.
+    """Attention refinement module of BiSeNet: a 3x3 convolution whose output channels are scaled by factors
+    computed from their global averages.
     """
 
     def __init__(self, inputs: int) -> None:
@@ -56,7 +56,9 @@ class AttentionRefinement(nn.Module):
 
 
 class FeatureFusion(nn.Module):
-    """Joins the spatial and the context path and weights each channel by channel attention (feature fusion module)."""
+    """Feature fusion module of BiSeNet: joins the spatial and the context path and scales each channel by channel
+    attention.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -77,7 +79,7 @@ class FeatureFusion(nn.Module):
 
 
 class Head(nn.Module):
-    """Convolutions that compute one logit map for each class."""
+    """Output head: convolutions that compute one logit map for each class."""
 
     def __init__(self, inputs: int, planes: int, classes: int) -> None:
         super().__init__()
@@ -94,10 +96,10 @@ class BiSeNetX39(nn.Module):
     """BiSeNet: a spatial path at 1/8 of the picture's sides and a context path down to 1/32, joined at 1/8.
 
     The authors' code interpolates to the picture's size and returns log-probabilities. This module returns the smaller
-    logit maps; the caller interpolates and may apply `log_softmax`.
+    logit maps; the caller interpolates the maps and may apply `log_softmax`.
 
     Attributes:
-        align_corners: how the maps must be interpolated to the picture's size.
+        align_corners: value of this option of torch's interpolation with which the maps must be resized to the picture.
     """
 
     align_corners = True
@@ -125,7 +127,7 @@ class BiSeNetX39(nn.Module):
                 nn.init.kaiming_normal_(module.weight, mode="fan_in", nonlinearity="relu")
 
     def forward(self, pictures: Tensor, *, auxiliary: bool = False) -> list[Tensor]:
-        """Logit maps, smaller than the picture.
+        """Computes logit maps that are smaller than the picture.
 
         Args:
             pictures: (B, 3, H, W), normalised.
@@ -150,7 +152,8 @@ class BiSeNetX39(nn.Module):
         return maps
 
     def taps(self) -> dict[str, nn.Module]:
-        """Feature maps with the names that the Z-Mask paper uses (Rossolini et al., AAAI 2023).
+        """The modules whose outputs are feature maps, with the names that the Z-Mask paper uses (Rossolini et al.,
+        AAAI 2023).
 
         `spatial_7x7` at 1/2 and `spatial_1x1` at 1/8 of the picture's sides belong to the spatial path; `ct2`, `ct1`
         and `ct0` at 1/8, 1/16 and 1/32 to the context path.
@@ -165,5 +168,5 @@ class BiSeNetX39(nn.Module):
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The network's tensors from a published checkpoint; those of the loss modules are dropped."""
+    """The tensors of BiSeNet from a published checkpoint of TorchSeg; tensors of its loss modules are dropped."""
     return {key: value for key, value in state.items() if not key.startswith(("criterion.", "ohem_criterion."))}

@@ -14,14 +14,17 @@ BRANCH_PLANES = 128
 HEAD_PLANES = 64
 
 WRAPPER = "model."
-"""Prefix of the training wrapper that the authors save; its loss module has weights too."""
+"""Prefix of the keys in the authors' checkpoints, which hold a training wrapper: the network and a loss module
+with weights of its own.
+"""
 
 
 class DDRNet23Slim(nn.Module):
-    """Two branches, one at 1/8 of the picture's sides and one down to 1/64, that exchange features twice.
+    """DDRNet-23-slim: two branches, one at 1/8 of the picture's sides and one down to 1/64, that exchange features
+    twice.
 
     Attributes:
-        align_corners: how the maps must be interpolated to the picture's size.
+        align_corners: value of this option of torch's interpolation with which the maps must be resized to the picture.
     """
 
     align_corners = False
@@ -62,7 +65,7 @@ class DDRNet23Slim(nn.Module):
                 nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
 
     def forward(self, pictures: Tensor, *, auxiliary: bool = False) -> list[Tensor]:
-        """Output maps at 1/8 of the picture's sides.
+        """Computes the output maps at 1/8 of the picture's sides.
 
         Args:
             pictures: (B, 3, H, W), normalised. Both branches stay aligned if H and W are multiples of 8.
@@ -88,7 +91,8 @@ class DDRNet23Slim(nn.Module):
         return maps
 
     def taps(self) -> dict[str, nn.Module]:
-        """Feature maps with the names that the Z-Mask paper uses (Rossolini et al., AAAI 2023).
+        """The modules whose outputs are feature maps, with the names that the Z-Mask paper uses (Rossolini et al.,
+        AAAI 2023).
 
         `rb1` at 1/4 and `rb2` at 1/8 of the picture's sides lie before the branches separate; `rbb1` at 1/8 and `rbb2`
         at 1/64 lie at the ends of the branches. All are taken before the activation ReLU.
@@ -97,6 +101,8 @@ class DDRNet23Slim(nn.Module):
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The network's tensors from a published checkpoint, without the wrapper's prefix and without its loss module."""
+    """The tensors of DDRNet from a published checkpoint, without the wrapper's prefix `model.` and without the
+    loss module.
+    """
     kept = {key: value for key, value in state.items() if not key.startswith("loss.")}
     return {key.removeprefix(WRAPPER): value for key, value in kept.items()}

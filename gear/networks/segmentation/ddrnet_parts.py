@@ -20,12 +20,14 @@ def conv1x1(inputs: int, outputs: int, stride: int = 1) -> nn.Conv2d:
 
 
 def upsample(features: Tensor, like: Tensor) -> Tensor:
-    """Resizes (B, C, h, w) features bilinearly to the height and width of the map `like`; corners are not aligned."""
+    """Resizes (B, C, h, w) features bilinearly to the height and width of the map `like`, with
+    `align_corners=False`.
+    """
     return functional.interpolate(features, size=like.shape[2:], mode="bilinear", align_corners=False)
 
 
 class BasicBlock(nn.Module):
-    """Two 3x3 convolutions with a shortcut; the caller decides whether a ReLU follows the sum."""
+    """Basic residual block: two 3x3 convolutions with a shortcut. No ReLU follows the sum; the caller may add one."""
 
     def __init__(self, inputs: int, planes: int, stride: int = 1, *, rectify: bool = True) -> None:
         super().__init__()
@@ -44,7 +46,9 @@ class BasicBlock(nn.Module):
 
 
 class Bottleneck(nn.Module):
-    """Convolutions 1x1, 3x3 and 1x1 with a shortcut; the output has twice the planes, and no ReLU follows the sum."""
+    """Bottleneck residual block: 1x1, 3x3 and 1x1 convolutions with a shortcut. The output has twice the planes;
+    no ReLU follows the sum.
+    """
 
     EXPANSION = 2
 
@@ -77,7 +81,7 @@ def shortcut(inputs: int, outputs: int, stride: int) -> nn.Sequential | None:
 
 
 def stage(inputs: int, planes: int, stride: int = 1) -> nn.Sequential:
-    """A stage of the network: two basic blocks; no ReLU follows the last one."""
+    """A stage of the network: two basic blocks; no ReLU follows the second one."""
     return nn.Sequential(BasicBlock(inputs, planes, stride), BasicBlock(planes, planes, rectify=False))
 
 
@@ -88,7 +92,9 @@ def pre_activated(convolution: nn.Conv2d, *pooling: nn.Module) -> nn.Sequential:
 
 
 class Dappm(nn.Module):
-    """Deep aggregation pyramid pooling: five scales; each is refined with the result of the next finer scale."""
+    """Deep aggregation pyramid pooling module: five pooling scales; the features of each scale are refined with
+    the result of the next finer scale.
+    """
 
     def __init__(self, inputs: int, branch: int, outputs: int) -> None:
         super().__init__()
@@ -105,7 +111,7 @@ class Dappm(nn.Module):
         self.shortcut = pre_activated(conv1x1(inputs, outputs))
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, inputs, H, W) features to (B, outputs, H, W)."""
+        """Converts (B, inputs, H, W) features to (B, outputs, H, W) features."""
         scales = [self.scale0(features)]
         for pool, process in (
             (self.scale1, self.process1),
@@ -119,7 +125,7 @@ class Dappm(nn.Module):
 
 
 class Head(nn.Module):
-    """Two convolutions that compute the output channels."""
+    """Output head: two convolutions that compute the output channels."""
 
     def __init__(self, inputs: int, planes: int, channels: int) -> None:
         super().__init__()

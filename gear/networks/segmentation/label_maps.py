@@ -1,8 +1,8 @@
-"""The most likely class of each pixel, computed from smaller logit maps without logits at the picture's size.
+"""Finds the most likely class of each pixel from small logit maps, without storing logits at the picture's size.
 
 Logits at the size of a 2048 x 1024 picture take 160 MB, and writing and reading them took two fifths of the time of a
-fast network. Here they are interpolated in bands of rows that fit into the CPU's cache, with the same values as
-`torch.nn.functional.interpolate`.
+fast network. Here the small maps are interpolated in bands of rows that fit into the CPU's cache. The values equal
+those of `torch.nn.functional.interpolate`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ _BAND_PX = 16
 
 
 def best_class_at(logits: Tensor, size_px: tuple[int, ...], *, align_corners: bool) -> UInt8Image:
-    """(H, W) uint8: the class with the largest logit after interpolation; of equal logits the first one.
+    """The (H, W) uint8 map of the class with the largest logit after bilinear interpolation; of equal logits the
+    first class.
 
     Args:
         logits: (C, h, w) float32 on the CPU.
@@ -43,9 +44,10 @@ def best_class_at(logits: Tensor, size_px: tuple[int, ...], *, align_corners: bo
 
 
 def best_class(logits: Tensor) -> UInt8Image:
-    """(H, W) uint8: the class with the largest of (C, H, W) logits; of equal logits the first one.
+    """The (H, W) uint8 map of the class with the largest of (C, H, W) logits; of equal logits the first class.
 
-    The result equals `argmax(0)`, which reads memory in an unfavourable order and takes twenty times as long on a CPU.
+    The result equals `argmax(0)`, which takes twenty times as long on a CPU because of the order in which it reads
+    memory.
     """
     return _first_of_largest(logits.float().numpy()) if logits.device.type == "cpu" else _on_device(logits)
 

@@ -20,7 +20,7 @@ TRAIN_ID_OF_LABEL_ID[[label.id for label in LABELS]] = [label.train_id for label
 
 
 class SegmentedSample(Protocol):
-    """Protocol of the samples that the losses accept."""
+    """Protocol of the samples that the losses accept: they have label ids."""
 
     @property
     def label_ids(self) -> npt.NDArray[np.uint8]:
@@ -29,20 +29,21 @@ class SegmentedSample(Protocol):
 
 
 def train_ids(samples: Sequence[SegmentedSample], device: torch.device) -> Tensor:
-    """(B, H, W) int64 Cityscapes train ids of samples of one size; 255 for labels that are not evaluated."""
+    """The (B, H, W) int64 Cityscapes train ids of samples of one size; 255 for labels that are not evaluated."""
     labels = (np.ascontiguousarray(sample.label_ids) for sample in samples)
     ids = np.stack([cv2.LUT(one, TRAIN_ID_OF_LABEL_ID) for one in labels])
     return torch.from_numpy(ids).to(device).long()
 
 
 STEP_PX = 2
-"""Training compares only every second pixel of every second row. The maps at 1/8 hold little more detail, and
-this takes a quarter of the time.
+"""Step of the pixels on which training computes the loss: every second pixel of every second row. The logit maps
+at 1/8 hold little more detail, and the loss takes a quarter of the time.
 """
 
 
 def offsets_px(index: int) -> tuple[int, int]:
-    """Row and column of the first pixel that training compares in the picture with this index in the batch.
+    """Row and column of the first pixel on which training computes the loss, in picture number `index` of the
+    batch.
 
     Four consecutive pictures together cover every pixel position.
     """
@@ -50,7 +51,7 @@ def offsets_px(index: int) -> tuple[int, int]:
 
 
 def sampled_logits(maps: Tensor, size_px: Sequence[int], *, align_corners: bool) -> Tensor:
-    """Bilinear interpolation of maps, computed only at the pixels that training compares.
+    """Interpolates logit maps bilinearly, only at the pixels on which training computes the loss.
 
     The values equal those of interpolation to the full size.
 
@@ -74,7 +75,7 @@ def sampled_logits(maps: Tensor, size_px: Sequence[int], *, align_corners: bool)
 
 
 def sampled_ids(ids: Tensor) -> Tensor:
-    """The entries of (B, H, W) ids at the pixels of `sampled_logits`: (B, H // STEP_PX, W // STEP_PX)."""
+    """The class ids at the pixels of `sampled_logits`: (B, H // STEP_PX, W // STEP_PX) entries of the (B, H, W) ids."""
     height, width = (side // STEP_PX * STEP_PX for side in ids.shape[1:])
     chosen = []
     for index, one in enumerate(ids):
@@ -120,21 +121,22 @@ SHARES = (
     0.278, 0.101, 0.199, 0.0050, 0.0045, 0.0071, 0.0003, 0.0023, 0.054, 0.046, 0.250, 0.0031, 0.0004, 0.0083, 0.0035,
     0.0021, 0.0, 0.0003, 0.0002,
 )  # fmt: skip
-"""Share of each train id among the pixels of 1005 pictures of gear's towns."""
+"""Share of the pixels, 0..1, that belong to each train id, measured on 1005 pictures of gear's towns."""
 
 BALANCED: tuple[float, ...] = tuple(math.log(1.02 + share) ** -0.5 for share in SHARES)
-"""Weight of each class in the loss, from 2 (road) to 7: the square root of the weight by Paszke et al., "ENet",
-arXiv 1606.02147, section 5.2. The root is taken because hard example mining already leaves out most pixels of
-frequent classes.
+"""Weight of each class in the loss, from 2 (road) to 7: the square root of the class weight of Paszke et al.,
+"ENet", arXiv 1606.02147, section 5.2. The root is taken because hard example mining already leaves out most
+pixels of frequent classes.
 """
 
 
 class SegmentationLosses:
-    """Hard cross-entropy of the main head and of the training heads; see `hard_cross_entropy`.
+    """Computes the cross-entropy over hard pixels (`hard_cross_entropy`) for the main head and for each training
+    head.
 
     Attributes:
-        easy: pixels whose correct class has a lower probability count.
-        least: smallest share of the pixels that count.
+        easy: probability of the correct class, 0..1; pixels below it count as hard.
+        least: smallest share of the pixels that count, 0..1.
         auxiliary_weight: weight of each training head in the sum that training minimises.
         weights: weight of each class; () for equal weights.
     """

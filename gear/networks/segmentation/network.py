@@ -1,4 +1,4 @@
-"""Networks that assign one of the 19 classes that Cityscapes evaluates to every pixel."""
+"""The base of gear's segmentation networks, which assign one of Cityscapes' 19 evaluated classes to every pixel."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ VIEW = "left"
 LOGITS = "logits"
 MAPS = "maps"
 AUXILIARY = "auxiliary"
-"""Prefix of the names of the training heads' outputs: `auxiliary_0`, `auxiliary_1` and so on."""
+"""Prefix of the output names of the heads that only training uses: `auxiliary_0`, `auxiliary_1` and so on."""
 
 STRIDE_PX = 8
-"""Stride of the output maps; the sides of the network's input are multiples of it."""
+"""Stride of the output maps in pixels; the sides of the network's input are multiples of this number."""
 
 LABEL_ID_OF_TRAIN_ID = tuple(
     label.id for label in sorted(LABELS, key=lambda label: label.train_id) if label.train_id != IGNORED_TRAIN_ID
@@ -31,19 +31,19 @@ LABEL_IDS = np.array(LABEL_ID_OF_TRAIN_ID, dtype=np.uint8)
 CLASSES = len(LABEL_IDS)
 
 Losses = Callable[[Mapping[str, Tensor], Sequence[Any]], Mapping[str, Tensor]]
-"""Function from outputs and the batch's samples to scalar losses by name."""
+"""Type of a function from outputs and the batch's samples to scalar losses by name."""
 
 
 class SemsegNetwork(Network):
-    """A graph for semantic segmentation as a gear network.
+    """A torch module for semantic segmentation (the graph) as a gear network.
 
     Pictures are resized by `input_scale` and then to the nearest multiple of 8 on each side (bilinear, with
     anti-aliasing when reducing). Nothing is cropped or padded, and logits are interpolated back to the picture's size.
     With `input_scale` 1, pictures whose sides are multiples of 8 are not resized.
 
     Attributes:
-        graph: returns a list of maps (B, classes, h, w), the main head's first. Its `align_corners` says how they are
-            interpolated, and its `taps()` returns the named feature maps.
+        graph: returns a list of maps (B, classes, h, w), the main head's first. Its `align_corners` states how the
+            maps are interpolated, and its `taps()` returns modules by name.
         input_scale: factor by which pictures are resized before the network.
     """
 
@@ -66,27 +66,30 @@ class SemsegNetwork(Network):
         self._losses = losses
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The feature maps of the graph, by name."""
+        """The modules, by name, whose outputs are feature maps: those of the graph's own `taps()`."""
         taps: Mapping[str, nn.Module] = self.graph.taps()  # type: ignore[operator]
         return taps
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The output `logits` (B, 19, H, W); channels are in the order of Cityscapes train ids."""
+        """The output `logits` (B, 19, H, W) at the picture's size; channels are in the order of Cityscapes train
+        ids.
+        """
         picture = pictures[VIEW]
         return {LOGITS: self._resized(self._maps(picture, auxiliary=False)[0], picture.shape[2:])}
 
     def run_for_predictions(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `predictions`: on a CPU `maps`, the graph's own smaller logits, which is faster; on a GPU
-        `logits`.
+        """The input of `predictions`: on a CPU `maps`, the graph's smaller logit maps, from which predicting is
+        faster; on a GPU `logits` at the picture's size.
         """
         if self.device.type != "cpu":
             return self.run(pictures)
         return {MAPS: self._maps(pictures[VIEW], auxiliary=False)[0]}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `losses`: `logits`, and `auxiliary_0` and so on with the same shape.
+        """The input of `losses`: `logits`, and the logits `auxiliary_0` and so on of the training heads, with the
+        same shape.
 
-        In training mode they are computed only at the pixels of `gear.networks.segmentation.losses.sampled_logits`.
+        In training mode logits are computed only at the pixels of `gear.networks.segmentation.losses.sampled_logits`.
         """
         size_px, align = pictures[VIEW].shape[2:], bool(self.graph.align_corners)
         maps = self._maps(pictures[VIEW], auxiliary=True)
@@ -97,11 +100,11 @@ class SemsegNetwork(Network):
         return {LOGITS: main} | {f"{AUXILIARY}_{index}": other for index, other in enumerate(others)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The losses with which the network was built, by name."""
+        """The scalar losses by name, from the loss function with which the network was built."""
         return self._losses(outputs, targets)
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
-        """(H, W) uint8 label ids of each picture."""
+        """The predicted (H, W) uint8 Cityscapes label ids of each picture."""
         if LOGITS in outputs:
             return [LABEL_IDS[best_class(logits)] for logits in outputs[LOGITS]]
         align = bool(self.graph.align_corners)
@@ -123,7 +126,7 @@ class SemsegNetwork(Network):
 
 
 def inner_size(size_px: Sequence[int], scale: float) -> tuple[int, ...]:
-    """Height and width of the network's input: the picture's sides times `scale`, rounded to multiples of the
-    stride, at least one stride.
+    """Height and width of the network's input: the picture's sides times `scale`, rounded to multiples of
+    `STRIDE_PX`, at least `STRIDE_PX`.
     """
     return tuple(max(1, round(side * scale / STRIDE_PX)) * STRIDE_PX for side in size_px)

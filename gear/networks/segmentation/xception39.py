@@ -9,13 +9,13 @@ from torch.nn import functional
 
 STEM_PLANES = 8
 STAGES = ((16, 4), (32, 8), (64, 4))
-"""For the stages at 1/8, 1/16 and 1/32 of the picture's sides: number of planes and number of blocks."""
+"""Number of planes and number of blocks of the stages at 1/8, 1/16 and 1/32 of the picture's sides."""
 
 EXPANSION = 4
 
 
 class ConvBnRelu(nn.Module):
-    """A convolution without bias, with optional batch normalisation and optional ReLU after it."""
+    """A convolution without bias, followed by optional batch normalisation and optional ReLU."""
 
     def __init__(
         self, inputs: int, outputs: int, kernel: int, stride: int = 1, *, norm: bool = True, rectify: bool = True
@@ -48,7 +48,7 @@ class Separable(nn.Module):
 
 
 class Block(nn.Module):
-    """Three separable convolutions with a shortcut; ReLU follows the sum."""
+    """Residual block of Xception39: three separable convolutions with a shortcut; ReLU follows the sum."""
 
     def __init__(self, inputs: int, planes: int, stride: int) -> None:
         super().__init__()
