@@ -69,8 +69,7 @@ def autocast(device: torch.device, precision: Literal["auto", "float32", "bfloat
 @contextlib.contextmanager
 def seeded(seed: int) -> Iterator[None]:
     """A context in which layers draw their initial weights with `seed`. Afterwards torch's random generators have
-    the
-    state that they had before.
+    the state that they had before.
 
     Raises:
         GearError: torch does not accept the seed.

@@ -1,4 +1,4 @@
-"""Finds weights files and reads their metadata. The module does not import torch, so that listing them is quick."""
+"""Finds weights files and reads their metadata. The module does not import torch, so listing weights files is quick."""
 
 from __future__ import annotations
 
@@ -17,12 +17,14 @@ from gear.values.errors import GearError
 from gear.values.serial import Json
 
 GROUP = "gear.weights"
-"""Group of entry points; each names a module whose `FOLDER` contains `models/` and `patches/`."""
+"""Group of the entry points of weights packages; each entry point names a module whose `FOLDER` contains `models/`
+and `patches/`.
+"""
 
 CHECKOUT = Path(__file__).resolve().parents[2] / "weights" / "gear_weights"
 
 JSON_KEYS = ("metrics", "intervals", "options", "data", "look", "averaged")
-"""Metadata keys whose texts are JSON."""
+"""Keys of the metadata whose values are JSON texts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,15 +52,15 @@ class WeightsFile:
 
     @property
     def numbers(self) -> int:
-        """Number of values in the file, including normalisation statistics."""
+        """Number of scalars in the file: weights, and normalisation statistics."""
         return sum(math.prod(shape) for shape in self.shapes.values())
 
     def facts(self) -> dict[str, Json]:
-        """The metadata; JSON texts are decoded, other texts are unchanged."""
+        """The metadata by key; JSON texts are decoded, other texts are unchanged."""
         return {key: _read(text) if key in JSON_KEYS else text for key, text in self.metadata.items()}
 
     def option(self, name: str) -> Json:
-        """The value that the metadata state for an option of the model; None if they state none."""
+        """The value of a model's option, such as `input_scale`, that the metadata state; None if they state none."""
         options = self.facts().get("options")
         return options.get(name) if isinstance(options, dict) else None
 
@@ -93,20 +95,20 @@ def check_file(path: Path) -> None:
 
 
 def not_safetensors(path: str | Path, error: Exception) -> GearError:
-    """The error for a file that cannot be read as safetensors."""
+    """Makes the error for a file that cannot be read as safetensors; `error` is the exception that reading raised."""
     reason = str(error).splitlines()[0]
     return GearError(f"{path}: not a safetensors file ({reason}); gear weights convert makes one of a published file")
 
 
 def resolve(weights: str, name: str) -> Path | None:
-    """The weights file for the option `weights` of a network.
+    """Finds the weights file that the option `weights` of a network selects.
 
     Args:
-        weights: value of the option.
+        weights: value of the option: `shipped`, `none`, or the path of a file.
         name: name of the network.
 
     Returns:
-        None for random weights.
+        Path of the file; None for random weights.
 
     Raises:
         GearError: `weights` is `shipped` and no installed package has weights of this network.
@@ -127,7 +129,8 @@ def resolve(weights: str, name: str) -> Path | None:
 
 
 def trained_option(weights: str, name: str, option: str) -> Json:
-    """The value that a network's weights file states for one of its options; None if it states none.
+    """The value of one option of a network, such as `input_scale`, that its weights file states; None if the file
+    states none.
 
     Args:
         weights: value of the option `weights`.
@@ -159,7 +162,7 @@ def shipped_networks() -> list[str]:
 def shipped_folders() -> tuple[Path, ...]:
     """Folders of the installed weights packages, sorted by the packages' names.
 
-    In a checkout of the repository the folder next to gear comes last.
+    In a checkout of the repository, the folder `weights` next to the package gear comes last.
 
     Raises:
         GearError: a weights package cannot be imported, or has no folder.
@@ -182,7 +185,7 @@ def _read(text: str) -> Json:
 
 
 def shipped_patches() -> dict[str, Path]:
-    """Folders of pre-computed patches in the installed weights packages, by name."""
+    """Folders of the pre-computed patches in the installed weights packages, by name of the patch."""
     return {
         path.name: path
         for folder in reversed(shipped_folders())

@@ -1,9 +1,9 @@
-"""Imports torchvision next to a build of torch for which it was not compiled.
+"""Makes torchvision importable next to a build of torch for which it was not compiled.
 
 torchvision's wheels are linked with CUDA. With the CPU build of torch their compiled operators do not load. Then
-torchvision cannot be imported, nor can packages that import it: timm, and most of transformers. `prepare` defines the
-operators that detectors need and imports torchvision with them. If the builds fit, it only imports torchvision. Call it
-before importing torchvision, timm or transformers.
+neither torchvision can be imported nor packages that import it: timm, and most of transformers. `prepare` defines the
+operators that detectors need and imports torchvision with them. If the builds fit, `prepare` only imports torchvision.
+Call `prepare` before importing torchvision, timm or transformers.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ SCHEMAS = (
     "roi_align(Tensor input, Tensor rois, float spatial_scale, SymInt pooled_height, SymInt pooled_width, "
     "int sampling_ratio, bool aligned) -> Tensor",
 )
-"""Declarations of the operators, copied from torchvision. `qnms` (for quantised boxes) is declared but has no
-implementation.
+"""Declarations of torchvision's operators, copied from torchvision. `qnms` (for quantised boxes) is declared
+without an implementation.
 """
 
 _libraries: list[torch.library.Library] = []
@@ -38,7 +38,8 @@ _libraries: list[torch.library.Library] = []
 def prepare() -> bool:
     """Makes torchvision importable; further calls in a process do nothing.
 
-    If the builds do not fit, deformable convolution and position-sensitive pooling stay undefined.
+    If torchvision does not fit the build of torch, deformable convolution and position-sensitive pooling stay
+    undefined.
 
     Returns:
         True if torchvision is installed.
@@ -59,7 +60,7 @@ def prepare() -> bool:
 
 
 def need() -> None:
-    """Like `prepare`, for code that cannot run without torchvision.
+    """Makes torchvision importable, as `prepare` does, for code that cannot run without torchvision.
 
     Raises:
         GearError: torchvision is not installed.

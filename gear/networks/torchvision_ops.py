@@ -11,7 +11,7 @@ from gear.values.geometry import Array
 
 
 def nms(boxes: Tensor, scores: Tensor, iou_threshold: float) -> Tensor:
-    """Greedy non-maximum suppression.
+    """Greedy non-maximum suppression, with the results of torchvision's `nms`.
 
     Args:
         boxes: (N, 4) left, top, right, bottom.
@@ -41,9 +41,11 @@ def nms(boxes: Tensor, scores: Tensor, iou_threshold: float) -> Tensor:
 def roi_align(
     features: Tensor, rois: Tensor, spatial_scale: float, height: int, width: int, sampling_ratio: int, aligned: bool
 ) -> Tensor:
-    """Averages of bilinear samples in each cell of a grid over each region (RoIAlign; He et al., Mask R-CNN, 2017).
+    """RoIAlign (He et al., Mask R-CNN, 2017): averages bilinear samples of the features in each cell of a grid
+    over each region.
 
-    Differentiable with respect to the features. Regions are not rounded, as in torchvision.
+    The result is differentiable with respect to the features. As in torchvision, regions are not rounded to whole
+    pixels.
 
     Args:
         features: (B, C, H, W).

@@ -19,26 +19,30 @@ from gear.networks.shipped import check_file, not_safetensors, resolve
 from gear.values.errors import GearError
 
 OPTIONAL = "num_batches_tracked"
-"""Name of a counter that older files lack and that no computation uses."""
+"""Name of a counter of batch normalisation that older files lack and that no computation uses."""
 
 SHORT = (torch.float16, torch.bfloat16, torch.float8_e4m3fn, torch.float8_e5m2)
-"""Number formats with fewer bits than the float32 of gear's networks."""
+"""Floating-point formats with fewer bits than the float32 of gear's networks; such tensors are converted when they
+are read.
+"""
 
 SHOWN_KEYS = 3
 
 HEADER_AT = 8
-"""Offset of the header in bytes: a safetensors file is the header's length, the header as JSON, and the tensors."""
+"""Offset of the JSON header in bytes. A safetensors file consists of the header's length, the header, and the
+tensors.
+"""
 
 LEAST_SHARED = 0.25
-"""Smallest share of a network's values that a file must contain to count as its trunk. Heads are small; a few
-equal layers can be a coincidence.
+"""Smallest share of a network's values that another network's file must provide to count as a file of the same
+trunk. Heads are small; a few equal layers can be a coincidence.
 """
 
 GraphT = TypeVar("GraphT", bound=nn.Module)
 
 
 def build_graph(make: Callable[[], GraphT], options: NetworkOptions, name: str) -> GraphT:
-    """Makes a network's graph with the weights that its options name.
+    """Builds a network's torch module with the weights that its options select.
 
     Args:
         make: function that builds the graph; its layers draw their initial weights with `options.seed`.
@@ -77,7 +81,7 @@ def load_trunk(network: nn.Module, path: str | Path) -> tuple[int, int]:
     """Loads those tensors of another network's file whose keys and shapes fit; the other weights are not changed.
 
     Returns:
-        How many of the network's values were loaded, and how many values it has.
+        The number of the network's values that were loaded, and the number of all its values.
 
     Raises:
         GearError: the file does not exist, is not safetensors, or shares less than `LEAST_SHARED` of the network's
@@ -99,13 +103,13 @@ def load_trunk(network: nn.Module, path: str | Path) -> tuple[int, int]:
 
 
 def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> list[str]:
-    """The reasons why a state does not fit a network; empty if it fits.
+    """Lists the reasons why tensors from a file do not fit a network; the list is empty if they fit.
 
     The reasons are missing and unknown keys, wrong shapes, wrong kinds of numbers, and numbers that are not finite.
 
     Args:
         wanted: the network's own tensors by key.
-        given: the tensors that are to be loaded.
+        given: the tensors that are to be loaded, by key.
     """
     missing = [key for key in wanted if key not in given and not key.endswith(OPTIONAL)]
     surplus = [key for key in given if key not in wanted]
@@ -149,12 +153,12 @@ def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
 
 
 def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> None:
-    """Writes a weights file; it appears whole or not at all. `serialised` documents the arguments."""
+    """Writes a weights file; the file appears whole or not at all. `serialised` documents the arguments."""
     write_alone(Path(path), serialised(state, metadata, halves=halves))
 
 
 def serialised(state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> bytes:
-    """The bytes of a safetensors file; equal tensors and metadata give equal bytes.
+    """The bytes of a safetensors file; the same tensors and metadata always give the same bytes.
 
     Args:
         state: tensors by key.

@@ -60,8 +60,8 @@ class DdrnetDepth(DepthNetwork):
         return {DEPTH: MIDDLE_M * resized(channel.float(), height, width)[:, 0].clamp(least, most).exp()}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """Three losses: scale-invariant error, mean relative error, and root mean square error in units of
-        20 m (`RMS_UNIT_M`).
+        """Three losses: scale-invariant error, mean relative error, and root mean square error in units of 20 m
+        (`RMS_UNIT_M`).
 
         The scale-invariant error is dominated by outliers; the mean relative error is robust to them.
         """

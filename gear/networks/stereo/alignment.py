@@ -1,9 +1,9 @@
-"""Dense photometric alignment (Stereo R-CNN, section 4.2): finds the depth at which the pixels of a car match best in
-both pictures.
+"""Dense photometric alignment (Stereo R-CNN, section 4.2): finds the depth of a car at which its pixels match best
+between the left and the right picture.
 
-Each pixel in the lower half of the car's box gets the depth of the 3D box's surface, relative to the depth of the box's
-centre. The centre is then moved along the depth axis until the sum of absolute differences between the pictures is
-smallest.
+Each pixel in the lower half of the car's 2D box gets the depth of the 3D box's surface, relative to the depth of the
+box's centre. The centre is then moved along the depth axis until the sum of absolute differences between the pictures
+is smallest.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from gear.values.geometry import Array
 
 UPSAMPLED = 2
 MOST_SAMPLES = 56
-"""Largest number of rows, and of columns, that are compared; in larger boxes only some are taken."""
+"""Largest number of rows, and of columns, of a car's box that are compared; larger boxes are sampled."""
 
 COARSE_STEPS, COARSE_M = 50, 0.5
 FINE_STEPS, FINE_M = 20, 0.05
@@ -32,7 +32,7 @@ NEAREST_M = 1.5
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Pair:
-    """Both pictures, at the size at which they are compared.
+    """The left and the right picture, at the size at which they are compared.
 
     Attributes:
         left, right: (1, 3, h, w) float.
@@ -45,7 +45,7 @@ class Pair:
 
     @staticmethod
     def of(left: Tensor, right: Tensor, scale: float) -> Pair:
-        """Enlarges two pictures by two for the comparison.
+        """Makes a pair from two pictures, which are enlarged by a factor of two for the comparison.
 
         Args:
             left, right: (1, 3, H, W) pictures.
@@ -59,7 +59,8 @@ class Pair:
 
 
 def align(pair: Pair, box: Box3d, measured: Measured, calibration: Calibration) -> float | None:
-    """Depth of the centre of a car's 3D box in metres; None if no pixel of the car is visible in both pictures.
+    """Estimates the depth of the centre of a car's 3D box in metres; None if no pixel of the car is visible in
+    both pictures.
 
     Args:
         pair: the pictures.

@@ -1,9 +1,9 @@
-"""Computes the 3D box of a car from its boxes in both pictures and one corner (Stereo R-CNN, section 4).
+"""Computes the 3D box of a car from its 2D boxes in both pictures and one ground corner (Stereo R-CNN, section 4).
 
-Seven measurements determine position and heading of a box of known size: the four sides of the left box, the left and
-right side of the right box, and the column of the ground corner that is visible between the sides. Which corner of the
-3D box lies on which side depends on the view. The authors choose among eight cases from a table. Here the corners are
-projected, the equations are solved, and the corners are projected again, until the assignment no longer changes.
+Seven measurements determine position and heading of a box of known size: the four sides of the left 2D box, the left
+and right side of the right 2D box, and the column of the ground corner that is visible between the sides. Which corner
+of the 3D box lies on which side depends on the view. The authors choose among eight cases from a table. This module
+projects the corners, solves the equations, and projects the corners again, until the assignment no longer changes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from gear.values.geometry import Array, wrap_angle_rad
 from gear.values.ground_truth import BoxPx
 
 BORDER_PX = (20.0, 10.0)
-"""A side of a 2D box that is nearer than this to the picture's edge (in x and y) may be cut by the picture."""
+"""Distance from the picture's edge, in x and in y, below which a side of a 2D box may be cut by the picture."""
 
 LEAST_BOX_PX, LEAST_SEEN_PX = 10.0, 3.0
 CORNER_WEIGHT = 2.0
@@ -29,14 +29,14 @@ NEAREST_M = 0.5
 ROUNDS = 5
 
 SIGNS = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)]) / 2
-"""Positions of the ground corners, as shares of the car's width to the right and of its length to the front, in
-the order of the keypoint's four types.
+"""Positions of the four ground corners, as shares of the car's width (to the right) and of its length (to the
+front), in the order of `Measured.corner`.
 """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
-    """What a network measures of one car, in index pixels of the pictures.
+    """The measurements of one car that a stereo network predicts, in index pixels of the pictures.
 
     Attributes:
         left_px: box in the left picture: left, top, right, bottom.
@@ -61,14 +61,16 @@ class Measured:
 
     @property
     def alpha_of_corner_rad(self) -> float:
-        """Rough observation angle, from the position of the corner between the sides."""
+        """Rough observation angle in radians, from the position of the visible ground corner between the sides of
+        the 2D box.
+        """
         share = (self.corner_px - self.left_px[0]) / max(self.left_px[2] - self.left_px[0], 1e-6)
         turned = math.asin(min(max(share, -1.0), 1.0))
         return wrap_angle_rad((-math.pi / 2, math.pi, math.pi / 2, 0.0)[self.corner] - turned)
 
 
 def solve_box(measured: Measured, calibration: Calibration, depth_m: float | None = None) -> Box3d | None:
-    """The 3D box that fits the measurements best, in the least-squares sense.
+    """Finds the 3D box that fits the measurements of one car best, in the least-squares sense.
 
     Args:
         measured: measurements of one car.
@@ -76,7 +78,7 @@ def solve_box(measured: Measured, calibration: Calibration, depth_m: float | Non
         depth_m: depth of the box's centre if it is known from alignment; the right picture is then not used.
 
     Returns:
-        None if the 2D boxes are too small, the car is hardly visible, or no plausible box fits.
+        The box; None if the 2D boxes are too small, the car is hardly visible, or no plausible box fits.
     """
     left, top, right, bottom = measured.left_px
     seen_px = measured.borders_px[1] - measured.borders_px[0]

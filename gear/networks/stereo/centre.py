@@ -1,13 +1,16 @@
-"""Stereo networks that find objects in a rectified pair of pictures by their centres.
+"""Stereo networks that detect objects in a rectified pair of pictures by their centres.
 
 Both pictures pass the same first layers of a trunk. Their features are correlated over disparities at half the
 resolution (as in DispNetC, Mayer et al., CVPR 2016). The result passes, together with the left features, the trunk's
-other layers and a feature pyramid. Each cell of the finest level then predicts whether the centre of an object lies
-there, and the properties of that object (CenterNet, Zhou et al., 2019; StereoCenterNet, Shi et al., 2021; RTS3D, Li et
+other layers and a feature pyramid. Each cell of the finest level then predicts whether the centre of an object lies in
+it, and the properties of that object (CenterNet, Zhou et al., 2019; StereoCenterNet, Shi et al., 2021; RTS3D, Li et
 al., AAAI 2021).
-Heading is predicted as a distribution over directions (as in Mousavian et al., CVPR 2017): if front and rear of a car
-are confused, the result is one of both headings and not their mean. Disparity of an object's centre is the expectation
-of a distribution over bins with equal steps of its logarithm, plus a correction, with an uncertainty.
+
+The heading is predicted as a distribution over directions (as in Mousavian et al., CVPR 2017). A network that confuses
+front and rear of a car therefore predicts one of the two headings and not their mean. The disparity of an object's
+centre is the expectation of a distribution over bins with equal steps of the disparity's logarithm, plus a correction,
+with an uncertainty.
+
 There are no anchors and no matching of boxes; all outputs are differentiable with respect to the pixels.
 """
 
@@ -24,22 +27,22 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 KINDS = ("Car", "Van", "Truck", "Pedestrian", "Cyclist", "Misc")
-"""KITTI's object types, in the order of the channels of `heat`."""
+"""KITTI's object types that the networks detect, in the order of the channels of the output `heat`."""
 
 STRIDE = 4
 MULTIPLE = 32
 MATCHING_STRIDE = 2
 PRIOR_SIZE_M = (1.6, 1.8, 3.9)
 HEADINGS = 24
-"""Number of directions, evenly spaced from 0, of the distribution of an observation angle."""
+"""Number of bins of the distribution over observation angles; bins are evenly spaced from 0."""
 
 PRIOR_HEAT = -4.6
-"""Probability of a centre in every cell before training."""
+"""Logit of a centre in every cell before training; it is the logit of a probability of 0.01."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoCentreShape:
-    """Numbers that determine the size of the network.
+    """Numbers that determine the size of a centre-based stereo network.
 
     Attributes:
         width: number of channels of the matched features; the volume, the pyramid and the heads have multiples of it.
@@ -68,15 +71,16 @@ def conv_relu(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Seque
 
 
 def correlate(left: Tensor, right: Tensor, disparities: int) -> Tensor:
-    """Cosine similarity of the left features at column x and the right features at column x - d.
+    """Computes the correlation volume: cosine similarity of the left features at column x and the right features
+    at column x - d.
 
     Args:
         left, right: (B, C, H, W) features of a rectified pair.
         disparities: number of values of d, which are 0 .. disparities - 1.
 
     Returns:
-        (B, disparities, H, W), float32 also under autocast, because differences below one disparity step are smaller
-        than the precision of bfloat16; 0 where x - d lies outside.
+        (B, disparities, H, W); 0 where x - d lies outside. The dtype is float32 also under autocast, because
+        differences below one disparity step are smaller than the precision of bfloat16.
     """
     with torch.autocast(left.device.type, enabled=False):
         return _band(left.float(), right.float(), disparities)
@@ -95,7 +99,7 @@ def _band(left: Tensor, right: Tensor, disparities: int) -> Tensor:
 
 
 class Head(nn.Module):
-    """A hidden layer and an output layer, applied to each cell."""
+    """Output head: a hidden layer and an output layer, applied to each cell of a feature map."""
 
     def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
         super().__init__()
@@ -105,7 +109,7 @@ class Head(nn.Module):
         self.start_at(0.0)
 
     def start_at(self, value: float) -> None:
-        """Sets the bias of the output layer, which is the output in every cell before training."""
+        """Sets the bias of the output layer to `value`, so that every output is about `value` before training."""
         assert self.out.bias is not None
         nn.init.constant_(self.out.bias, value)
 
@@ -116,7 +120,8 @@ class Head(nn.Module):
 
 
 class CentreGraph(nn.Module, ABC):
-    """Base class of the graphs: matching, pyramid and heads. A subclass provides the trunk.
+    """Base class of the centre-based stereo networks' torch modules: matching, pyramid and heads. A subclass
+    provides the trunk.
 
     The input are two normalised pictures, the output is a dictionary of maps.
     """
@@ -124,7 +129,7 @@ class CentreGraph(nn.Module, ABC):
     log_bins: Tensor
 
     corrects_surface: ClassVar[bool] = False
-    """True if the network predicts the disparity of an object's centre as a correction of the disparity of the
+    """Whether the network predicts the disparity of an object's centre as a correction of the disparity of the
     visible surface, which follows from the volume alone.
     """
 
@@ -163,23 +168,25 @@ class CentreGraph(nn.Module, ABC):
 
     @abstractmethod
     def shared_layers(self) -> Mapping[str, nn.Module]:
-        """The layers of the trunk that both pictures pass, by key name.
+        """The trunk's layers that process both pictures, by key name.
 
-        They come before the layers of the volume, and `left_layers` after them: hashes of weights depend on the order
-        of the keys.
+        In the state dict these layers come before the layers of the correlation volume, and `left_layers` come after.
+        This order is fixed, because hashes of weights depend on the order of the keys.
         """
 
     @abstractmethod
     def left_layers(self) -> Mapping[str, nn.Module]:
-        """Layers of the trunk behind the cost volume, which only the left picture's features pass, by key name."""
+        """The trunk's layers after the correlation volume, by key name; they process the features of the left
+        picture only.
+        """
 
     @abstractmethod
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Feature maps of single pictures (B, 3, H, W): at stride 2, (B, C, H / 2, W / 2), and at stride 4."""
+        """The feature maps of single pictures (B, 3, H, W): (B, C, H / 2, W / 2) at stride 2, and a map at stride 4."""
 
     @abstractmethod
     def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
-        """Feature maps of the left pictures at strides 4, 8, 16 and 32.
+        """The trunk's feature maps of the left pictures at strides 4, 8, 16 and 32.
 
         Args:
             coarse: features of the left pictures at stride 4.
@@ -187,7 +194,7 @@ class CentreGraph(nn.Module, ABC):
         """
 
     def forward(self, left: Tensor, right: Tensor) -> dict[str, Tensor]:
-        """Maps (B, ..., H / 4, W / 4) by name; lengths are in pixels of the given pictures.
+        """Predicts maps (B, ..., H / 4, W / 4) by name; lengths are in pixels of the input pictures.
 
         Args:
             left, right: (B, 3, H, W), normalised; H and W are multiples of 32.
@@ -253,16 +260,15 @@ def _exp(raw: Tensor) -> Tensor:
 
 
 def fit_to_network(picture: Tensor, scale: float) -> tuple[Tensor, tuple[float, float]]:
-    """Converts pictures to the network's input: resized by `scale` and padded at the right and the bottom to multiples
-    of 32.
+    """Converts pictures to the network's input: resized by `scale`, and padded at the right and the bottom to
+    multiples of 32.
 
     Args:
         picture: (B, 3, H, W).
         scale: factor on H and W.
 
     Returns:
-        The network's input (B, 3, h, w), and how many pixels of the given picture one pixel of the input is, in x and
-        in y.
+        The network's input (B, 3, h, w), and the size of one pixel of the input in pixels of `picture`, in x and in y.
     """
     height, width = picture.shape[-2:]
     size = (max(1, round(height * scale)), max(1, round(width * scale)))
@@ -273,7 +279,9 @@ def fit_to_network(picture: Tensor, scale: float) -> tuple[Tensor, tuple[float, 
 
 
 def in_picture_px(raw: Mapping[str, Tensor], ratio: tuple[float, float]) -> dict[str, Tensor]:
-    """Converts lengths in the graph's outputs to pixels of a picture that is `ratio` (in x and in y) times as large."""
+    """Converts lengths in the graph's outputs from pixels of its input to pixels of the picture; `ratio` is the
+    size of an input pixel in picture pixels (x, y).
+    """
     x, y = ratio
     factors = {"sides_px": (x, y, x, y), "centre_px": (x, y), "disparity_px": (x,)}
     return {

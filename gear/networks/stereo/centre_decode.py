@@ -17,22 +17,22 @@ from gear.metrics.boxes import iou_2d
 from gear.values.geometry import Array, Intrinsics, wrap_angle_rad
 
 TRUSTED_M = 1.0
-"""Tolerance of depth in metres. A detection's score is the geometric mean of the probabilities that it is an
+"""Tolerance of depth in metres. A detection's score is the geometric mean of three probabilities: that it is an
 object, that its depth is right within this tolerance, and (for `LONG` kinds) that its axis is right.
 """
 
 LONG = ("Car", "Van", "Truck", "Cyclist")
-"""Kinds of objects whose 3D boxes change much when they are turned."""
+"""Kinds of objects whose 3D boxes overlap much less after a rotation, because they are longer than wide."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Peaks:
-    """Rules by which centres become detections.
+    """Rules by which peaks of the centre map become detections.
 
     Attributes:
         most: largest number of detections in a picture.
         least_score: smallest score that is reported.
-        same_overlap: two detections with a larger IoU of their 2D boxes are the same object, if their depths agree too.
+        same_overlap: IoU of the 2D boxes above which two detections are the same object, if their depths agree as well.
         same_depth: largest relative difference of the depths of two detections of the same object.
     """
 
@@ -49,7 +49,7 @@ def decode(
     cell_px: tuple[float, float],
     peaks: Peaks,
 ) -> list[tuple[KittiLabel, ...]]:
-    """The detections of each picture of a batch, highest score first.
+    """Converts the outputs for a batch to the detections of each picture, highest score first.
 
     Args:
         outputs: result of `gear.networks.stereo.centre.CentreGraph.forward`, lengths in pixels of the picture.
@@ -124,11 +124,11 @@ def _label(
 
 
 def heading_rad(logits: Array) -> tuple[Array, Array]:
-    """Angles of distributions over directions that are evenly spaced from 0.
+    """Computes angles from distributions over directions that are evenly spaced from 0.
 
-    First the axis is chosen for which the probabilities of both of its ends have the largest sum, so that confusion of
-    front and rear does not turn the axis. It is refined by the mean of the best direction and its neighbours. The more
-    likely end is the front.
+    The axis is chosen first: the axis whose two ends have the largest sum of probabilities. A confusion of front and
+    rear therefore does not turn the axis. The angle is refined by the mean of the best direction and its neighbours.
+    The more likely end of the axis is the front.
 
     Args:
         logits: (..., directions).

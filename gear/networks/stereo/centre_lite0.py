@@ -1,9 +1,9 @@
-"""The centre-based stereo network (`gear.networks.stereo.centre`) on EfficientNet-Lite0, with ImageNet weights at the
-start.
+"""The centre-based stereo network (`gear.networks.stereo.centre`) with EfficientNet-Lite0 as trunk, initialised
+with ImageNet weights.
 
-Both pictures pass the layers at 1/2 and 1/4 of their sides; the left picture's map at 1/4 passes the others. A layer
-with small initial weights adds the correlation volume to that map, so that at first the trunk receives inputs like
-those on which it was trained.
+Both pictures pass the trunk's layers at 1/2 and 1/4 of their sides; the left picture's map at 1/4 passes the later
+layers. A layer with small initial weights adds the correlation volume to that map. At first the later layers therefore
+receive inputs like those on which they were trained.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from gear.networks.efficientnet_lite0 import CHANNELS, LEVELS, OnLite0, features
 from gear.networks.stereo.centre import CentreGraph, StereoCentreShape
 
 FUSE_STD = 0.01
-"""Initial standard deviation of the weights of the layer that adds the volume; it adds less than a hundredth of
-the trunk's own map.
+"""Initial standard deviation of the weights of the layer that adds the correlation volume; at first it adds less
+than a hundredth of the trunk's own map.
 """
 
 
 class StereoCentreLite0(CentreGraph, OnLite0):
-    """The graph; parameters of the trunk have timm's names."""
+    """The torch module of the network; parameters of the trunk have timm's names."""
 
     corrects_surface = True
 
@@ -33,28 +33,28 @@ class StereoCentreLite0(CentreGraph, OnLite0):
         super().__init__(shape, CHANNELS, pyramid=2 * shape.width)
 
     def shared_layers(self) -> Mapping[str, nn.Module]:
-        """`trunk`, the whole trunk, since timm's layers lie in one module."""
+        """The trunk as a whole, under the key `trunk`, because timm's layers lie in one module."""
         return {"trunk": features_of_lite0(range(len(LEVELS)))}
 
     def left_layers(self) -> Mapping[str, nn.Module]:
-        """`fuse`, the layer that adds the volume."""
+        """The layer that adds the correlation volume to the left features, under the key `fuse`."""
         fuse = nn.Conv2d(2 * self.shape.width, CHANNELS[1], 1, bias=False)
         nn.init.normal_(fuse.weight, std=FUSE_STD)
         return {"fuse": fuse}
 
     def lite0(self) -> nn.Module:
-        """The trunk, an EfficientNet-Lite0."""
+        """The trunk, an EfficientNet-Lite0 with the parameter names of timm."""
         return self.trunk
 
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Feature maps of the first two levels, at strides 2 and 4."""
+        """The feature maps of (B, 3, H, W) pictures at the trunk's first two levels, at strides 2 and 4."""
         trunk = self.trunk
         fine = trunk.get_submodule("blocks.0")(trunk.get_submodule("bn1")(trunk.get_submodule("conv_stem")(pictures)))
         return fine, trunk.get_submodule("blocks.1")(fine)
 
     def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
-        """Feature maps at strides 4, 8, 16 and 32: the input of the third stage, and the last map of each later
-        level.
+        """The left feature maps at strides 4, 8, 16 and 32: the input of the third stage, and the last map of each
+        later level.
         """
         maps = [coarse + self.fuse(volume)]
         for level in LEVELS[2:]:

@@ -22,13 +22,17 @@ from gear.values.ground_truth import BoxPx
 Whole = npt.NDArray[np.int64]
 
 PEAK_SHARE = 0.54 / 6
-"""Standard deviation of a centre's Gaussian as a share of the box's side (TTFNet, Liu et al., AAAI 2020)."""
+"""Standard deviation of the Gaussian around a centre, as a share of the 2D box's side (TTFNet, Liu et al., AAAI
+2020).
+"""
 
 LEAST_SIGMA = 0.7
-"""Smallest standard deviation in cells, so that the Gaussian of a small object reaches the neighbouring cells."""
+"""Smallest standard deviation of that Gaussian in cells; with it the Gaussian of a small object reaches the
+neighbouring cells.
+"""
 
 COUNTED_FROM = 0.1
-"""Cells where the Gaussian has at least this value are trained on the object."""
+"""Value of the Gaussian from which a cell is trained to predict the object's properties."""
 
 FOCAL_POWER, BUMP_POWER = 2.0, 4.0
 ALMOST_ZERO = 1e-6
@@ -60,7 +64,7 @@ class LabelledPair(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """The grid of the outputs' cells over the picture.
+    """The grid of the network's output cells over the picture.
 
     Attributes:
         height, width: number of cells.
@@ -72,24 +76,24 @@ class Grid:
     cell_px: tuple[float, float]
 
     def cell_of(self, u_px: float, v_px: float) -> tuple[float, float]:
-        """Column and row of the cell at a point (index pixels), as fractions; the middle of the first cell is
-        (0, 0).
+        """Column and row, as fractions, of the cell that contains a point (index pixels); the middle of the first
+        cell is (0, 0).
         """
         return (u_px + 0.5) / self.cell_px[0] - 0.5, (v_px + 0.5) / self.cell_px[1] - 0.5
 
     def middles_px(self, rows: Whole, columns: Whole) -> Array:
-        """(N, 2) centres x, y of cells in index pixels."""
+        """The (N, 2) centres x, y of the cells with the given rows and columns, in index pixels."""
         return np.stack([(columns + 0.5) * self.cell_px[0] - 0.5, (rows + 0.5) * self.cell_px[1] - 0.5], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CentreTargets:
-    """Training targets of the cells of a batch.
+    """Training targets of all cells of a batch.
 
     Attributes:
         heat: (B, K, h, w) 0..1, 1 at the cells of the centres; K kinds of objects.
         is_counted: (B, 1, h, w) bool; False inside ignored objects.
-        where: (N, 3) batch index, row and column of the cells that are trained on an object.
+        where: (N, 3) batch index, row and column of the N cells that are trained on an object.
         weight: (N,) weight of each of these cells; the weights of one object sum to 1.
         values: (N, 11) sides (4), centre (2), size (3), observation angle and occluded share, as in the network's
             outputs.
@@ -179,12 +183,12 @@ def _surface_px(sample: LabelledPair, grid: Grid) -> Array:
 
 
 def middle_of(box: Box3d) -> Array:
-    """(3,) centre of the box in the camera's frame, metres."""
+    """The (3,) centre of a 3D box in the camera's frame, metres."""
     return np.array(box.bottom_m) - (0, box.height_m / 2, 0)
 
 
 def disparity_px(box: Box3d, calibration: Calibration) -> float:
-    """Disparity of the box's centre, f B / z, in pixels of the picture."""
+    """The disparity of a 3D box's centre, focal length * baseline / depth, in pixels of the picture."""
     return calibration.intrinsics.focal_px * calibration.baseline_m / float(middle_of(box)[2])
 
 
@@ -225,15 +229,18 @@ def _values(thing: LabelledObject, calibration: Calibration, middles_px: Array) 
 def centre_losses(
     outputs: Mapping[str, Tensor], targets: CentreTargets, *, bins_px: Tensor, cell_px: tuple[float, float]
 ) -> dict[str, Tensor]:
-    """The losses of the centre-based networks, weighted so that training can minimise their sum.
+    """The scalar losses of the centre-based networks by name, weighted for training to minimise their sum.
 
     - `heat`: the focal loss of CenterNet.
+    - `sides`, `size`: mean absolute difference of the logarithms of the 2D box's sides and of the object's size.
+    - `centre`: smooth L1 loss of the projected 3D centre, in cells.
+    - `heading`: cross-entropy over the directions.
+    - `hidden`: binary cross-entropy of the occluded share.
     - `disparity`: negative log-likelihood of a Laplace density over the disparity's logarithm (Kendall and Gal, NeurIPS
-      2017), so that one unit is the same relative error of depth at all distances; plus the cross-entropy of the bins,
-      with the target shared between the two nearest bins.
+      2017), plus the mean absolute error of that logarithm. One unit is the same relative error at all distances.
+    - `disparity_bins`: cross-entropy of the disparity bins, with the target shared between the two nearest bins.
     - `surface`: the same cross-entropy for the disparities that the volume alone predicts in cells on vehicles. It
       trains the matching features.
-    - `heading`: cross-entropy over the directions.
 
     Args:
         outputs: result of `gear.networks.stereo.centre.CentreGraph.forward`, lengths in pixels of the picture.

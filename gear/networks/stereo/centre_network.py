@@ -1,4 +1,4 @@
-"""The centre-based stereo networks as gear networks."""
+"""The gear network around the centre-based stereo graphs: it prepares pictures, and computes losses and predictions."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from gear.networks.weights import build_graph
 class StereoCentreNetwork(Network):
     """A centre-based stereo network as a gear network.
 
-    Its outputs are those of `gear.networks.stereo.centre.CentreGraph.forward`, with lengths in pixels of the given
-    pictures.
+    Its outputs are maps by name, as `gear.networks.stereo.centre.CentreGraph.forward` returns them, with lengths in
+    pixels of the original pictures.
     """
 
     graph: CentreGraph
@@ -52,7 +52,7 @@ class StereoCentreNetwork(Network):
         self._taps = dict(taps)
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The maps of the graph, by name."""
+        """The output maps (B, ..., h, w) of the graph by name, with lengths in pixels of the original pictures."""
         # Channels last: a quarter faster on the CPU, in float32 and in bfloat16.
         pair = [self.normalise(pictures[name]).contiguous(memory_format=torch.channels_last) for name in (LEFT, RIGHT)]
         left, ratio = fit_to_network(pair[0], self.input_scale)
@@ -60,7 +60,9 @@ class StereoCentreNetwork(Network):
         return in_picture_px(self.graph(left, right), ratio)
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[LabelledPair]) -> Mapping[str, Tensor]:
-        """The losses of `gear.networks.stereo.centre_losses.centre_losses`."""
+        """The scalar losses by name: heat, 2D box, centre, size, heading, occlusion and disparity
+        (`gear.networks.stereo.centre_losses.centre_losses`).
+        """
         intrinsics = targets[0].calibration.intrinsics
         ratio = self._ratio((intrinsics.height_px, intrinsics.width_px))
         height, width = outputs["heat"].shape[-2:]
@@ -69,14 +71,16 @@ class StereoCentreNetwork(Network):
         return centre_losses(outputs, centre_targets(targets, KINDS, grid), bins_px=bins_px, cell_px=grid.cell_px)
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
-        """Detections of each picture, as KITTI labels with scores."""
+        """The detections of each picture, as KITTI labels with scores."""
         ratio = self._ratio(size_px)
         cell_px = (STRIDE * ratio[0], STRIDE * ratio[1])
         peaks = Peaks(least_score=self.options.least_score)
         return decode(outputs, KINDS, self.options.calibration(size_px), cell_px, peaks)
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The feature maps `layer1` (of both pictures, left ones first), `volume`, and `layer2` to `layer4`."""
+        """The modules whose outputs are feature maps: `layer1` (both pictures, the left ones first), `volume`, and
+        `layer2` to `layer4`.
+        """
         return {name: self.graph.get_submodule(layer) for name, layer in self._taps.items()}
 
     def _ratio(self, size_px: tuple[int, ...]) -> tuple[float, float]:

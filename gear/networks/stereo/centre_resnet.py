@@ -1,4 +1,4 @@
-"""The centre-based stereo network (`gear.networks.stereo.centre`) on a ResNet-18."""
+"""The centre-based stereo network (`gear.networks.stereo.centre`) with a ResNet-18 as trunk."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gear.networks.stereo.centre import CentreGraph, StereoCentreShape, conv, co
 
 
 class Block(nn.Module):
-    """ResNet's basic block; its shortcut averages before the projection (ResNet-D, He et al., CVPR 2019)."""
+    """ResNet's basic block, whose shortcut averages features before the projection (ResNet-D, He et al., CVPR 2019)."""
 
     def __init__(self, inputs: int, outputs: int, stride: int) -> None:
         super().__init__()
@@ -39,8 +39,8 @@ def _channels(shape: StereoCentreShape) -> list[int]:
 
 
 class StereoCentre(CentreGraph):
-    """The graph: both pictures pass the stem and one stage of the ResNet; the left picture and the volume pass
-    the other stages.
+    """The torch module of the network: both pictures pass the stem and one stage of the ResNet; the left features
+    and the correlation volume pass the later stages.
     """
 
     stem: nn.Module
@@ -54,7 +54,7 @@ class StereoCentre(CentreGraph):
         super().__init__(shape, (shape.width, *_channels(shape)), pyramid=3 * shape.width)
 
     def shared_layers(self) -> Mapping[str, nn.Module]:
-        """`stem` and `layer1`, which both pictures pass."""
+        """The layers `stem` and `layer1`, which process both pictures, by key name."""
         width = self.shape.width
         return {
             "stem": nn.Sequential(conv_relu(3, width, 3, 2), conv_relu(width, width, 3)),
@@ -62,7 +62,9 @@ class StereoCentre(CentreGraph):
         }
 
     def left_layers(self) -> Mapping[str, nn.Module]:
-        """`fuse` and `layer2` to `layer4`, which the left picture and the volume pass."""
+        """The layers `fuse` and `layer2` to `layer4`, which process the left features and the correlation volume,
+        by key name.
+        """
         one, two, three, four = _channels(self.shape)
         return {
             "fuse": conv_relu(one + 2 * self.shape.width, one, 1),
@@ -72,13 +74,13 @@ class StereoCentre(CentreGraph):
         }
 
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Feature maps of the stem and the first stage, at strides 2 and 4."""
+        """The feature maps of (B, 3, H, W) pictures after the stem and the first stage, at strides 2 and 4."""
         fine = self.stem(pictures)
         return fine, self.layer1(fine)
 
     def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
-        """Feature maps at strides 4, 8, 16 and 32: the input of the second stage, and the outputs of the later
-        stages.
+        """The left feature maps at strides 4, 8, 16 and 32: the input of the second stage, and the outputs of the
+        later stages.
         """
         maps = [self.fuse(torch.cat([coarse, volume], dim=1))]
         for layer in (self.layer2, self.layer3, self.layer4):

@@ -1,4 +1,4 @@
-"""Boxes in the convention of the first Faster R-CNN.
+"""Boxes in the convention of the first Faster R-CNN, which Stereo R-CNN uses.
 
 Right and bottom are the last pixels inside the box, so a side has the length right - left + 1. All boxes are (…, 4):
 left, top, right, bottom.
@@ -10,19 +10,19 @@ import torch
 from torch import Tensor
 
 MOST_GROWTH = 4.135
-"""Largest logarithm of the ratio between the sizes of a box and its anchor: log(1000 / 16), as in later networks."""
+"""Largest logarithm of the ratio between the sides of a box and of its anchor: log(1000 / 16), as in later networks."""
 
 
 def sides(boxes: Tensor) -> Tensor:
-    """(…, 2) widths and heights of (…, 4) boxes, in pixels."""
+    """The (…, 2) widths and heights of (…, 4) boxes in pixels; a width is right - left + 1."""
     return boxes[..., 2:] - boxes[..., :2] + 1
 
 
 def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
-    """(…, 4) codes of boxes relative to anchors.
+    """The (…, 4) codes of boxes relative to anchors, which the network learns to predict.
 
-    A code holds the shift of the centre in units of the anchor's sides (x, y), and the logarithms of the size ratios
-    (width, height).
+    A code holds the shift of the centre (x, y) in units of the anchor's sides, and the logarithms of the ratios of
+    width and height to those of the anchor.
     """
     own, wanted = sides(anchors), sides(boxes)
     middle, target = anchors[..., :2] + own / 2, boxes[..., :2] + wanted / 2
@@ -32,7 +32,7 @@ def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
 def decode(codes: Tensor, anchors: Tensor) -> Tensor:
     """The (…, 4) boxes for (…, 4) codes relative to (…, 4) anchors.
 
-    As in the original code this is not the exact inverse of `encode`: right and bottom are larger by one pixel.
+    As in the authors' code, right and bottom are larger by one pixel than the exact inverse of `encode` would give.
     """
     own = sides(anchors)
     middle = anchors[..., :2] + own / 2 + codes[..., :2] * own
@@ -41,13 +41,13 @@ def decode(codes: Tensor, anchors: Tensor) -> Tensor:
 
 
 def clip(boxes: Tensor, size_px: tuple[int, int]) -> Tensor:
-    """Clips boxes to a picture of size (height, width)."""
+    """Clips (…, 4) boxes to a picture of size (height, width); right and bottom are at most the last column and row."""
     most = boxes.new_tensor([size_px[1] - 1, size_px[0] - 1] * 2)
     return torch.minimum(boxes.clamp(min=0), most)
 
 
 def overlaps(a: Tensor, b: Tensor) -> Tensor:
-    """(N, M) intersection over union of each of (N, 4) boxes with each of (M, 4) boxes."""
+    """The (N, M) intersection over union of each of (N, 4) boxes with each of (M, 4) boxes."""
     low = torch.maximum(a[:, None, :2], b[None, :, :2])
     high = torch.minimum(a[:, None, 2:], b[None, :, 2:])
     shared = (high - low + 1).clamp(min=0).prod(dim=-1)
@@ -55,9 +55,9 @@ def overlaps(a: Tensor, b: Tensor) -> Tensor:
 
 
 def left_and_right(six: Tensor) -> tuple[Tensor, Tensor]:
-    """Splits (…, 6) codes of box pairs into (…, 4) codes of the left and of the right boxes.
+    """Splits (…, 6) codes of box pairs into (…, 4) codes of the left boxes and (…, 4) codes of the right boxes.
 
-    The six numbers are x, y, width, height of the left box, and x and width of the right box. Both boxes have the same
+    The six numbers are x, y, width, height of the left box, and x and width of the right box. Both boxes cover the same
     rows, because the pictures are rectified.
     """
     return six[..., :4], six[..., [4, 1, 5, 3]]

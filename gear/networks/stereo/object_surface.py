@@ -1,4 +1,4 @@
-"""Disparity of visible vehicle surfaces, computed from the vehicles' 3D boxes as an approximation."""
+"""Approximates the disparity of visible vehicle surfaces from the vehicles' 3D boxes."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from gear.groundtruth.boxes import Box3d
 from gear.values.geometry import Array
 
 SOLID = ("Car", "Van", "Truck")
-"""Kinds of objects that fill the lower half of their box."""
+"""Kinds of objects that fill the lower half of their 3D box."""
 
 FOOT_SHARE = 0.1
-"""Share of a box's height, at the bottom, where the road is visible between the wheels."""
+"""Share of a 3D box's height, at the bottom, where the road is visible between the wheels."""
 
 MOST_OCCLUDED = 0.3
 
 
 def depth_of_box(box: Box3d, rays: Array) -> Array:
-    """(…) depth z at which rays from the camera enter a box; NaN for rays that miss it.
+    """The (…) depth z at which rays from the camera enter a 3D box; NaN for rays that miss the box.
 
     Args:
         box: 3D box in the camera frame, metres.

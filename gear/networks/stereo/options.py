@@ -1,4 +1,6 @@
-"""Options of the stereo networks, and the calibration that follows from them. The module does not import torch."""
+"""Options of the stereo networks, and the calibration that follows from them. The module does not import torch, so
+plugin specs load quickly.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +15,15 @@ from gear.values.geometry import Intrinsics
 LEFT, RIGHT = "left", "right"
 
 INPUT_SCALE = 0.5
-"""Input scale of the centre-based network if neither the user nor the weights state one."""
+"""Factor by which pictures are resized before the centre-based network if neither the user nor the weights state
+one.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoOptions(NetworkOptions):
-    """Camera parameters that the pictures do not contain. The defaults are those of the task stereo3d.
+    """Parameters of the stereo cameras that the pictures themselves do not contain. The defaults are those of the
+    task stereo3d.
 
     Attributes:
         hfov_deg: horizontal field of view of the pictures, degrees.
@@ -35,7 +40,7 @@ class StereoOptions(NetworkOptions):
             raise FieldError("baseline_m", f"must be 0.01 to 10 m, got {self.baseline_m:g}")
 
     def calibration(self, size_px: tuple[int, ...]) -> Calibration:
-        """The calibration of pictures of size (height, width)."""
+        """The calibration of a stereo pair whose pictures have the size (height, width)."""
         intrinsics = Intrinsics.from_hfov(size_px[1], size_px[0], math.radians(self.hfov_deg))
         return Calibration(intrinsics=intrinsics, baseline_m=self.baseline_m)
 

@@ -1,4 +1,4 @@
-"""Converts Stereo R-CNN's outputs for box pairs to KITTI labels with scores."""
+"""Converts Stereo R-CNN's raw outputs for box pairs to KITTI labels with scores."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class FoundCar:
 def decode_cars(
     said: Mapping[str, Tensor], scale: float, size_px: tuple[int, int], least_score: float
 ) -> list[FoundCar]:
-    """The cars of one picture, highest score first.
+    """Converts the raw outputs for one picture to detected cars, highest score first.
 
     Args:
         said: outputs of the network for one picture, without the batch dimension.
@@ -90,16 +90,17 @@ def decode_cars(
 def place_car(
     car: FoundCar, calibration: Calibration, pair: Pair | None, aligned_bias_px: float = 0.0
 ) -> KittiLabel | None:
-    """Computes the 3D box of a car: solves for it, aligns its depth photometrically, and solves again with that depth.
+    """Computes the 3D box of a detected car: solves for the box, aligns its depth photometrically, and solves
+    again with that depth.
 
     Args:
         car: a detected car.
         calibration: calibration of the original pictures.
-        pair: the pictures; None leaves out the alignment.
+        pair: the pictures; None skips the alignment.
         aligned_bias_px: value added to the aligned disparity.
 
     Returns:
-        None if no box fits.
+        The car as a KITTI label; None if no box fits.
     """
     box = solve_box(car.measured, calibration)
     if box is None:

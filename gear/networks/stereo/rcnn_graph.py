@@ -83,7 +83,7 @@ def _stage(inputs: int, width: int, blocks: int, stride: int) -> nn.Sequential:
 
 
 class StereoRpn(nn.Module):
-    """The region proposal network, which reads both pyramids."""
+    """The region proposal network of Stereo R-CNN; it reads the feature pyramids of both pictures."""
 
     def __init__(self, inputs: int, hidden: int) -> None:
         super().__init__()
@@ -92,10 +92,10 @@ class StereoRpn(nn.Module):
         self.RPN_bbox_pred_left_right = nn.Conv2d(2 * hidden, 6 * len(RATIOS), 1)
 
     def forward(self, left: Sequence[Tensor], right: Sequence[Tensor]) -> tuple[Tensor, Tensor, Tensor]:
-        """Logits (B, A, 2), objectness (B, A) in 0..1, and codes of box pairs (B, A, 6), for A anchors.
+        """Predicts logits (B, A, 2), objectness (B, A) in 0..1, and codes of box pairs (B, A, 6), for A anchors.
 
         The authors' softmax pairs channel c with channel c + 3, although anchor a was trained with channels 2 a and 2 a
-        + 1. The published weights rely on that, so proposals are ranked by the same objectness.
+        + 1. The published weights rely on this pairing, so this module ranks proposals by the same objectness.
         """
         logits, chances, codes = [], [], []
         for one, two in zip(left, right, strict=True):
@@ -110,7 +110,9 @@ class StereoRpn(nn.Module):
 
 
 class StereoRcnn(nn.Module):
-    """The whole graph. As in the authors' training, batch normalisation and the first two stages are never trained."""
+    """The whole torch module of Stereo R-CNN. As in the authors' training, batch normalisation and the first two
+    stages are never trained.
+    """
 
     def __init__(self, shape: StereoRcnnShape) -> None:
         super().__init__()
@@ -173,7 +175,7 @@ class StereoRcnn(nn.Module):
                 parameter.requires_grad_(False)
 
     def train(self, mode: bool = True) -> StereoRcnn:
-        """Training mode for all layers except batch normalisation."""
+        """Sets training mode for all layers except batch normalisation, which stays in eval mode."""
         super().train(mode)
         for module in self.modules():
             if is_norm(module):
@@ -181,7 +183,9 @@ class StereoRcnn(nn.Module):
         return self
 
     def pyramid(self, pictures: Tensor) -> list[Tensor]:
-        """Feature maps P2 .. P6 (strides 4 .. 64) of (B, 3, H, W) pictures in BGR, 0..255 minus the mean."""
+        """The feature maps P2 .. P6 (strides 4 .. 64) of (B, 3, H, W) pictures; pictures are BGR in 0..255 minus
+        the mean.
+        """
         stages = [self.RCNN_layer0(pictures)]
         for layer in (self.RCNN_layer1, self.RCNN_layer2, self.RCNN_layer3, self.RCNN_layer4):
             stages.append(layer(stages[-1]))
@@ -200,12 +204,12 @@ class StereoRcnn(nn.Module):
     def regions(
         self, left: Sequence[Tensor], right: Sequence[Tensor], pairs: tuple[Tensor, Tensor], height_px: int
     ) -> dict[str, Tensor]:
-        """Outputs of the second stage for R pairs of boxes in one picture.
+        """Computes the outputs of the second stage for R pairs of boxes in one picture.
 
         Args:
             left, right: levels P2 .. P5 of the pyramids, for a batch of one.
             pairs: (R, 4) left and (R, 4) right boxes in pixels of the network's input.
-            height_px: height of that input.
+            height_px: height of the network's input.
 
         Returns:
             `class_logits` (R, K); `box_codes` (R, K, 6); `size_and_direction` (R, K, 5): encoded width, height, length,
@@ -231,7 +235,9 @@ def _complete(module: nn.Module, state: dict[str, Any], prefix: str, *_: Any) ->
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The tensors of a published state; missing variances of the losses get their initial values."""
+    """The tensors of a published checkpoint; learned variances of the losses that are missing get their initial
+    values.
+    """
     return {VARIANCES: torch.full((len(LOSSES),), FIRST_LOG_VARIANCE), **state}
 
 
@@ -241,9 +247,9 @@ def is_norm(module: nn.Module) -> bool:
 
 
 def pooled(levels: Sequence[Tensor], boxes: Tensor, cells: int, height_px: int) -> Tensor:
-    """(R, C, cells, cells) features of boxes, each from the pyramid level that suits its size.
+    """The (R, C, cells, cells) features of R boxes; each box is pooled from the pyramid level that suits its size.
 
-    The level is 4 + ln(side / 224), rounded: the authors use the natural logarithm, although the paper on feature
+    The level is 4 + ln(side / 224), rounded. The authors use the natural logarithm here, although the paper on feature
     pyramids has the logarithm to base 2.
 
     Args:
@@ -265,7 +271,7 @@ def pooled(levels: Sequence[Tensor], boxes: Tensor, cells: int, height_px: int) 
 
 
 def anchors(levels: Sequence[Tensor]) -> Tensor:
-    """(A, 4) anchors in pixels of the network's input, in the order of the proposal network's outputs.
+    """The (A, 4) anchors in pixels of the network's input, in the order of the proposal network's outputs.
 
     Args:
         levels: feature maps P2 .. P6.

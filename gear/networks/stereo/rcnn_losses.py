@@ -19,14 +19,20 @@ from gear.values.geometry import Array
 
 CAR = "Car"
 BOX_DEVIATION = (0.1, 0.1, 0.2, 0.2, 0.1, 0.2)
-"""Divisors of the six numbers of box codes: x, y, width, height of the left box, x and width of the right box."""
+"""Scales of the six numbers of box codes, which are divided by them: x, y, width, height of the left box, x and
+width of the right box.
+"""
 
 SIZE_MEAN = (1.6, 1.5, 4.0, 0.0, 0.0)
 SIZE_DEVIATION = 0.5
-"""Means and scales by which width, height, length (metres), sine and cosine of the observation angle are encoded."""
+"""Scale of the encoding of width, height, length (metres), sine and cosine of the observation angle: (value -
+`SIZE_MEAN`) / scale.
+"""
 
 SIDE_MARGIN_PX = 3.0
-"""A corner that is nearer than this to a side of the box is not used, because it tells no more than the side itself."""
+"""Distance from a side of the 2D box, in pixels, below which the visible ground corner is not used, because it
+adds no information to the side.
+"""
 
 LEAST_HEIGHT_PX, LEAST_SEEN_PX = 10.0, 3.0
 RPN_SAMPLES, RPN_HIGH, RPN_LOW = 256, 0.7, 0.3
@@ -36,7 +42,7 @@ RPN_SIGMA = 3.0
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CarTargets:
-    """The cars of one picture, in pixels of the network's input.
+    """Training targets of one picture: its cars, in pixels of the network's input.
 
     Attributes:
         left, right, union: (N, 4) boxes in the left picture, in the right picture, and around both.
@@ -61,7 +67,7 @@ class CarTargets:
 
 
 def car_targets(sample: LabelledPair, scale: float) -> CarTargets:
-    """The training targets of a sample.
+    """Computes the training targets of a sample in pixels of the network's input.
 
     Args:
         sample: a sample with labelled objects.
@@ -136,8 +142,8 @@ def _uncovered(left: Array, nearer: Sequence[Array]) -> Array:
 
 
 def ground_corners(box: Box3d) -> Array:
-    """(4, 3) corners of the bottom face in the camera frame: rear left, front left, front right, rear right, as
-    seen by the driver.
+    """The (4, 3) corners of a 3D box's bottom face in the camera frame, metres: rear left, front left, front
+    right, rear right, as seen by the driver.
     """
     c, s = math.cos(box.rotation_y_rad), math.sin(box.rotation_y_rad)
     front, right = np.array([c, 0.0, -s]), np.array([-s, 0.0, -c])
@@ -159,7 +165,8 @@ def _corner_between(box: Box3d, calibration: Calibration, borders: Array) -> Arr
 def rpn_losses(
     logits: Tensor, codes: Tensor, anchors: Tensor, cars: CarTargets, size_px: tuple[int, int], draws: torch.Generator
 ) -> dict[str, Tensor]:
-    """The two losses of the proposal network for one picture: classification and box pairs.
+    """Computes the two losses of the region proposal network for one picture: classification of anchors, and codes
+    of box pairs.
 
     Args:
         logits: (A, 2) of the anchors.
@@ -210,17 +217,19 @@ def _six(left: Tensor, right: Tensor, left_from: Tensor, right_from: Tensor) -> 
 
 
 def smooth_l1(said: Tensor, wanted: Tensor, sigma: float = 1.0) -> Tensor:
-    """Smooth L1 loss: quadratic for differences below 1 / sigma^2, linear above."""
+    """Smooth L1 loss of predictions (`said`) and targets (`wanted`), element by element: quadratic for differences
+    below 1 / sigma^2, linear above.
+    """
     return functional.smooth_l1_loss(said, wanted, reduction="none", beta=1 / sigma**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SampledPairs:
-    """Box pairs on which the second stage is trained; pairs with cars come first.
+    """Box pairs on which the second stage is trained; pairs that overlap a car come first.
 
     Attributes:
         left, right: (R, 4) boxes.
-        owner: (F,) index of the car for each of the first F pairs; the other pairs show background.
+        owner: (F,) index of the car for each of the first F pairs; the other R - F pairs are background.
     """
 
     left: Tensor
@@ -229,8 +238,8 @@ class SampledPairs:
 
 
 def sample_pairs(left: Tensor, right: Tensor, cars: CarTargets, draws: torch.Generator) -> SampledPairs:
-    """Samples box pairs from proposals and ground truth: a quarter overlap a car in both pictures, the others only
-    partly.
+    """Samples box pairs from proposals and ground truth: a quarter of the pairs overlap a car in both pictures,
+    the other pairs overlap a car only partly.
 
     Args:
         left, right: (P, 4) proposals.
@@ -255,7 +264,7 @@ def sample_pairs(left: Tensor, right: Tensor, cars: CarTargets, draws: torch.Gen
 
 
 def region_losses(said: Mapping[str, Tensor], pairs: SampledPairs, cars: CarTargets) -> dict[str, Tensor]:
-    """The four losses of the second stage for one picture.
+    """Computes the four losses of the second stage for one picture.
 
     Args:
         said: outputs of `gear.networks.stereo.rcnn_graph.StereoRcnn.regions` for the pairs.

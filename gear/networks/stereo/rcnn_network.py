@@ -1,4 +1,4 @@
-"""Stereo R-CNN as a gear network."""
+"""Stereo R-CNN (Li, Chen, Shen, CVPR 2019) as a gear network."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ PROPOSED_IN_TRAINING = 2000
 
 
 class StereoRcnnNetwork(Network):
-    """Stereo R-CNN. Outputs are in pixels of the network's input, with R box pairs for each picture.
+    """Stereo R-CNN as a gear network. Outputs are in pixels of the network's input, with A anchors and R box pairs
+    for each picture.
 
     `rpn_logits` (B, A, 2) and `rpn_codes` (B, A, 6) belong to the anchors. `rois_left` and `rois_right` (B, R, 4) are
     the proposals, padded with zeros, without gradients. The other outputs are those of `StereoRcnn.regions` for each
@@ -45,11 +46,11 @@ class StereoRcnnNetwork(Network):
     def forward(
         self, views: Mapping[str, Tensor], targets: Sequence[LabelledPair] | None = None
     ) -> Mapping[str, Tensor]:
-        """Outputs of a batch, or the six losses if `targets` are given.
+        """Computes the outputs for a batch, or the six losses if `targets` are given.
 
-        Each loss L is weighted by its learned variance s: L exp(-s) + s. Anchors and box pairs for the losses are
-        sampled with `options.seed`, so each call samples the same ones. In training mode torch's own generator samples
-        them anew for every picture.
+        Each loss L is weighted by its learned logarithmic variance s: L exp(-s) + s. Anchors and box pairs for the
+        losses are sampled with `options.seed`, so each call samples the same ones. In training mode torch's own
+        generator samples them anew for every picture.
         """
         if targets is None:
             return super().forward(views)
@@ -62,12 +63,15 @@ class StereoRcnnNetwork(Network):
         return {name: means[name] * (-variances[i]).exp() + variances[i] for i, name in enumerate(LOSSES)}
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """All outputs. Pictures are processed one by one, as in training, so that no picture depends on the others."""
+        """All outputs by name. Pictures are processed one by one, as in training; therefore no picture depends on
+        other pictures of the batch.
+        """
         each = [self._outputs_of(*self._pyramids(pictures, i)) for i in range(len(pictures[LEFT]))]
         return {name: torch.stack([outputs[name] for outputs in each]) for name in each[0]}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[LabelledPair]) -> Mapping[str, Tensor]:
-        """Not available, because the second stage is trained on pairs that are sampled with the targets.
+        """Always raises an error: the second stage is trained on pairs that are sampled with the targets, so
+        losses cannot follow from outputs.
 
         Raises:
             TypeError: always; call `forward` with targets instead.
@@ -75,7 +79,7 @@ class StereoRcnnNetwork(Network):
         raise TypeError("Stereo R-CNN has its losses from pictures: call forward(views, targets)")
 
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[tuple[KittiLabel, ...]]:
-        """The cars of each sample, with depth refined by photometric alignment."""
+        """The detected cars of each sample, with depth refined by photometric alignment."""
         found = []
         for sample in samples:
             views = {name: view.to(self.device) for name, view in as_batch([sample], self._views).items()}
@@ -86,13 +90,15 @@ class StereoRcnnNetwork(Network):
         return found
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
-        """The cars, computed from boxes and corners alone; `predict` also has the pictures and aligns depth with
-        them.
+        """The detected cars, computed from 2D boxes and corners alone. `predict` also has the pictures and refines
+        depth by photometric alignment.
         """
         return self._placed(outputs, size_px, None)
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The stages of the residual network. They run on the left picture first, then on the right one."""
+        """The stages of the residual network, by name. Each stage runs on the left picture first, then on the
+        right picture.
+        """
         return {f"layer{number}": getattr(self.graph, f"RCNN_layer{number}") for number in (1, 2, 3, 4)}
 
     def _placed(

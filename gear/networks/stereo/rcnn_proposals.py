@@ -14,8 +14,8 @@ SAME_OVERLAP = 0.7
 def propose(
     chances: Tensor, codes: Tensor, anchors: Tensor, size_px: tuple[int, int], *, considered: int, most: int
 ) -> tuple[Tensor, Tensor]:
-    """The best pairs of one picture: those that non-maximum suppression keeps both among the left and among the right
-    boxes.
+    """Selects the best box pairs of one picture by non-maximum suppression; a pair is kept if both its left and
+    its right box are kept.
 
     Gradients end here, as in the authors' network.
 
@@ -24,7 +24,7 @@ def propose(
         codes: (A, 6) codes of the anchors' box pairs.
         anchors: (A, 4) anchors in pixels of the network's input.
         size_px: height and width of the network's input.
-        considered: number of the best anchors that are considered.
+        considered: number of anchors with the highest probability from which pairs are selected.
         most: largest number of pairs.
 
     Returns:
