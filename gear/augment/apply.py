@@ -1,4 +1,4 @@
-"""Augments one sample: mirrors, crops, resizes and recolours it."""
+"""Augments a training sample: mirrors, crops, resizes and recolours the pictures together with the ground truth."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Framing:
     """The part of a picture that training uses, and its size.
 
     Attributes:
-        crop_px: height and width of the network's input; None for those of the whole picture.
+        crop_px: height and width of the network's input; None for the size of the whole picture.
         scales: range of the factor by which a picture is resized.
     """
 
@@ -51,7 +51,8 @@ class Framing:
 
 
 def shrunk(sample: SampleT, share: float) -> SampleT:
-    """The sample of a camera with the same view and fewer pixels: the whole picture at a share of its size.
+    """The sample as from a camera with the same view and fewer pixels: pictures and ground truth are resized by
+    the factor `share`.
 
     Raises:
         GearError: the sample is of a class without registered functions.
@@ -67,9 +68,9 @@ def shrunk(sample: SampleT, share: float) -> SampleT:
 
 
 def augment(sample: SampleT, how: Augmentation, framing: Framing, rng: np.random.Generator) -> SampleT:
-    """Returns a changed copy of a sample, whose ground truth is changed with its pixels.
+    """Returns a randomly changed copy of a sample; its ground truth is changed together with its pixels.
 
-    Scale factors are drawn uniformly in their logarithm. Mirrored, cropped or resized samples have no `surfaces`, and
+    The logarithm of the scale factor is drawn uniformly. Mirrored, cropped or resized samples have no `surfaces`, and
     their `record` still describes the rendered scene.
 
     Raises:

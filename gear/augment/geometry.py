@@ -1,4 +1,4 @@
-"""Geometric changes of pictures, maps and boxes: mirroring, and cropping to a window that is resized."""
+"""Geometric changes of pictures, maps and boxes: mirroring, and cropping to a window that is then resized."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from gear.values.ground_truth import BoxPx
 
 SampleT = TypeVar("SampleT", bound=Sample)
 PADDING_LEVEL = 114
-"""Grey level with which a window is padded beyond the picture."""
+"""Grey level, 0..255, with which a window is padded where it extends beyond the picture."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """A part of a picture that is resized to another size.
+    """A part of a picture (a crop), and the size to which the part is resized.
 
     Attributes:
         left_px, top_px, width_px, height_px: position and size of the part in whole edge pixels of the picture; the
-            part may exceed the picture and is padded there.
+            part may extend beyond the picture and is padded there.
         out_width_px, out_height_px: size after resizing.
     """
 
@@ -55,7 +55,8 @@ class Window:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Geometry(Generic[SampleT]):
-    """Functions that mirror, crop and resize the samples of one task. None of them changes its argument.
+    """The functions that mirror, crop and resize the samples of one task. Each returns a new sample and leaves its
+    argument unchanged.
 
     Attributes:
         flip: mirrors a sample, left to right.
@@ -75,7 +76,7 @@ class Geometry(Generic[SampleT]):
 
 
 def whole_window(size_px: tuple[int, int], share: float) -> Window:
-    """A window of a whole picture of the given height and width, resized to a share of its size."""
+    """The window that covers a whole picture of size (height, width) and resizes it by the factor `share`."""
     height, width = size_px
     return Window(
         left_px=0,
@@ -95,14 +96,14 @@ def draw_window(
     *,
     is_centred: bool = False,
 ) -> Window:
-    """Draws a window inside a picture, or around it if the window is larger.
+    """Draws the position of a random crop inside a picture; a window larger than the picture contains the picture.
 
     Args:
         size_px: height and width of the picture.
         out_px: height and width of the window after resizing.
         scale: output pixels per pixel of the picture.
         rng: generator of the window's position.
-        is_centred: whether the window must have the picture's centre.
+        is_centred: whether the window must have the same centre as the picture.
     """
     (height, width), (out_height, out_width) = size_px, out_px
     h, w = max(1, round(out_height / scale)), max(1, round(out_width / scale))
@@ -137,12 +138,14 @@ def cut_picture(picture: UInt8Image, window: Window) -> UInt8Image:
 
 
 def cut_map(values: npt.NDArray[Any], window: Window, fill: float) -> npt.NDArray[Any]:
-    """Crops and resizes an (H, W) map by nearest neighbour, padded with `fill`."""
+    """Crops and resizes an (H, W) map by nearest neighbour; cells beyond the map get the value `fill`."""
     return _resized(_part(values, window, fill), window, cv2.INTER_NEAREST_EXACT)
 
 
 def cut_box(box_px: BoxPx, window: Window) -> BoxPx:
-    """Converts a box from edge pixels of the picture to edge pixels of the window's output; not clipped."""
+    """Converts a box from edge pixels of the picture to edge pixels of the window's output; the result is not
+    clipped.
+    """
     left, top, right, bottom = box_px
     return (
         (left - window.left_px) * window.scale_x,
@@ -153,14 +156,14 @@ def cut_box(box_px: BoxPx, window: Window) -> BoxPx:
 
 
 def flip_box(box_px: BoxPx, width_px: int) -> BoxPx:
-    """Mirrors a box in edge pixels."""
+    """Mirrors a box, in edge pixels of a picture of width `width_px`, left to right."""
     left, top, right, bottom = box_px
     return (width_px - right, top, width_px - left, bottom)
 
 
 def clipped(box_px: BoxPx, frame_px: BoxPx) -> BoxPx:
-    """Intersection of two boxes; if they do not intersect, its right is left of its left, or its bottom
-    above its top.
+    """Intersection of two boxes. For boxes that do not intersect, the result has a right side left of its left
+    side, or a bottom above its top.
     """
     return (
         max(box_px[0], frame_px[0]),
@@ -177,7 +180,7 @@ def box_area(box_px: BoxPx) -> float:
 
 
 def share_in_frame(box_px: BoxPx, frame_px: BoxPx) -> float:
-    """Share, 0..1, of a box that lies inside a frame."""
+    """Share, 0..1, of a box's area that lies inside the box `frame_px`."""
     whole = box_area(box_px)
     return box_area(clipped(box_px, frame_px)) / whole if whole > 0 else 0.0
 

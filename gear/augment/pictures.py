@@ -1,4 +1,4 @@
-"""Random changes of pixel values as by a camera, an encoder or dirt; the geometry does not change."""
+"""Random changes of pixel values, as by a camera, an encoder or dirt. Pixels are not moved."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ from gear.values.frames import UInt8Image
 
 LEVELS = np.arange(256, dtype=np.float32) / 255
 MOST_BLUR_PX = 100.0
-"""Largest standard deviation of the blur in pixels; the time of a blur grows with it."""
+"""Upper limit of the option `blur_px`, the standard deviation of the blur in pixels; a larger blur would take too
+long.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Colours:
-    """Strengths of the colour changes. Every change is drawn uniformly from its range.
+    """Strengths of the colour changes. Every change is drawn uniformly from its range, gamma in its logarithm.
 
     Attributes:
-        brightness: light is scaled by 1 ± this.
-        contrast: distance from middle grey is scaled by 1 ± this.
-        saturation: distance from grey is scaled by 1 ± this.
+        brightness: pixel values are scaled by 1 ± this.
+        contrast: the difference from middle grey is scaled by 1 ± this.
+        saturation: the difference from the pixel's grey level is scaled by 1 ± this.
         balance: each of red, green, blue is scaled by 1 ± this.
         gamma: exponent between 1 / (1 + this) and 1 + this.
         noise: probability that noise is added.
@@ -67,7 +69,9 @@ class Colours:
 
 
 def recolour(images: Mapping[str, UInt8Image], colours: Colours, rng: np.random.Generator) -> dict[str, UInt8Image]:
-    """Recoloured pictures of one sample. All views are changed in the same way, except that each has its own noise."""
+    """The recoloured pictures of one sample by camera. All views are changed in the same way; only the noise
+    differs between views.
+    """
     table, saturation = _table(colours, rng), 1 + rng.uniform(-colours.saturation, colours.saturation)
     blur_px = rng.uniform(min(0.3, colours.blur_px), colours.blur_px) if rng.random() < colours.blur else 0.0
     noise_levels = rng.uniform(0, colours.noise_levels) if rng.random() < colours.noise else 0.0

@@ -1,4 +1,4 @@
-"""Pinholes and boxes in index pixels of pictures that are mirrored or cut."""
+"""Converts pinhole intrinsics and boxes in index pixels for pictures that are mirrored or cropped."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ from gear.values.ground_truth import BoxPx
 
 
 def mirrored_pinhole(pinhole: Intrinsics) -> Intrinsics:
-    """The pinhole of pictures that are mirrored left to right."""
+    """The intrinsics of a picture that is mirrored left to right."""
     if pinhole.principal_px is None:
         return pinhole
     return replace(pinhole, principal_px=(pinhole.width_px - 1 - pinhole.cx_px, pinhole.cy_px))
 
 
 def windowed_pinhole(pinhole: Intrinsics, window: Window) -> Intrinsics:
-    """The pinhole of a window's picture. Its focal lengths differ where the window is stretched by rounded sizes."""
+    """The intrinsics of the resized crop `window` of a picture. fx and fy differ where rounded sizes stretch the
+    crop.
+    """
     focal_px, focal_y_px = pinhole.fx_px * window.scale_x, pinhole.fy_px * window.scale_y
     principal_px = None
     if pinhole.principal_px is not None:
@@ -28,12 +30,14 @@ def windowed_pinhole(pinhole: Intrinsics, window: Window) -> Intrinsics:
 
 
 def cut_index_box(box_px: BoxPx, window: Window) -> BoxPx:
-    """Converts a box from index pixels of the picture to index pixels of the window's picture; not clipped."""
+    """Converts a box from index pixels of the picture to index pixels of the window's output; the result is not
+    clipped.
+    """
     left, top, right, bottom = box_px
     edges = cut_box((left + 0.5, top + 0.5, right + 0.5, bottom + 0.5), window)
     return (edges[0] - 0.5, edges[1] - 0.5, edges[2] - 0.5, edges[3] - 0.5)
 
 
 def index_frame(width_px: int, height_px: int) -> BoxPx:
-    """The outer borders of a picture in index pixels."""
+    """The outer borders of a picture as a box in index pixels: left and top are -0.5."""
     return (-0.5, -0.5, width_px - 0.5, height_px - 0.5)

@@ -1,4 +1,4 @@
-"""3D boxes of objects in a camera's frame, and their projections."""
+"""3D boxes of objects in a camera's frame, and their projections into the picture."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ from gear.values.ground_truth import BoxPx
 from gear.values.scene import CameraRecord, Vec3
 
 EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-"""Pairs of corner numbers, one per edge. The bits of a corner's number give its side: 4 for x, 2 for y, 1 for z."""
+"""The 12 edges of a box, as pairs of corner numbers. The bits of a corner number state its side: 4 for x, 2 for y,
+1 for z.
+"""
 
 _CORNERS = frozen([[(i >> 2 & 1) - 0.5, (i >> 1 & 1) - 0.5, i & 1] for i in range(8)])
-"""(8, 3) offsets of the corners from the middle of the bottom face, in lengths, widths and heights."""
+"""(8, 3) offsets of the corners from the middle of the bottom face, as multiples of length, width and height."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Box3d:
-    """A box that is upright in a camera's frame (x right, y down, z forward), as in KITTI.
+    """A 3D box whose vertical axis is the camera's y axis (camera frame: x right, y down, z forward), as in KITTI.
 
     Attributes:
         height_m, width_m, length_m: size along the camera's y axis, the object's left and the object's front.
@@ -39,24 +41,24 @@ class Box3d:
 
     @property
     def alpha_rad(self) -> float:
-        """Observation angle in [-pi, pi): the rotation relative to the ray from the camera to the box."""
+        """Observation angle in [-pi, pi): rotation of the object relative to the ray from the camera to the object."""
         return wrap_angle_rad(self.rotation_y_rad - math.atan2(self.bottom_m[0], self.bottom_m[2]))
 
     @property
     def middle_m(self) -> Vec3:
-        """Middle of the box."""
+        """Middle of the box in the camera's frame, metres."""
         x, y, z = self.bottom_m
         return (x, y - self.height_m / 2, z)
 
     @property
     def distance_m(self) -> float:
-        """Distance from the camera to the middle of the box."""
+        """Distance from the camera to the middle of the box, metres."""
         x, y, z = self.middle_m
         return math.sqrt(x * x + y * y + z * z)
 
     @property
     def corners_m(self) -> Array:
-        """(8, 3) corners in the camera's frame, in the order that `EDGES` uses."""
+        """The (8, 3) corners in the camera's frame, metres, in the order that `EDGES` uses."""
         c, s = math.cos(self.rotation_y_rad), math.sin(self.rotation_y_rad)
         front, left = np.array([c, 0.0, -s]), np.array([s, 0.0, c])
         up = np.array([0.0, -self.height_m, 0.0])
@@ -70,12 +72,13 @@ class Box3d:
 
 
 def middle_in_camera(box_px: BoxPx, distance_m: float, pinhole: Intrinsics) -> Vec3:
-    """The middle of an object in a camera's frame: at its distance, on the ray through the middle of its box.
+    """Estimates the middle of an object in a camera's frame: the point at the object's distance on the ray through
+    the middle of its 2D box.
 
     Args:
-        box_px: of the whole silhouette, which may exceed the picture; edge pixels.
-        distance_m: from the camera to the middle of the object.
-        pinhole: of the camera.
+        box_px: box of the whole silhouette in edge pixels; it may extend beyond the picture.
+        distance_m: distance from the camera to the middle of the object.
+        pinhole: intrinsics of the camera.
     """
     left, top, right, bottom = box_px
     ray = pinhole.unproject([[(left + right - 1) / 2, (top + bottom - 1) / 2]], [1.0])[0]
@@ -84,10 +87,11 @@ def middle_in_camera(box_px: BoxPx, distance_m: float, pinhole: Intrinsics) -> V
 
 
 def box_in_camera(thing: SceneObject, camera: CameraRecord) -> Box3d:
-    """The tight box of an object in the camera's frame.
+    """The tight 3D box of an object in the camera's frame.
 
-    The heading is the object's front projected on the camera's x-z plane. It is exact for level
-    cameras and upright objects. Otherwise it is an approximation: KITTI has a single angle, about the camera's y axis.
+    The heading is the direction of the object's front, projected on the camera's x-z plane. It is exact for level
+    cameras and upright objects. In other cases it is an approximation, because KITTI has a single angle, about the
+    camera's y axis.
     """
     camera_from_object = camera.world_from_camera_transform.inverse().matrix @ thing.world_from_object.matrix
     centre, (length_m, width_m, height_m) = thing.shape.box_centre_m, (float(v) for v in thing.shape.box_size_m)
@@ -103,14 +107,15 @@ def box_in_camera(thing: SceneObject, camera: CameraRecord) -> Box3d:
 
 
 def project_box(corners_m: Array, intrinsics: Intrinsics) -> tuple[float, float, float, float] | None:
-    """Projects a box: left, top, right, bottom in index pixels, not clipped to the picture.
+    """Projects a 3D box into the picture and returns the 2D box around it, not clipped to the picture.
 
     Args:
         corners_m: (8, 3) camera-frame corners in the order of `EDGES`.
         intrinsics: intrinsics of the pinhole camera.
 
     Returns:
-        None if the whole box lies behind the near plane; edges that cross it are cut there.
+        left, top, right, bottom in index pixels. Edges that cross the near plane are cut there. None if the whole box
+        lies behind the near plane.
     """
     points = corners_m if (corners_m[:, 2] >= NEAR_M).all() else _in_front(corners_m)
     if not len(points):

@@ -1,4 +1,4 @@
-"""Label maps with Cityscapes ids, from the id buffer."""
+"""Label and instance maps with Cityscapes ids, computed from the id buffer (the geom id of each pixel)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ InstanceImage = npt.NDArray[np.uint16]
 
 
 def instance_map(geom_id: IdImage, geoms: GeomTable, objects: Mapping[int, SceneObject]) -> InstanceImage:
-    """Cityscapes instance ids of an id buffer.
+    """Computes the map of Cityscapes instance ids from an id buffer.
 
     Args:
         geom_id: (H, W) int32, -1 for the sky.
@@ -26,8 +26,8 @@ def instance_map(geom_id: IdImage, geoms: GeomTable, objects: Mapping[int, Scene
         objects: objects by id; geoms of other objects get no instance number.
 
     Returns:
-        (H, W) uint16. The visible instances of each class are numbered from 0 in order of object id. The ego car is
-        `ego vehicle`.
+        (H, W) uint16. The visible instances of each class are numbered from 0 in order of object id. The ego car gets
+        the label `ego vehicle`.
     """
     runs = Runs.of(geom_id)
     table = np.zeros(len(geoms.object_id) + 1, dtype=np.uint16)
@@ -55,7 +55,7 @@ def instance_map(geom_id: IdImage, geoms: GeomTable, objects: Mapping[int, Scene
 
 
 def label_map(instances: InstanceImage) -> npt.NDArray[np.uint8]:
-    """(H, W) uint8 Cityscapes label ids of an instance map."""
+    """The (H, W) uint8 map of Cityscapes label ids for an (H, W) uint16 map of instance ids."""
     labels = np.empty(instances.shape, np.uint8)
     for top in range(0, len(instances), STRIP_ROWS):
         strip = instances[top : top + STRIP_ROWS]
@@ -65,11 +65,11 @@ def label_map(instances: InstanceImage) -> npt.NDArray[np.uint8]:
 
 
 def coarsen(instances: InstanceImage, window_px: int) -> InstanceImage:
-    """Simplifies labels to those that an annotator with a polygon tool would draw.
+    """Simplifies a label map to the precision of an annotator with a polygon tool.
 
-    Each pixel takes the most frequent label in the square around it, and the most frequent instance of that label.
-    Things that are thinner than about half the window (wires, thin poles, single leaves), and equally small gaps (sky
-    between twigs), take the label of their surroundings. Straight borders do not move.
+    Each pixel takes the most frequent label in the square around the pixel, and the most frequent instance of that
+    label. Structures that are thinner than about half the window (wires, thin poles, single leaves), and equally small
+    gaps (sky between twigs), take the label of their surroundings. Straight borders do not move.
 
     Args:
         instances: (H, W) uint16 instance map.

@@ -1,9 +1,9 @@
 """A laser scan from four depth views around one point, in the pattern of the Velodyne HDL-64E at 10 Hz.
 
-64 beams from 2.0 degrees above to 24.9 degrees below the horizon, one firing for each 0.1729 degrees of azimuth, up to
-120 m (HDL-64E S2 manual; Geiger et al., Vision meets Robotics: The KITTI Dataset, 2013). A beam takes the depth of the
-pixel that it meets, and its point lies on the ray through the middle of that pixel: the point is exact, and its
-direction differs from that of the beam by at most half a pixel, 0.04 degrees.
+The scanner has 64 beams from 2.0 degrees above to 24.9 degrees below the horizon, one firing per 0.1729 degrees of
+azimuth, and a range of up to 120 m (HDL-64E S2 manual; Geiger et al., Vision meets Robotics: The KITTI Dataset, 2013).
+Each beam takes the depth of the pixel that it hits, and its point lies on the ray through the middle of that pixel. The
+point is therefore exact; its direction differs from that of the beam by at most half a pixel, 0.04 degrees.
 """
 
 from __future__ import annotations
@@ -21,28 +21,30 @@ from gear.values.scene import CameraRecord, Pose
 BEAMS = 64
 HIGHEST_DEG, LOWEST_DEG = 2.0, -24.9
 FIRINGS = 2083
-"""Firings of each beam in one turn: 1.333 million points per second, 10 turns per second."""
+"""Number of firings of each beam in one turn; 64 beams and 10 turns per second give 1.333 million points per second."""
 
 LEAST_M, MOST_M = 0.9, 120.0
-"""Ranges that the scanner reports."""
+"""Smallest and largest range that the scanner reports, in metres."""
 
 VIEWS = 4
 WIDTH_PX = 1536
 FOCAL_PX = WIDTH_PX / 2
-"""Each view sees 90 degrees."""
+"""Focal length of each of the four views in pixels; with it a view covers 90 degrees."""
 
 _CORNER = math.sqrt(2.0)
-"""By how much farther from the horizon's row a beam lies in a corner of a view than in its middle."""
+"""Factor by which a beam is farther from the horizon's row at the sides of a view than in the view's middle."""
 
 CY_PX = math.ceil(FOCAL_PX * math.tan(math.radians(HIGHEST_DEG)) * _CORNER) + 1
 HEIGHT_PX = CY_PX + math.ceil(FOCAL_PX * math.tan(math.radians(-LOWEST_DEG)) * _CORNER) + 2
 
 VELODYNE_FROM_CAMERA = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""(3, 3) from a camera's axes (x right, y down, z forward) to the scanner's (x forward, y left, z up)."""
+"""(3, 3) rotation from a camera's axes (x right, y down, z forward) to the scanner's axes (x forward, y left, z up)."""
 
 
 def scan_cameras(reference: CameraRecord) -> tuple[CameraRecord, ...]:
-    """The four views of a scanner in the place of a camera: ahead, to the left, behind, to the right."""
+    """The four camera views of a laser scanner at the position of a reference camera: ahead, to the left, behind,
+    to the right.
+    """
     pose = reference.world_from_camera_transform
     return tuple(
         CameraRecord(
@@ -60,15 +62,15 @@ def scan_cameras(reference: CameraRecord) -> tuple[CameraRecord, ...]:
 
 
 def scan_points(depths_m: Sequence[FloatImage]) -> npt.NDArray[np.float32]:
-    """The points of a scan.
+    """Computes the points of a laser scan from the depth of its four views.
 
     Args:
-        depths_m: (H, W) float32 planar depth of each view of `scan_cameras`, NaN where there is nothing.
+        depths_m: (H, W) float32 planar depth of each view of `scan_cameras`, NaN where no surface was hit.
 
     Returns:
-        (N, 4) float32: x forward, y left, z up in metres, and intensity 0..1, the cosine of the angle between the beam
-        and the surface's normal: what a matt surface of one brightness returns. Beams come from the highest to the
-        lowest, each from straight ahead to the left.
+        (N, 4) float32: x forward, y left, z up in metres, and intensity 0..1. The intensity is the cosine of the angle
+        between beam and surface normal, as for matt surfaces of equal brightness. Points are ordered by beam, from the
+        highest to the lowest, and within a beam by azimuth, from straight ahead to the left.
     """
     azimuth = np.arange(FIRINGS) * (2 * math.pi / FIRINGS)
     elevation = np.radians(np.linspace(HIGHEST_DEG, LOWEST_DEG, BEAMS))

@@ -1,4 +1,4 @@
-"""Moves silhouettes of the pinhole camera the way that a lens moves pictures, depth and ids."""
+"""Moves silhouettes of the pinhole camera in the same way as a lens moves pictures, depth and ids."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from gear.values.scene import CameraRecord
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensWarp:
-    """The map by which a camera's lens moves pixels, applied to silhouettes.
+    """The map by which a camera's lens moves pixels, for use on silhouettes.
 
     Attributes:
-        map: for each pixel of the distorted picture its position in the pinhole's picture, and the inverse.
+        map: position in the pinhole's picture for each pixel of the distorted picture, and the inverse map.
     """
 
     map: PixelMap
 
     @staticmethod
     def of(camera: CameraRecord) -> LensWarp | None:
-        """The warp of a camera; None for a pinhole camera.
+        """The warp of a camera's lens; None for a camera without a lens.
 
         Raises:
             ValueError: the distortion folds the picture over.
@@ -33,7 +33,8 @@ class LensWarp:
         return LensWarp(moving[0].pixel_map(camera)) if moving else None
 
     def points(self, pinhole_px: Array) -> Array:
-        """Positions of the pinhole's points in the distorted picture; also for points outside the picture.
+        """Converts positions in the pinhole's picture to positions in the distorted picture, also outside the
+        picture.
 
         Args:
             pinhole_px: (..., 2) index pixels.
@@ -44,8 +45,8 @@ class LensWarp:
         return self.map.forward(pinhole_px)
 
     def window(self, window: Window) -> Window:
-        """The window of the distorted picture that contains a window of the pinhole's picture, with a margin of one
-        pixel; an empty window stays empty.
+        """The window of the distorted picture that contains `window`, a window of the pinhole's picture, with a
+        margin of one pixel. An empty window stays empty.
         """
         x0, y0, x1, y1 = window
         if x0 >= x1 or y0 >= y1:
@@ -57,15 +58,16 @@ class LensWarp:
         return (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
 
     def mask(self, mask: Mask, window: Window, wanted: Window) -> Mask:
-        """Warps a silhouette by nearest neighbour, as depth and ids are warped.
+        """Warps a silhouette from the pinhole's to the distorted picture by nearest neighbour, as depth and ids
+        are warped.
 
         Args:
-            mask: (h, w) silhouette of the pinhole camera.
-            window: position of the mask in the pinhole's picture, inside of it.
-            wanted: window of the distorted picture to compute, inside of it.
+            mask: (h, w) bool silhouette of the pinhole camera.
+            window: position of the mask in the pinhole's picture, inside this picture.
+            wanted: window of the distorted picture for which the result is computed, inside this picture.
 
         Returns:
-            (rows, columns) mask of the window `wanted`.
+            (rows, columns) bool mask of the window `wanted`.
         """
         (x0, y0, x1, y1), part = window, np.s_[wanted[1] : wanted[3], wanted[0] : wanted[2]]
         column, row = (np.rint(one[part]).astype(np.intp) for one in (self.map.x, self.map.y))

@@ -16,7 +16,9 @@ from gear.values.ground_truth import BoxPx, ObjectTruth
 from gear.values.scene import CameraRecord
 
 MOST_ROWS = 4096
-"""Number of rows that are sampled of the part of a silhouette beyond one side of the picture, if it has more rows."""
+"""Largest number of rows in which the part of a silhouette beyond one side of the picture is counted; of more rows
+only this many are sampled.
+"""
 
 EMPTY = VisiblePart(left_px=0, top_px=0, mask=np.zeros((0, 0), dtype=np.bool_), count_px=0)
 
@@ -32,17 +34,17 @@ def observe_objects(
     """Measures every object except the ego car in one view.
 
     Silhouettes are exact to the pixel, also outside the picture; if thousands of rows lie there, their area is exact to
-    a thousandth. What lies less than 10 cm before the camera is left out. Behind a lens silhouettes are bent as the ids
-    are; outside of the picture edges stay straight between corners.
+    a thousandth. Parts less than 10 cm in front of the camera are left out. Behind a lens silhouettes are bent in the
+    same way as the ids; outside of the picture edges stay straight between corners.
 
     Args:
         view: id buffer and camera.
         geoms: label and object of each geom.
         objects: objects by id.
-        by_label: True measures each label of an object separately, so that a cyclist gives a bicycle and a rider; False
+        by_label: True measures each label of an object separately, so a cyclist gives a bicycle and a rider; False
             measures the object as a whole, with its main label.
-        include_hidden: also measures objects that have no visible pixel but would be in the picture if nothing covered
-            them.
+        include_hidden: whether to measure also objects that have no visible pixel but would be in the picture if no
+            other object occluded them.
 
     Returns:
         Measurements in order of object id and label code.
@@ -70,7 +72,7 @@ def observe_objects(
 
 
 def in_camera(thing: SceneObject, camera: CameraRecord) -> Array:
-    """(N, 3) vertices of an object in the camera's frame."""
+    """The (N, 3) vertices of an object in the camera's frame, metres."""
     camera_from_object = camera.world_from_camera_transform.inverse().matrix @ thing.world_from_object.matrix
     return np.asarray(thing.shape.vertices_m @ camera_from_object[:3, :3].T + camera_from_object[:3, 3])
 

@@ -11,7 +11,7 @@ from gear.values.ground_truth import BoxPx
 
 
 def part_boxes(mask: npt.NDArray[np.bool_]) -> tuple[BoxPx, ...]:
-    """The tight box of each connected part (8 neighbours) of an (H, W) mask, in edge pixels."""
+    """The tight box, in edge pixels, of each connected part (8 neighbours) of an (H, W) mask."""
     count, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     boxes = []
     for left, top, width, height, _ in stats[1:count].tolist():  # the first part is what lies outside the mask
@@ -20,16 +20,18 @@ def part_boxes(mask: npt.NDArray[np.bool_]) -> tuple[BoxPx, ...]:
 
 
 MOSTLY = 0.5
-"""Share of an object's visible pixels inside a mask, above which the object is ignored together with the mask."""
+"""Share of an object's visible pixels inside a mask above which the object is ignored together with the masked
+part of the picture.
+"""
 
 
 def share_inside(box_px: BoxPx, counts: str, mask: npt.NDArray[np.bool_]) -> float:
-    """Share of an object's visible pixels that lies in a mask, 0..1.
+    """The share, 0..1, of an object's visible pixels that lie inside a mask.
 
     Args:
-        box_px: tight box of the visible pixels; edge pixels.
-        counts: compressed run lengths of the visible pixels in the whole picture.
-        mask: (H, W) of the picture.
+        box_px: tight box of the object's visible pixels, in edge pixels.
+        counts: COCO's compressed run lengths of the object's visible pixels in the whole picture.
+        mask: (H, W) bool, of the size of the picture.
     """
     left, top, right, bottom = (round(side) for side in box_px)
     crop = mask[top:bottom, left:right]
@@ -41,14 +43,14 @@ def share_inside(box_px: BoxPx, counts: str, mask: npt.NDArray[np.bool_]) -> flo
 
 
 def least_share_inside(box_px: BoxPx, visible_px: int, mask: npt.NDArray[np.bool_]) -> float:
-    """Smallest possible share, 0..1, of an object's visible pixels inside a mask.
+    """The smallest possible share, 0..1, of an object's visible pixels that lie inside a mask.
 
-    It is not known which pixels of the box belong to the object, so as many as possible are assumed to be outside the
-    mask.
+    Only the box and the number of the visible pixels are known, so as many of them as possible are assumed to be
+    outside the mask.
 
     Args:
-        box_px: box that holds all visible pixels, in edge pixels.
-        visible_px: number of visible pixels.
+        box_px: box that holds all visible pixels of the object, in edge pixels.
+        visible_px: number of visible pixels of the object.
         mask: (H, W) bool, of the size of the picture.
     """
     left, top, right, bottom = (round(side) for side in box_px)

@@ -1,7 +1,7 @@
 """Rasterises silhouettes of triangles with the rule of GPUs: a pixel is covered if its centre is inside.
 
 Every triangle gives one span per pixel row. Spans are accumulated as differences along the rows, or counted in sorted
-order, so that a mesh of any size is rasterised by a few array operations.
+order. A mesh of any size is therefore rasterised by a few array operations.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from gear.values.geometry import Array, Intrinsics
 
 Mask = npt.NDArray[np.bool_]
 Window = tuple[int, int, int, int]
-"""First column, first row, one past the last column, and one past the last row, in index pixels; may lie outside the
-picture.
+"""A rectangle of whole pixels: first column, first row, one past the last column, and one past the last row, in
+index pixels. It may lie outside the picture.
 """
 
 NEAR_M = 0.1
-"""Distance of the near plane along the optical axis, as in the renderers; nothing nearer is projected."""
+"""Distance of the near plane along the optical axis in metres, as in the renderers; nearer parts are not projected."""
 
 SPANS_AT_ONCE = 2_000_000
 
 
 def clip_near(triangles_m: Array, near_m: float = NEAR_M) -> Array:
-    """Clips (T, 3, 3) camera-frame triangles at z = near.
+    """Clips (T, 3, 3) camera-frame triangles at the near plane, z = `near_m`: the part with smaller z is removed.
 
-    The part with smaller z is removed. A triangle of which one corner is removed becomes two.
+    A triangle of which one corner is removed becomes two triangles.
     """
     front = triangles_m[..., 2] >= near_m
     count = front.sum(axis=1)
@@ -44,7 +44,7 @@ def clip_near(triangles_m: Array, near_m: float = NEAR_M) -> Array:
 
 
 def project_mesh(vertices_camera_m: Array, faces: npt.NDArray[np.int32], intrinsics: Intrinsics) -> Array:
-    """Projects the triangles of a mesh that face the camera.
+    """Projects those triangles of a mesh that face the camera.
 
     Args:
         vertices_camera_m: (N, 3) vertices in the camera's frame.
@@ -71,7 +71,9 @@ def project_mesh(vertices_camera_m: Array, faces: npt.NDArray[np.int32], intrins
 
 
 def bounds(triangles_px: Array) -> Window:
-    """The smallest window that contains the silhouette; empty and at the origin if there are no triangles."""
+    """The smallest window that contains the silhouette of (T, 3, 2) triangles in index pixels; without triangles
+    an empty window at the origin.
+    """
     if not len(triangles_px):
         return (0, 0, 0, 0)
     low, high = np.ceil(triangles_px.min(axis=(0, 1))), np.ceil(triangles_px.max(axis=(0, 1)))

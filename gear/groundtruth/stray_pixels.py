@@ -1,4 +1,4 @@
-"""Stray pixels: small visible pieces of an object, far from the rest of it."""
+"""Removes stray pixels: small visible pieces of an object, far from its larger pieces."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ import numpy.typing as npt
 Mask = npt.NDArray[np.bool_]
 
 STRAY_SHARE = 0.05
-"""Largest share of the visible pixels that a stray piece may have."""
+"""Largest share of an object's visible pixels that a stray piece may have."""
 
 MAIN_SHARE = 0.5
-"""Smallest share of the visible pixels in the larger pieces; an object with less in them is scattered, and all of it is
-kept.
+"""Smallest share of an object's visible pixels that the larger pieces must have together. Below it the object is
+scattered, and all of its pieces are kept.
 """
 
 
 def without_strays(mask: Mask) -> tuple[Mask, int, int]:
-    """Removes stray pieces, which would enlarge the box of the visible pixels.
+    """Removes stray pieces from the mask of an object's visible pixels, because they would enlarge its box.
 
-    A piece is 8-connected. It is removed if it has at most `STRAY_SHARE` of the pixels and extends beyond the box of
-    the larger pieces: a handlebar beyond the rider in front of it, or three pixels of a person between the leaves of a
-    hedge.
+    A piece is 8-connected. It is removed if it has at most 5 % of the pixels (`STRAY_SHARE`) and extends beyond the box
+    of the larger pieces. Examples are a handlebar beyond the rider in front of it, or three pixels of a person between
+    the leaves of a hedge.
 
     Args:
-        mask: (h, w) visible pixels, tight.
+        mask: (h, w) bool visible pixels, cropped to their tight box.
 
     Returns:
-        The tight mask of the kept pixels, and its first column and row in the given mask.
+        The mask of the kept pixels, cropped to their tight box, and the column and row of its first pixel in the input
+        mask.
     """
     count, pieces, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
     if count <= 2:

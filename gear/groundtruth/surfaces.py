@@ -1,4 +1,6 @@
-"""Measures patch surfaces in one view."""
+"""Measures patch surfaces (the rectangles that show patches) in one view: corners, visible pixels, distance and
+angle.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +18,16 @@ from gear.values.ground_truth import SurfaceTruth
 from gear.values.scene import SceneRecord, SurfaceRecord
 
 UNIT_CORNERS = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
-"""Patch coordinates of the corners: top left, top right, bottom right, bottom left."""
+"""Patch coordinates (u right, v down) of the patch's corners: top left, top right, bottom right, bottom left."""
 
 CURVE_STEPS = 32
-"""Number of straight pieces by which a curved edge is approximated behind a lens."""
+"""Number of straight pieces by which an edge of a surface is approximated behind a lens, where edges are curves."""
 
 
 def observe_surfaces(view: View, geoms: GeomTable, record: SceneRecord) -> tuple[SurfaceTruth, ...]:
-    """Measures each surface of the record in one view, in the order of the record."""
+    """Measures each patch surface of a scene in one view: corners, visible pixels, distance and angle; in the
+    order of `record.surfaces`.
+    """
     return tuple(_observe(view, geoms, record, index, surface) for index, surface in enumerate(record.surfaces))
 
 

@@ -1,4 +1,4 @@
-"""Which objects are labelled, which are regions to ignore, and which are left out."""
+"""Decides which objects become labels, which become regions to ignore in the evaluation, and which are left out."""
 
 from __future__ import annotations
 
@@ -45,16 +45,18 @@ class VisibilityLimits:
             raise FieldError("min_pixels_px", f"must be at least 1, got {self.min_pixels_px}")
 
     def mentions(self, truth: ObjectTruth) -> bool:
-        """Whether the object becomes a label or a region to ignore, instead of being left out."""
+        """Whether the object appears in the ground truth, as a label or as a region to ignore; False if it is left
+        out.
+        """
         return truth.visible_px >= self.min_pixels_px
 
     def labels(self, truth: ObjectTruth, box_px: BoxPx, distance_m: float) -> bool:
-        """Whether the object is labelled.
+        """Whether the object becomes a label, not only a region to ignore.
 
         Args:
             truth: the measured object.
             box_px: the box that the format writes: left, top, right, bottom.
-            distance_m: from the camera to the middle of its 3D box.
+            distance_m: distance from the camera to the middle of the object's 3D box.
         """
         if truth.visible_box is None or not self.mentions(truth):
             return False
@@ -75,8 +77,9 @@ PRESETS: dict[Preset, VisibilityLimits] = {
         max_distance_m=200.0, min_box_area_px2=900.0, min_visible_fraction=0.1, min_visible_px=100
     ),
 }
-"""Presets of limits. `kitti`: objects that some difficulty of KITTI's evaluation counts. `coco`: objects with 100
-visible pixels. `carla_gear`: the limits of the CARLA-GeAR paper, 200 m and 900 px², and further limits by gear.
+"""Limits by name of the preset. `kitti`: objects that some difficulty of KITTI's evaluation counts. `coco`:
+objects with 100 visible pixels. `carla_gear`: the limits of the CARLA-GeAR paper, 200 m and 900 px², and
+further limits by gear.
 """
 
 
@@ -110,7 +113,7 @@ class Visibility:
         self.limits()
 
     def limits(self) -> VisibilityLimits:
-        """The preset's limits, replaced by the given ones.
+        """The limits of the preset, replaced by the limits that the user gave.
 
         Raises:
             FieldError: a limit is out of its range.

@@ -1,4 +1,4 @@
-"""Finds the visible pixels of all parts of objects in one pass over the id buffer."""
+"""Finds the visible pixels of all parts of objects in one pass over the id buffer (the geom id of each pixel)."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from gear.values.frames import GeomTable, IdImage, SceneObject
 
 Mask = npt.NDArray[np.bool_]
 PartKey = tuple[int, int]
-"""Object id and label code, which identify a part."""
+"""Key of a part of an object: object id and label code."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class VisiblePart:
-    """The visible pixels of one part.
+    """The visible pixels of one part of an object, such as a rider.
 
     Attributes:
         left_px, top_px: column and row of the mask's first pixel in the picture.
-        mask: (h, w) bool, the smallest that holds the part.
+        mask: (h, w) bool, cropped to the tight box of the visible pixels.
         count_px: number of visible pixels.
     """
 
@@ -33,14 +33,16 @@ class VisiblePart:
 
 
 def gather(table: npt.NDArray[np.generic], geom_id: IdImage) -> npt.NDArray[np.generic]:
-    """`table[geom_id]`; the last entry of the table is for the geom id -1, where the picture shows no geom."""
+    """The table entry of each pixel, `table[geom_id]`. The table's last entry belongs to geom id -1, which marks
+    pixels without a geom.
+    """
     return np.take(table, geom_id, mode="wrap")
 
 
 def visible_parts(
     geom_id: IdImage, geoms: GeomTable, objects: Mapping[int, SceneObject], *, by_label: bool
 ) -> dict[PartKey, VisiblePart]:
-    """Finds all parts with at least one visible pixel.
+    """Finds all parts of objects that have at least one visible pixel.
 
     Args:
         geom_id: (H, W) int32, -1 for nothing.

@@ -1,1 +1,3 @@
-"""Metrics: evaluators over a dataset, each by the definitions of its benchmark."""
+"""Metrics of the tasks. Each evaluator gathers samples and predictions of a dataset and follows the definitions of
+a benchmark.
+"""

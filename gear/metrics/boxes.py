@@ -1,4 +1,6 @@
-"""Overlaps of all pairs of boxes: axis-aligned in the picture, rotated on the ground, and in space."""
+"""Overlaps between all pairs of two lists of boxes: 2D boxes in the picture, rotated footprints on the ground, and
+3D boxes.
+"""
 
 from __future__ import annotations
 
@@ -7,29 +9,31 @@ import numpy as np
 from gear.values.geometry import Array
 
 MAX_CORNERS = 8
-"""The intersection of two rectangles has at most eight corners."""
+"""Largest number of corners that the intersection of two rectangles can have."""
 
 
 def intersections_px2(a: Array, b: Array) -> Array:
-    """(N, M) intersection areas of (N, 4) and (M, 4) boxes (left, top, right, bottom)."""
+    """The (N, M) intersection areas, in square pixels, of (N, 4) boxes and (M, 4) boxes (left, top, right, bottom)."""
     low = np.maximum(a[:, None, :2], b[None, :, :2])
     high = np.minimum(a[:, None, 2:], b[None, :, 2:])
     return np.asarray(np.prod(np.clip(high - low, 0, None), axis=-1))
 
 
 def iou_2d(a: Array, b: Array) -> Array:
-    """(N, M) intersection over union of (N, 4) and (M, 4) boxes."""
+    """The (N, M) intersection over union of (N, 4) boxes and (M, 4) boxes (left, top, right, bottom)."""
     shared = intersections_px2(a, b)
     return _over(shared, _areas(a)[:, None] + _areas(b)[None] - shared)
 
 
 def share_of_first(a: Array, b: Array) -> Array:
-    """(N, M) intersection areas of (N, 4) and (M, 4) boxes, divided by the area of the first box."""
+    """The (N, M) intersection areas of (N, 4) boxes `a` and (M, 4) boxes `b`, divided by the area of the box from
+    `a`.
+    """
     return _over(intersections_px2(a, b), np.broadcast_to(_areas(a)[:, None], (len(a), len(b))))
 
 
 def iou_ground_and_space(a: Array, b: Array) -> tuple[Array, Array]:
-    """Overlaps of KITTI's 3D boxes.
+    """Computes the intersection over union of all pairs of KITTI's 3D boxes, on the ground and in space.
 
     Args:
         a, b: (N, 7) and (M, 7) boxes: height, width, length, x, y, z of the middle of the bottom face, and rotation_y,
@@ -49,7 +53,9 @@ def iou_ground_and_space(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def footprint_intersections_m2(a: Array, b: Array) -> Array:
-    """(N, M) intersection areas of the footprints of (N, 7) and (M, 7) boxes, in square metres."""
+    """The (N, M) intersection areas, in square metres, of the footprints of (N, 7) and (M, 7) KITTI boxes (height,
+    width, length, x, y, z, rotation_y).
+    """
     shared = np.zeros((len(a), len(b)))
     reach = (np.hypot(a[:, 1], a[:, 2])[:, None] + np.hypot(b[:, 1], b[:, 2])[None]) / 2
     near = np.hypot(a[:, None, 3] - b[None, :, 3], a[:, None, 5] - b[None, :, 5]) < reach
@@ -60,7 +66,9 @@ def footprint_intersections_m2(a: Array, b: Array) -> Array:
 
 
 def footprints(boxes: Array) -> Array:
-    """(N, 4, 2) corners of the footprints of (N, 7) boxes in x and z, counter-clockwise in (x, z)."""
+    """The (N, 4, 2) footprint corners (x, z) of (N, 7) KITTI boxes (height, width, length, x, y, z, rotation_y),
+    counter-clockwise in (x, z).
+    """
     c, s = np.cos(boxes[:, 6]), np.sin(boxes[:, 6])
     along = np.array([0.5, -0.5, -0.5, 0.5]) * boxes[:, 2:3]
     across = np.array([0.5, 0.5, -0.5, -0.5]) * boxes[:, 1:2]

@@ -1,4 +1,4 @@
-"""COCO's average precision, computed by pycocotools."""
+"""COCO's average precision of 2D detection, computed by pycocotools."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ RECALLS = ("ar1", "ar10", "ar100", "ar_small", "ar_medium", "ar_large")
 
 
 class CocoEvaluator(Generic[SampleT]):
-    """Gathers pictures and detections, and evaluates them with pycocotools at the end."""
+    """Evaluator of 2D detection: gathers pictures and detections, and computes COCO's metrics with pycocotools at
+    the end.
+    """
 
     def __init__(self, as_picture: Callable[[SampleT], Picture]) -> None:
         """Args: as_picture: converts a sample to its COCO picture with annotations."""
@@ -32,9 +34,10 @@ class CocoEvaluator(Generic[SampleT]):
         self.detections: list[tuple[Detection, ...]] = []
 
     def update(self, sample: SampleT, prediction: Sequence[Detection]) -> Mapping[str, float]:
-        """Adds the detections of one sample; returns `found_share` and `false_alarms` of this sample.
+        """Adds one sample with its detections; returns the metrics of this sample alone.
 
-        `gear.metrics.single_picture` defines both; average precision is not defined for a single picture.
+        The metrics are `found_share`, the share of the labels that were detected, and `false_alarms`, the number of
+        wrong detections (`gear.metrics.single_picture`). Average precision is not defined for a single picture.
 
         Raises:
             ValueError: a detection has an unknown category, a box whose right is left of its left or bottom above its
@@ -69,13 +72,13 @@ class CocoEvaluator(Generic[SampleT]):
         )
 
     def merge(self, other: Any) -> None:
-        """Adds the pictures of another evaluator."""
+        """Adds the samples that another evaluator of this class has gathered."""
         self.pictures += other.pictures
         self.detections += other.detections
 
     def result(self) -> Mapping[str, float]:
-        """COCO's twelve metrics for boxes (`ap`, `ap50`, …, `ar100`, …), and `ap_<category>` of every category that
-        occurs; 0..1 or NaN.
+        """The metrics by name: COCO's twelve metrics for boxes (`ap`, `ap50`, …, `ar100`, …), and `ap_<category>`
+        of every labelled category; 0..1 or NaN.
         """
         names = (*STATS, *RECALLS)
         occurring = sorted({item.category_id for item in _labelled(self.pictures)})
@@ -96,7 +99,9 @@ class CocoEvaluator(Generic[SampleT]):
         return metrics
 
     def resampled(self, draws: Draws) -> Spread:
-        """(R,) values of `ap`, `ap50`, `ap75` and `ap_<category>`."""
+        """The metrics `ap`, `ap50`, `ap75` and `ap_<category>` of R resampled datasets, (R,) each. Row r of
+        `draws` lists the sample indices of dataset r.
+        """
         found = matches(self._matched())
         values = resampled(list(found.values()), draws)
         spread = {
@@ -109,7 +114,9 @@ class CocoEvaluator(Generic[SampleT]):
         return spread
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """0 and 1: every metric of this evaluator is a share."""
+        """Smallest and largest possible value of a metric: 0 and 1, because every metric of this evaluator is a
+        share.
+        """
         return 0.0, 1.0
 
     def _matched(self) -> Any:
@@ -139,7 +146,9 @@ class CocoEvaluator(Generic[SampleT]):
 
 
 def coco_eval(truth: Json, found: list[Json]) -> Any:
-    """A `COCOeval` of boxes over all of COCO's categories."""
+    """Makes pycocotools' `COCOeval` for 2D boxes over all of COCO's categories, from ground truth and detections
+    in COCO's JSON format.
+    """
     from pycocotools.coco import COCO
     from pycocotools.cocoeval import COCOeval
 

@@ -1,7 +1,7 @@
 """Average precision from the matches of pycocotools, with a weight for each picture.
 
-pycocotools matches picture by picture, so that a resampled dataset needs no second matching: each picture is counted as
-often as it was drawn.
+pycocotools matches each picture independently, so a resampled dataset needs no second matching: the matches of each
+picture are counted as often as the picture was drawn.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ RECALLS = np.linspace(0.0, 1.0, 101)
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Matches:
-    """Matched detections of one category, in order of decreasing score.
+    """The detections of one category in all pictures, by decreasing score, with the result of pycocotools'
+    matching.
 
     Attributes:
-        owner: (D,) index of the picture of each detection.
-        hit: (T, D) whether the detection matches a label, for each IoU threshold.
-        counts: (T, D) whether the detection is not ignored.
-        wanted: (N,) number of labels to be found in each picture.
+        owner: (D,) index of the picture of each of the D detections.
+        hit: (T, D) whether the detection matches a label, for each of T IoU thresholds.
+        counts: (T, D) whether the detection counts, that is, is not ignored.
+        wanted: (N,) number of labels in each of N pictures that a detector should find.
     """
 
     owner: npt.NDArray[np.int64]
@@ -37,8 +38,8 @@ class Matches:
 
 
 def matches(evaluation: Any) -> dict[int, Matches]:
-    """The matches of an evaluated `COCOeval` by category, in its first area range; only categories with labels to be
-    found.
+    """The matches of an evaluated `COCOeval` by category id, for its first area range. Categories without a label
+    that counts are left out.
     """
     parameters = evaluation.params
     pictures, areas = len(parameters.imgIds), len(parameters.areaRng)
@@ -64,7 +65,9 @@ def _gathered(rows: list[tuple[int, Any]], wanted: npt.NDArray[np.int64], most: 
 
 
 def average_precision(found: Matches, weights: npt.NDArray[np.int64]) -> Array:
-    """(T,) average precision at 101 recalls, with each picture counted `weights` times; NaN without labels."""
+    """The (T,) average precision at 101 recalls for T IoU thresholds. Picture i counts `weights[i]` times; NaN if
+    no label counts.
+    """
     total = int(weights @ found.wanted)
     if not total:
         return np.full(len(found.hit), np.nan)
@@ -80,7 +83,9 @@ def average_precision(found: Matches, weights: npt.NDArray[np.int64]) -> Array:
 
 
 def resampled(found: Sequence[Matches], draws: Draws) -> Array:
-    """(R, categories, T) average precision over the pictures of each draw."""
+    """The (R, categories, T) average precision of R resampled datasets; row r of `draws` lists the picture indices
+    of dataset r.
+    """
     values = np.full((len(draws), len(found), len(found[0].hit) if found else 1), np.nan)
     for row, drawn in enumerate(draws):
         for column, one in enumerate(found):
@@ -89,7 +94,7 @@ def resampled(found: Sequence[Matches], draws: Draws) -> Array:
 
 
 def known_mean(values: Array, axes: tuple[int, ...]) -> Array:
-    """Mean over axes without NaN; NaN where all values are NaN."""
+    """The mean over the given axes of all values that are not NaN; NaN where all values are NaN."""
     known = ~np.isnan(values)
     total = np.where(known, values, 0.0).sum(axis=axes)
     return np.asarray(np.where(known.any(axis=axes), total / np.maximum(known.sum(axis=axes), 1), np.nan))

@@ -1,5 +1,5 @@
-"""The metric by which reference networks of 2D detection are compared: AP50 of frequent traffic categories in the
-dataset.
+"""The metric with which gear compares its reference networks of 2D detection: AP50 of the frequent traffic
+categories of a dataset.
 """
 
 from __future__ import annotations
@@ -19,21 +19,25 @@ from gear.values.serial import Json
 CATEGORIES = ("person", "bicycle", "car", "motorcycle", "bus", "truck")
 MIN_HEIGHT_PX = 32.0
 AT_HEIGHT_PX = 800
-"""Number of rows of a picture to which limits on heights refer."""
+"""Number of rows of the picture for which limits on heights of objects are stated; limits scale with the picture's
+height.
+"""
 
 MIN_INSTANCES = 50
 LARGE = 1e10
 
 
 class TallObjects(CocoEvaluator[SampleT]):
-    """Average precision at IoU 0.5, averaged over the traffic categories with at least 50 instances.
+    """Evaluator of average precision at IoU 0.5, averaged over the traffic categories with at least 50 instances.
 
-    An instance counts if its visible box is at least 32 px high in a picture of 800 rows. Lower instances, and lower
-    detections that match nothing, are ignored, as pycocotools ignores objects outside an area range.
+    An instance counts if its visible box is at least 32 px high in a picture of 800 rows. Lower instances are ignored,
+    and so are lower detections that match nothing, as pycocotools ignores objects outside an area range.
     """
 
     def result(self) -> Mapping[str, float]:
-        """`ap50`, `ap50_<category>` (NaN where there are fewer instances) and `instances_<category>`."""
+        """The metrics by name: `ap50`, `ap50_<category>` (NaN for fewer than 50 instances) and
+        `instances_<category>`, the number of instances.
+        """
         found = self._found()
         counts = {name: int(one.wanted.sum()) if (one := found.get(name)) else 0 for name in CATEGORIES}
         values = {
@@ -47,7 +51,9 @@ class TallObjects(CocoEvaluator[SampleT]):
         return {"ap50": total, **{f"ap50_{name}": value for name, value in values.items()}, **instances}
 
     def resampled(self, draws: Draws) -> Spread:
-        """(R,) values of `ap50` and `ap50_<category>`; the whole dataset decides which categories count."""
+        """The metrics `ap50` and `ap50_<category>` of R resampled datasets, (R,) each. The categories with at
+        least 50 instances in the whole dataset count.
+        """
         found = {name: one for name, one in self._found().items() if int(one.wanted.sum()) >= MIN_INSTANCES}
         values = resampled(list(found.values()), draws)[:, :, 0]
         return {"ap50": known_mean(values, (1,)), **{f"ap50_{name}": values[:, i] for i, name in enumerate(found)}}

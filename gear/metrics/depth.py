@@ -1,4 +1,6 @@
-"""Monocular depth: the metrics of KITTI's devkit and those of Eigen et al. (NeurIPS 2014), as means over pictures."""
+"""Metrics of monocular depth, averaged over pictures: those of KITTI's devkit and those of Eigen et al. (NeurIPS
+2014).
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ CROPS: dict[str, tuple[float, float, float, float]] = {
     "garg": (0.40810811, 0.99189189, 0.03594771, 0.96405229),
     "eigen": (0.3324324, 0.91351351, 0.0359477, 0.96405229),
 }
-"""Evaluated part of the picture by name: first and last row, first and last column, as shares of the picture's size."""
+"""Evaluated part of the picture by name of the crop: first and last row, first and last column, as shares of the
+picture's size.
+"""
 
 MIN_DEPTH_M = 1e-3
 
@@ -32,28 +36,30 @@ MIN_CODED_DEPTH_M = 1 / UNITS_PER_M
 """Smallest depth that the 16-bit pictures of KITTI's devkit can hold, in metres."""
 
 PIXELS_AT_ONCE = 1 << 16
-"""Number of pixels that are processed at a time, few enough for intermediate results to stay in the
-processor's cache.
-"""
+"""Number of pixels that are processed at a time; their intermediate results fit into the processor's cache."""
 
 SINGLE_PRECISION_M = 1e5
-"""Depths between the inverse of this value and this value are processed in single precision."""
+"""Depths from the inverse of this value up to this value are processed in single precision, other depths in double
+precision.
+"""
 
 LOG_ERROR = 1e-6
-"""Bound on the error of a logarithm of a quotient in single precision, which is at most a few times 1e-7."""
+"""Upper bound on the error of the logarithm of a quotient in single precision; the actual error is at most a few
+times 1e-7.
+"""
 
 
 class DepthTruth(Protocol):
-    """The part of a depth sample that the metric uses."""
+    """Protocol of the depth samples that the evaluators accept: they have `depth_m`."""
 
     @property
     def depth_m(self) -> FloatImage:
-        """(H, W) float32 metres, NaN where there is no ground truth."""
+        """The (H, W) float32 true depth in metres; NaN where there is no ground truth."""
         ...
 
 
 class DepthEvaluator:
-    """Gathers the metrics of every picture and averages them.
+    """Evaluator of monocular depth: gathers the metrics of every picture and averages them.
 
     Metrics without a prefix are those of KITTI's devkit: over all pixels whose ground truth its 16-bit pictures can
     hold (up to 256 m), with predictions clipped to the range of these pictures. Metrics with the prefix `eigen_` use
@@ -107,28 +113,32 @@ class DepthEvaluator:
         return window
 
     def merge(self, other: Any) -> None:
-        """Adds the pictures of another evaluator."""
+        """Adds the pictures that another evaluator of this class has gathered."""
         for name, values in other.metrics.items():
             self.metrics.setdefault(name, []).extend(values)
 
     def result(self) -> Mapping[str, float]:
-        """Means over pictures that have ground truth.
+        """The metrics by name: means over the pictures that have ground truth.
 
-        `mae_m`, `rmse_m`, `imae_per_km`, `irmse_per_km`, `log_mae`, `log_rmse`, `silog` (x100), `abs_rel`, `sq_rel`
-        (squared error over squared depth); `eigen_d1` to `eigen_d3`, `eigen_abs_rel`, `eigen_sq_rel` (over depth),
-        `eigen_rmse_m`, `eigen_rmse_log`, `eigen_log10`, `eigen_silog`.
+        Names are `mae_m`, `rmse_m`, `imae_per_km`, `irmse_per_km`, `log_mae`, `log_rmse`, `silog` (x100), `abs_rel` and
+        `sq_rel` (squared error over squared depth); `eigen_d1` to `eigen_d3`, `eigen_abs_rel`, `eigen_sq_rel` (squared
+        error over depth), `eigen_rmse_m`, `eigen_rmse_log`, `eigen_log10` and `eigen_silog`.
         """
         known = {name: [v for v in self.metrics.get(name, []) if v == v] for name in self._names()}
         # Sorted, so that the order in which pictures came does not reach the last digit.
         return {name: float(np.mean(np.sort(values))) if values else float("nan") for name, values in known.items()}
 
     def resampled(self, draws: Draws) -> Spread:
-        """(R,) means over the drawn pictures of each row of `draws`."""
+        """The metrics of R resampled datasets, (R,) each: means over the pictures whose indices row r of `draws`
+        lists.
+        """
         values = {name: np.array(self.metrics.get(name, []), np.float64) for name in self._names()}
         return {name: _known_means(one[draws]) for name, one in values.items() if len(one)}
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """0 and 1 for shares of pixels within a factor (`d1` to `d3`); 0 and infinity for errors."""
+        """Smallest and largest possible value of a metric: 0 and 1 for `d1` to `d3` (shares of pixels), 0 and
+        infinity for errors.
+        """
         return 0.0, 1.0 if metric.removeprefix("eigen_") in ("d1", "d2", "d3") else math.inf
 
     @staticmethod
@@ -137,8 +147,8 @@ class DepthEvaluator:
 
 
 class NearDepth(DepthEvaluator):
-    """The metric by which reference networks of depth are compared: whole pictures, ground truth below 80 m, without
-    the sky.
+    """The metric with which gear compares its reference networks of depth: whole pictures, true depths below 80 m,
+    no sky.
 
     Predictions are clipped to 80 m. The devkit's metrics are not included.
     """
@@ -149,7 +159,7 @@ class NearDepth(DepthEvaluator):
         super().__init__(max_depth_m=80.0, crop="none")
 
     def update(self, sample: DepthTruth, prediction: FloatImage) -> Mapping[str, float]:
-        """Takes (H, W) metres; returns this picture's metrics."""
+        """Adds a predicted (H, W) depth map in metres; returns the metrics of this picture."""
         return _renamed(super().update(sample, prediction))
 
     def result(self) -> Mapping[str, float]:
@@ -157,7 +167,9 @@ class NearDepth(DepthEvaluator):
         return _renamed(super().result())
 
     def resampled(self, draws: Draws) -> Spread:
-        """(R,) means over the drawn pictures of the metrics of `result`."""
+        """The metrics of R resampled datasets, (R,) each, with the names of `result`: means over the pictures
+        whose indices row r of `draws` lists.
+        """
         return _renamed(super().resampled(draws))
 
 

@@ -1,9 +1,11 @@
-"""KITTI's object evaluation: average precision of 2D boxes, of footprints and of 3D boxes, and orientation similarity.
+"""KITTI's object evaluation: average precision of 2D boxes, of footprints and of 3D boxes, and orientation
+similarity.
 
-It follows the rules of the devkit: 41 thresholds, similar classes and labels beyond the difficulty ignored, detections
-in DontCare regions excused. `r11` is the mean over 11 recalls, `r40` the mean over 40 recalls that replaced it in 2019.
-With fewer than 41 labels of a class a perfect detector stays below 1 in both, because fewer recall steps exist. This is
-the benchmark's own definition; `ceilings` gives the largest possible values.
+The evaluation follows the rules of the devkit. It uses 41 score thresholds. Labels of similar classes and labels beyond
+the difficulty are ignored, and detections in DontCare regions are no false alarms. `r11` is the mean precision over 11
+recalls; `r40` is the mean over 40 recalls, which replaced `r11` in 2019. With fewer than 41 labels of a class a perfect
+detector stays below 1 in both means, because fewer recall steps exist. This is the benchmark's own definition;
+`ceilings` gives the largest possible values.
 """
 
 from __future__ import annotations
@@ -36,11 +38,13 @@ from gear.values.ground_truth import BoxPx
 SampleT = TypeVar("SampleT", contravariant=True)
 
 STEPS = 40
-"""Number of recall steps: recalls are multiples of 1/40."""
+"""Number of recall steps; the recalls at which precision is measured are multiples of 1/40."""
 
 
 class KittiEvaluator(Generic[SampleT]):
-    """Gathers the labels and detections of all pictures, and computes the metrics at the end."""
+    """Evaluator of KITTI's object metrics: gathers the labels and detections of all pictures, and computes the
+    metrics at the end.
+    """
 
     def __init__(
         self,
@@ -52,9 +56,10 @@ class KittiEvaluator(Generic[SampleT]):
         self.pictures: list[PictureBoxes] = []
 
     def update(self, sample: SampleT, prediction: Sequence[KittiLabel]) -> Mapping[str, float]:
-        """Adds the detections of one sample; returns `found_share` and `false_alarms` of its 2D boxes.
+        """Adds one sample with its detections; returns the metrics of its 2D boxes alone.
 
-        `gear.metrics.single_picture` defines both; average precision is not defined for a single picture.
+        The metrics are `found_share`, the share of the labels that were detected, and `false_alarms`, the number of
+        wrong detections (`gear.metrics.single_picture`). Average precision is not defined for a single picture.
 
         Raises:
             ValueError: a detection has no score, a type that is none of KITTI's, a box whose right is left of its left
@@ -75,14 +80,14 @@ class KittiEvaluator(Generic[SampleT]):
         )
 
     def merge(self, other: Any) -> None:
-        """Adds the pictures of another evaluator."""
+        """Adds the pictures that another evaluator of this class has gathered."""
         self.pictures += other.pictures
 
     def result(self) -> Mapping[str, float]:
-        """Metrics by name, 0..1; NaN where no label is to be found.
+        """The metrics by name, 0..1; NaN where no label counts.
 
-        `<class>_<2d|bev|3d>_<easy|moderate|hard>_<r11|r40>` and `<class>_aos_…`, and `ap_3d_moderate`, the mean of the
-        classes' `3d_moderate_r40`.
+        Names are `<class>_<2d|bev|3d>_<easy|moderate|hard>_<r11|r40>`, `<class>_aos_…` (orientation similarity), and
+        `ap_3d_moderate`, the mean of the classes' `3d_moderate_r40`.
         """
         metrics: dict[str, float] = {}
         for kind in NEIGHBOURS:
@@ -93,7 +98,9 @@ class KittiEvaluator(Generic[SampleT]):
         return {"ap_3d_moderate": float(np.mean(known)) if known else float("nan"), **metrics}
 
     def resampled(self, draws: Draws) -> Spread:
-        """(R,) values of `<class>_<2d|bev|3d>_moderate_r40` and `ap_3d_moderate`."""
+        """The metrics `<class>_<2d|bev|3d>_moderate_r40` and `ap_3d_moderate` of R resampled datasets, (R,) each.
+        Row r of `draws` lists the sample indices of dataset r.
+        """
         moderate = next(difficulty for difficulty in DIFFICULTIES if difficulty.name == "moderate")
         spread: dict[str, Array] = {}
         for kind in NEIGHBOURS:
@@ -107,11 +114,15 @@ class KittiEvaluator(Generic[SampleT]):
         return spread
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """0 and 1: every metric of this evaluator is a share."""
+        """Smallest and largest possible value of a metric: 0 and 1, because every metric of this evaluator is a
+        share.
+        """
         return 0.0, 1.0
 
     def ceilings(self) -> Mapping[str, float]:
-        """The metrics that perfect detections would reach, for those below 1."""
+        """The values that perfect detections would reach, by name of the metric; only metrics whose value would be
+        below 1.
+        """
         most: dict[str, float] = {}
         for kind in NEIGHBOURS:
             for overlap in OVERLAPS:
@@ -146,10 +157,10 @@ def _check(found: KittiLabel) -> None:
 
 
 def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:
-    """(R,) average precision at 40 recalls over the pictures of each row of (R, N) draws; NaN without labels to be
-    found.
+    """The (R,) average precision at 40 recalls of R resampled datasets; NaN where no label counts.
 
-    Every picture is matched once, at all thresholds that occur in any draw.
+    Row r of the (R, N) draws lists the picture indices of dataset r. Every picture is matched only once, at all
+    thresholds that occur in any draw.
     """
     wanted = np.array([int((picture.label_state == 0).sum()) for picture in chosen])
     scores = [(score, number) for number, picture in enumerate(chosen) for score in matched_scores(picture)]
@@ -174,7 +185,7 @@ def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:
 
 
 def curves(chosen: Sequence[Chosen]) -> tuple[Array, Array]:
-    """(41,) precision and orientation similarity at recalls 0, 1/40, …, 1; NaN without labels to be found."""
+    """The (41,) precision and the (41,) orientation similarity at recalls 0, 1/40, …, 1; NaN if no label counts."""
     wanted = sum(int((picture.label_state == 0).sum()) for picture in chosen)
     if not wanted:
         return np.full(STEPS + 1, np.nan), np.full(STEPS + 1, np.nan)
@@ -194,7 +205,9 @@ def curves(chosen: Sequence[Chosen]) -> tuple[Array, Array]:
 
 
 def perfect_curve(chosen: Iterable[Chosen]) -> Array:
-    """(41,) precision of perfect detections, as `curves` gives it."""
+    """The (41,) precision at recalls 0, 1/40, …, 1 that perfect detections would reach; below 1 at the end for
+    fewer than 41 labels.
+    """
     wanted = sum(int((picture.label_state == 0).sum()) for picture in chosen)
     if not wanted:
         return np.full(STEPS + 1, np.nan)
@@ -202,7 +215,9 @@ def perfect_curve(chosen: Iterable[Chosen]) -> Array:
 
 
 def recall_thresholds(scores: Sequence[float], wanted: int) -> Array:
-    """Scores at which the recall reaches each step of 1/40, in decreasing order; at most 41."""
+    """The scores, in decreasing order, at which the recall reaches each step of 1/40; at most 41. `wanted` is the
+    number of labels that count.
+    """
     thresholds = []
     recall = 0.0
     for i, score in enumerate(scores):

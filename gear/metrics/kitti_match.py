@@ -20,17 +20,23 @@ Overlap = Literal["2d", "bev", "3d"]
 OVERLAPS: tuple[Overlap, ...] = ("2d", "bev", "3d")
 
 NEIGHBOURS = {"Car": "Van", "Pedestrian": "Person_sitting", "Cyclist": ""}
-"""For each class the similar type whose objects are ignored: detecting one is neither a hit nor a false alarm."""
+"""Similar type of each class, "" for none. Labels of the similar type are ignored: detecting such an object is
+neither a hit nor a false alarm.
+"""
 
 MIN_OVERLAP = {"Car": 0.7, "Pedestrian": 0.5, "Cyclist": 0.5}
 
 LOOSE_OVERLAP = {"Car": 0.5, "Pedestrian": 0.25, "Cyclist": 0.25}
-"""Overlaps from above in the looser set of thresholds of kitti-object-eval-python, which papers report, too."""
+"""Smallest IoU of footprints for a match, by class, in the looser set of thresholds of kitti-object-eval-python,
+which papers also report.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difficulty:
-    """The limits of a difficulty: labels beyond them are ignored."""
+    """The limits of a difficulty of KITTI (easy, moderate, hard): labels below the height or above the occlusion
+    or truncation are ignored.
+    """
 
     name: str
     min_height_px: float
@@ -52,9 +58,10 @@ class PictureBoxes:
     Attributes:
         labels: all labels except DontCare regions.
         detections: all detections, each with a score.
-        overlaps: (labels, detections) intersections over union, by kind of overlap.
-        in_dont_care: (detections,) largest share of a detection's own box that lies in one DontCare region.
-        in_ignored: (detections,) the same for regions that are ignored for overlaps from above and in space, too.
+        overlaps: (labels, detections) intersections over union, by kind of overlap (`2d`, `bev`, `3d`).
+        in_dont_care: (detections,) largest share of the detection's 2D box that lies in a single DontCare region.
+        in_ignored: (detections,) largest share of the detection's 2D box that lies in a single ignored box. Unlike
+            DontCare regions, ignored boxes count for footprints and 3D boxes, too.
     """
 
     labels: tuple[KittiLabel, ...]
@@ -70,9 +77,10 @@ def picture_boxes(
     """Computes the overlaps of all labels and detections of a picture.
 
     Args:
-        labels: with DontCare regions.
-        detections: every one with a score.
-        ignored_px: boxes in the picture, in index pixels, that excuse detections of all overlaps.
+        labels: labels, including DontCare regions.
+        detections: detections, each with a score.
+        ignored_px: 2D boxes in index pixels; a detection that lies in such a box is no false alarm, for any kind of
+            overlap.
     """
     things = tuple(label for label in labels if label.type != "DontCare")
     regions = _boxes_px([label for label in labels if label.type == "DontCare"])
@@ -88,7 +96,7 @@ def picture_boxes(
 
 
 def picture_detections(detections: Sequence[KittiLabel]) -> tuple[PictureDetection, ...]:
-    """Detections in the picture alone."""
+    """Reduces KITTI's detections to class, 2D box (edge pixels) and score."""
     return tuple(
         PictureDetection(label=one.type, box_px=to_edge_pixels(one.box_px), score=one.score or 0.0)
         for one in detections
@@ -96,7 +104,9 @@ def picture_detections(detections: Sequence[KittiLabel]) -> tuple[PictureDetecti
 
 
 def is_in_place(labels: Sequence[KittiLabel], detections: Sequence[KittiLabel]) -> Bools:
-    """(N, M): whether a detection overlaps a label from above by at least `LOOSE_OVERLAP` of the label's class."""
+    """The (N, M) bool mask of the N labels and M detections whose footprints overlap by at least `LOOSE_OVERLAP`
+    of the label's class.
+    """
     ground, _ = iou_ground_and_space(_boxes_m(labels), _boxes_m(detections))
     least = np.array([LOOSE_OVERLAP[label.type] for label in labels])
     return np.asarray(ground >= least[:, None])
@@ -118,15 +128,17 @@ def _boxes_m(labels: Sequence[KittiLabel]) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Chosen:
-    """Labels and detections of one picture, sorted for one class at one difficulty.
+    """Labels and detections of one picture, sorted for one class at one difficulty into counted, ignored and other
+    ones.
 
     Attributes:
-        label_state: (labels,) 0 for labels to be found, 1 for ignored ones, -1 for those of other classes.
-        detection_state: (detections,) the same for detections.
+        label_state: (labels,) 0 for labels that count, 1 for ignored labels, -1 for labels of other classes.
+        detection_state: (detections,) 0 for detections that count, 1 for ignored detections, -1 for those of other
+            classes.
         scores: (detections,) scores.
         overlaps: (labels, detections) intersections over union.
         angle_gain: (labels, detections) (1 + cos of the difference of alpha) / 2.
-        excused: (detections,) lies in a DontCare region or in an ignored one.
+        excused: (detections,) whether the detection lies in a DontCare region or an ignored box, and is no false alarm.
         min_overlap: smallest overlap of a match.
     """
 
@@ -148,7 +160,8 @@ def choose(
     min_overlap: float | None = None,
     max_distance_m: float = np.inf,
 ) -> Chosen:
-    """Sorts labels and detections into those that count, those that are ignored, and those of other classes.
+    """Sorts the labels and detections of a picture into those that count, those that are ignored, and those of
+    other classes.
 
     Args:
         picture: labels and detections.
@@ -193,8 +206,8 @@ def choose(
 
 
 def matched_scores(chosen: Chosen) -> list[float]:
-    """Scores of the detections that match a label if no score threshold is applied; each label takes the one with the
-    highest score.
+    """The scores of the detections that match a label when no score threshold is applied. Each label takes the
+    detection with the highest score.
     """
     taken = np.zeros(len(chosen.scores), dtype=np.bool_)
     scores = []
@@ -211,7 +224,9 @@ def matched_scores(chosen: Chosen) -> list[float]:
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class Counts:
-    """Counts at each threshold, (T,) each: hits, false alarms, misses, and hits weighted by orientation similarity."""
+    """Counts at each of T score thresholds, (T,) each: hits, false alarms, misses, and hits weighted by
+    orientation similarity.
+    """
 
     tp: Array
     fp: Array
@@ -220,7 +235,9 @@ class Counts:
 
 
 def count(chosen: Chosen, thresholds: Array) -> Counts:
-    """Matches one picture at every threshold; each label takes the detection that overlaps it most."""
+    """Matches the labels and detections of one picture at every score threshold, and counts the results. Each
+    label takes the detection that overlaps it most.
+    """
     size = len(thresholds)
     kept = (chosen.scores[None] >= thresholds[:, None]) & (chosen.detection_state >= 0)[None]
     taken = np.zeros_like(kept)

@@ -1,4 +1,6 @@
-"""The metric by which reference networks of stereo detection are compared: near cars, seen from above."""
+"""The metric with which gear compares its reference networks of stereo detection: average precision of the
+footprints of near cars.
+"""
 
 from __future__ import annotations
 
@@ -17,17 +19,18 @@ MIN_OVERLAP = 0.5
 
 
 class NearCars(KittiEvaluator[SampleT]):
-    """Average precision of the footprints of cars, at an overlap of 0.5.
+    """Evaluator of the average precision of cars' footprints, at an overlap of 0.5.
 
     Labels and detections more than 40 m ahead are ignored. All other rules, including the difficulties, are the
     devkit's.
     """
 
     def update(self, sample: SampleT, prediction: Sequence[KittiLabel]) -> Mapping[str, float]:
-        """Adds the detections of one sample; returns `found_share` and `false_alarms` of the footprints of its near
-        cars.
+        """Adds one sample with its detections; returns `found_share` and `false_alarms` of the footprints of near
+        cars in this sample.
 
-        Both are for moderate difficulty and detections with a score of at least 0.5.
+        `found_share` is the share of the labels that were detected, `false_alarms` the number of wrong detections; for
+        moderate difficulty, and detections with a score of at least 0.5.
 
         Raises:
             ValueError: a detection has no score, a type that is none of KITTI's, a box whose right is left of its left
@@ -39,7 +42,9 @@ class NearCars(KittiEvaluator[SampleT]):
         return {"found_share": hits / wanted if wanted else float("nan"), "false_alarms": float(here.fp[0])}
 
     def result(self) -> Mapping[str, float]:
-        """`car_bev_<moderate|easy|hard>_r40`, 0..1; NaN where no label is to be found."""
+        """The metrics `car_bev_<moderate|easy|hard>_r40`, average precision at 40 recalls, 0..1; NaN where no
+        label counts.
+        """
         metrics = {}
         for difficulty in _moderate_first():
             precision, _ = curves(self._chosen(difficulty))
@@ -47,11 +52,15 @@ class NearCars(KittiEvaluator[SampleT]):
         return metrics
 
     def resampled(self, draws: Draws) -> Spread:
-        """(R,) values of all metrics of `result`."""
+        """The metrics of `result` for R resampled datasets, (R,) each. Row r of `draws` lists the sample indices
+        of dataset r.
+        """
         return {_name(one): resampled_r40(self._chosen(one), draws) for one in _moderate_first()}
 
     def ceilings(self) -> Mapping[str, float]:
-        """The metrics that perfect detections would reach, for those below 1."""
+        """The values that perfect detections would reach, by name of the metric; only metrics whose value would be
+        below 1.
+        """
         curves_by_name = {_name(one): perfect_curve(self._chosen(one)) for one in _moderate_first()}
         most = {name: float(curve[1 : STEPS + 1].mean()) for name, curve in curves_by_name.items()}
         return {name: value for name, value in most.items() if value < 1}

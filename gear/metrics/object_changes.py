@@ -1,9 +1,10 @@
-"""The effect of a patch on the objects of a picture: the picture is compared with its twin, object by object.
+"""The effect of a patch on the objects of a picture: the picture is compared, object by object, with its twin, the
+same picture with another patch or none.
 
-Twins show the same objects, so that an object is known by its id and class. Of the objects that are found in the twin,
-those that are missed in the picture are `hidden`, and the others that are not found are `misclassified` or `moved`
-(`gear.metrics.object_matching`). A detection is `invented` if it is background and the twin has no confident detection
-of its class that overlaps it by an IoU of at least 0.5.
+Twins contain the same objects, which are identified by id and class. Only objects that are found in the twin are
+compared. An object that is missed in the picture is `hidden`; an object that is detected wrongly there is
+`misclassified` or `moved` (`gear.metrics.object_matching`). A detection on background is `invented` if the twin has no
+confident detection of the same class that overlaps it by an IoU of at least 0.5.
 """
 
 from __future__ import annotations
@@ -23,12 +24,15 @@ Change = Literal["hidden", "misclassified", "moved", "invented"]
 CHANGES: tuple[Change, ...] = get_args(Change)
 
 OF_OBJECTS: dict[ObjectState, Change] = {"missed": "hidden", "misclassified": "misclassified", "moved": "moved"}
-"""The change of an object that is found in the twin, by its state in the picture."""
+"""Name of the change for an object that is found in the twin (the same picture with another patch), by the
+object's state in the picture.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectChange:
-    """An object or a detection that differs between a picture and its twin; JSON-ready.
+    """An object or a detection that differs between a picture and its twin (the same picture with another patch);
+    JSON-ready.
 
     Attributes:
         change: kind of the change: `hidden`, `misclassified`, `moved` or `invented`.
@@ -50,13 +54,17 @@ class ObjectChange:
 
 
 def found_in_twin(now: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectOutcome, ...]:
-    """The objects of a picture that are found in its twin."""
+    """The outcomes in the picture `now` for the objects that are found in `twin`, the same picture with another
+    patch.
+    """
     found = {(thing.object_id, thing.label) for thing in twin.objects if thing.state == "found"}
     return tuple(thing for thing in now.objects if (thing.object_id, thing.label) in found)
 
 
 def changes(now: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectChange, ...]:
-    """The differences from the twin: objects in the order of the ground truth, then detections by decreasing score."""
+    """Lists the changes from `twin` (the same picture with another patch) to `now`: objects in the order of the
+    ground truth, then invented detections by decreasing score.
+    """
     lost = [
         ObjectChange(
             change=OF_OBJECTS[thing.state],

@@ -37,14 +37,16 @@ from gear.values.picture_objects import (
 )
 
 LEAST_OVERLAP = 0.1
-"""IoU from which a detection of an object's class is about that object, though at another place."""
+"""IoU from which a detection of the object's class is attributed to the object, as `moved` where the IoU stays
+below 0.5.
+"""
 
 
 def outcomes(given: PictureObjects, patch: PatchArea) -> PictureOutcomes:
-    """The outcomes of the objects and of the confident detections of a picture.
+    """Determines the outcome of each object of a picture, and the role of each confident detection.
 
     Args:
-        given: objects and detections.
+        given: objects and detections of one view.
         patch: visible patches of the same view.
     """
     order = np.argsort([-one.score for one in given.detections], kind="stable")

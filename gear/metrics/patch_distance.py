@@ -14,11 +14,11 @@ from gear.values.picture_objects import PatchDistance
 from gear.values.scene import Vec3
 
 MOSTLY = 0.5
-"""A box with a larger share of its pixels on a patch lies on the patch."""
+"""Share of a box's pixels on a patch above which the box as a whole lies on the patch."""
 
 
 class PatchArea:
-    """The visible patches of one picture."""
+    """The visible pixels and the positions of the patches in one picture, from which distances are measured."""
 
     def __init__(self, mask: npt.NDArray[np.bool_], middles_m: Sequence[Vec3] = ()) -> None:
         """Args:
@@ -32,11 +32,12 @@ class PatchArea:
             self._distance_px = np.asarray(cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE))
 
     def distance(self, box_px: BoxPx, position_m: Vec3 | None = None) -> PatchDistance:
-        """The distance of a box from the patches.
+        """Measures the distance of a box from the visible patches, in pixels and, if `position_m` is known, in
+        metres.
 
         Args:
-            box_px: in edge pixels; may leave the picture. Its pixels are those of the picture with a centre inside the
-                box, or the nearest pixel where there is none.
+            box_px: box in edge pixels, which may extend beyond the picture. Its pixels are the pixels of the picture
+                with their centre inside the box, or the nearest pixel if there are none.
             position_m: middle of the object in the camera's frame, if it is known.
         """
         if self._distance_px is None:

@@ -1,4 +1,4 @@
-"""Semantic segmentation by the definitions of Cityscapes: IoU of classes and categories, and iIoU.
+"""Metrics of semantic segmentation by the definitions of Cityscapes: IoU of classes and categories, and iIoU.
 
 Pixels whose ground truth is not evaluated are skipped. A class that occurs neither in ground truth nor in predictions
 is left out of the mean. For iIoU every pixel of an instance has the weight (average instance size of the class) / (size
@@ -36,25 +36,27 @@ COUNT = len(LABELS)
 PIECE_PX = 1 << 17
 
 Values = npt.NDArray[np.float64]
-"""The value of a metric, or (R,) values for R draws."""
+"""The value of a metric, or (R,) values of a metric for R resampled datasets."""
 
 
 class SegmentedSample(Protocol):
-    """The part of a segmentation sample that the metric uses."""
+    """Protocol of the segmentation samples that the evaluators accept: they have label ids and instance ids."""
 
     @property
     def label_ids(self) -> npt.NDArray[np.uint8]:
-        """(H, W) uint8 label ids."""
+        """The (H, W) uint8 Cityscapes label ids of the picture."""
         ...
 
     @property
     def instance_ids(self) -> npt.NDArray[np.uint16]:
-        """(H, W) uint16 instance ids."""
+        """The (H, W) uint16 Cityscapes instance ids of the picture."""
         ...
 
 
 class SemanticEvaluator:
-    """Gathers one confusion matrix and the weighted counts of instances."""
+    """Evaluator of semantic segmentation: gathers a confusion matrix of pixels, and the weighted counts of
+    instances for iIoU.
+    """
 
     def __init__(self) -> None:
         self.confusion = np.zeros((COUNT, COUNT), dtype=np.int64)
@@ -64,7 +66,7 @@ class SemanticEvaluator:
         self.weighted_category_fn = np.zeros(COUNT)
 
     def update(self, sample: SegmentedSample, prediction: npt.NDArray[np.uint8]) -> Mapping[str, float]:
-        """Adds predicted (H, W) uint8 label ids; returns `miou` of this picture.
+        """Adds the predicted (H, W) uint8 label ids of one sample; returns `miou` of this picture.
 
         Raises:
             ValueError: the prediction has another shape than the ground truth, or holds a value that is no label id:
@@ -105,7 +107,7 @@ class SemanticEvaluator:
             self.weighted_category_fn[label.id] += (size - near) * weight
 
     def merge(self, other: Any) -> None:
-        """Adds the counts of another evaluator."""
+        """Adds the counts that another evaluator of this class has gathered."""
         self.confusion += other.confusion
         self.weighted_tp += other.weighted_tp
         self.weighted_fn += other.weighted_fn
@@ -113,16 +115,20 @@ class SemanticEvaluator:
         self.weighted_category_fn += other.weighted_category_fn
 
     def result(self) -> Mapping[str, float]:
-        """`miou`, `iiou`, `category_miou`, `category_iiou`, `pixel_accuracy`, and `iou_<class>`; shares, 0..1."""
+        """The metrics by name: `miou`, `iiou`, `category_miou`, `category_iiou`, `pixel_accuracy`, and
+        `iou_<class>`; shares, 0..1.
+        """
         return {name: float(value) for name, value in self.metrics(self.totals()).items()}
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """0 and 1: every metric of this evaluator is a share."""
+        """Smallest and largest possible value of a metric: 0 and 1, because every metric of this evaluator is a
+        share.
+        """
         return 0.0, 1.0
 
     def totals(self) -> Mapping[str, npt.NDArray[Any]]:
-        """The counts by name: the (COUNT, COUNT) confusion matrix of pixels, and (COUNT,) weighted counts
-        of instances.
+        """The gathered counts by name: the (COUNT, COUNT) confusion matrix of pixels, and (COUNT,) weighted counts
+        of instances; COUNT is the number of label ids.
         """
         return {
             "confusion": self.confusion,
@@ -133,7 +139,9 @@ class SemanticEvaluator:
         }
 
     def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
-        """The metrics of `result`, computed from counts that may have further leading axes."""
+        """Computes the metrics of `result` from counts by name. Further leading axes of the counts, such as
+        resampled datasets, are kept.
+        """
         confusion = totals["confusion"]
         classes = self._classes(confusion)
         metrics = {
@@ -151,14 +159,16 @@ class SemanticEvaluator:
 
 
 class PresentClasses(SemanticEvaluator):
-    """mIoU over the evaluated classes that occur in the ground truth, without the class train.
+    """Evaluator of the mIoU over the classes that occur in the ground truth, without the class train.
 
-    Cityscapes counts the IoU of a class that is predicted but does not occur as 0. Here this class has IoU NaN and is
-    left out of the mean; its pixels still count as errors of the classes to which they belong.
+    Cityscapes counts the IoU of a class that is predicted but does not occur as 0. Here the IoU of such a class is NaN
+    and is left out of the mean; its pixels still count as errors of the classes to which they belong.
     """
 
     def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
-        """`miou` and `iou_<class>`, 0..1; NaN for classes that do not occur."""
+        """Computes `miou` and `iou_<class>`, 0..1, from counts by name; NaN for classes that do not occur in the
+        ground truth.
+        """
         classes = self._classes(totals["confusion"])
         return {"miou": _mean(classes)} | {f"iou_{name.replace(' ', '_')}": iou for name, iou in classes.items()}
 

@@ -1,4 +1,6 @@
-"""Metrics of a detector for a single picture, for which average precision is not defined."""
+"""Detection metrics of a single picture: the share of labels that are found, and the number of false alarms.
+Average precision is not defined for one picture.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +19,12 @@ MIN_OVERLAP = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Boxes:
-    """Labels or detections of one picture.
+    """Labels or detections of one picture, as arrays.
 
     Attributes:
         box_px: (N, 4) left, top, right, bottom.
-        kind: (N,) number of each box's class.
-        weight: (N,) for labels 1 if the label is to be found, otherwise 0; for detections the score.
+        kind: (N,) class number of each box.
+        weight: (N,) for labels 1 if a detector should find the label, otherwise 0; for detections the score.
     """
 
     box_px: Array
@@ -31,7 +33,7 @@ class Boxes:
 
 
 def boxes(rows: Sequence[tuple[Sequence[float], int, float]]) -> Boxes:
-    """Boxes from tuples of box, class and weight."""
+    """Makes a `Boxes` object from tuples of box (left, top, right, bottom), class number and weight."""
     return Boxes(
         box_px=np.array([box for box, _, _ in rows], dtype=np.float64).reshape(-1, 4),
         kind=np.array([kind for _, kind, _ in rows], dtype=np.int64),
@@ -40,17 +42,18 @@ def boxes(rows: Sequence[tuple[Sequence[float], int, float]]) -> Boxes:
 
 
 def single_metrics(labels: Boxes, found: Boxes, ignored_px: Array, low_px: float = 0.0) -> dict[str, float]:
-    """`found_share`, the share of the labels that are found (NaN without labels), and the number of `false_alarms`.
+    """Computes `found_share`, the share of the labels that are detected (NaN without labels), and the number of
+    `false_alarms`.
 
-    Detections with a score of at least 0.5, in order of decreasing score, each take the label of their class with the
-    largest overlap, if it is at least 0.5. A detection without a label, or whose label is already taken, is a false
-    alarm, unless at least half of it lies in an ignored box.
+    Detections with a score of at least 0.5 are matched in order of decreasing score. Each takes the label of its class
+    with the largest overlap, if that overlap is at least 0.5. A detection without a label, or whose label is already
+    taken, is a false alarm, unless at least half of the detection lies in an ignored box.
 
     Args:
-        labels: labels; those with weight 0 need not be found.
+        labels: labels; those with weight 0 do not count as missed.
         found: detections.
         ignored_px: (M, 4) boxes of regions to ignore.
-        low_px: detections that are lower than this and match nothing are no false alarms.
+        low_px: detections that are lower than this height and match nothing are no false alarms.
     """
     sure = np.flatnonzero(found.weight >= SURE)
     sure = sure[np.argsort(-found.weight[sure], kind="stable")]
