@@ -1,1 +1,3 @@
-"""Contracts: the protocols and specs of plugins, and those between gear's packages. Imports `gear.values` only."""
+"""Contracts: the protocols and specs of plugins, and the protocols between gear's packages. This package imports
+only `gear.values`.
+"""

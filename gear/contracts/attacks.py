@@ -1,4 +1,6 @@
-"""The protocol of attacks, and optional protocols for more. torch is imported for type checkers only."""
+"""The protocol of attacks, and optional protocols for attacks with further abilities. torch is imported for type
+checkers only.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +31,8 @@ class Patch:
 
 
 def surface_of(name: str) -> int:
-    """The number of the surface in a patch's name: 10 for `patch_10`; -1 where the name has no number. Patches are
-    sorted by it.
+    """The number of the surface that a patch belongs to, from the patch's name: 10 for `patch_10`; -1 for a name
+    without number. Patches are sorted by this number.
     """
     number = name.rpartition("_")[2]
     return int(number) if number.isdecimal() else -1
@@ -38,7 +40,7 @@ def surface_of(name: str) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
-    """What an attack may spend.
+    """The computation that an attack may use.
 
     Attributes:
         steps: optimisation steps.
@@ -50,13 +52,14 @@ class Budget:
 
 
 class Compositor(Protocol):
-    """Composes patches into the pictures of samples, differentiably with respect to the patches."""
+    """Renders patches into the pictures of samples; the pictures are differentiable with respect to the patches."""
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
-        """Composes pictures of some samples with the patches on their surfaces.
+        """Composes the pictures of some samples with the patches on their surfaces.
 
         Args:
-            patches: one per surface, values in 0..1: (3, h, w) for all samples, or (B, 3, h, w) with one per sample.
+            patches: one tensor per surface, values in 0..1: (3, h, w) for all samples, or (B, 3, h, w) with one patch
+                per sample.
             samples: indices of B samples in the dataset.
             view: name of the camera.
 
@@ -67,11 +70,13 @@ class Compositor(Protocol):
 
 
 State = Mapping[str, npt.NDArray[Any]]
-"""Arrays by name, from which an interrupted attack can be resumed."""
+"""State of an attack as arrays by name, from which an interrupted attack can be resumed."""
 
 
 class Monitor(Protocol):
-    """Observes an attack while it runs, for progress, curves, checkpoints and early stopping."""
+    """Observes a running attack: it shows progress, records curves, writes checkpoints and decides on early
+    stopping.
+    """
 
     def resume(self) -> State | None:
         """The last state that an interrupted run of the same attack reported; None for a new run."""
@@ -84,12 +89,12 @@ class Monitor(Protocol):
         patches: Callable[[], tuple[Patch, ...]],
         state: Callable[[], State],
     ) -> bool:
-        """Called after every step.
+        """Is called by the attack after every step.
 
         Args:
             done: number of steps done.
             values: scalars by name, such as terms, losses and norms.
-            patches: function that returns the current patches; called only if they are needed.
+            patches: function that returns the current patches; the monitor calls it only if it needs them.
             state: function that returns the state to resume from; an empty mapping where the attack cannot be resumed.
 
         Returns:
@@ -111,7 +116,7 @@ class Attack(Protocol):
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each surface of the samples.
+        """Optimises the patches of all surfaces of the samples; returns one patch for each surface.
 
         Args:
             model: attacked network; after the call its weights, buffers and modes are as before.
@@ -127,11 +132,11 @@ class Attack(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Term:
-    """One summand of an objective.
+    """One summand of an attack's objective.
 
     Attributes:
         value: scalar tensor, differentiable, that grows with the harm.
-        weight: factor of its gradient, after that has been brought to unit length.
+        weight: factor of the term's gradient; the gradient is normalised to unit length first.
     """
 
     value: Tensor
@@ -139,12 +144,13 @@ class Term:
 
 
 class Objective(Protocol):
-    """What an attack maximises, as one or several terms."""
+    """The quantity that an attack maximises, as one or several terms."""
 
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
     ) -> Mapping[str, Term]:
-        """Terms by name; empty where the batch has nothing left that could be harmed.
+        """Computes the terms of the objective for a batch, by name; the result is empty if nothing in the batch
+        can still be harmed.
 
         Args:
             model: attacked network.
@@ -157,20 +163,23 @@ class Objective(Protocol):
 
 @runtime_checkable
 class HarmObjective(Protocol):
-    """An objective that compares patches by `harm`, because the sum of its weighted terms is not comparable between
-    patches.
+    """An objective that compares patches by the scalar `harm`, because the sum of its weighted terms is not
+    comparable between patches.
     """
 
     @property
     def needs_clean_output(self) -> bool:
-        """Whether `harm` needs the model's output on the picture without the patch, once for each sample.
+        """Whether `harm` needs the model's output on the picture without the patch; it is computed once for each
+        sample.
 
-        This output counts among the queries of black-box attacks.
+        This computation counts among the queries of black-box attacks.
         """
         ...
 
     def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
-        """Scalar tensor that grows with the harm to a batch; the arguments are those of `Objective.terms`."""
+        """Scalar tensor that grows with the harm of the patch to a batch; the arguments are those of
+        `Objective.terms`.
+        """
         ...
 
 
@@ -178,11 +187,11 @@ class HarmObjective(Protocol):
 class WithObjective(Protocol):
     """An attack that chooses the objective by which its patches are compared on validation samples.
 
-    Patches of other attacks are compared by untargeted harm to the task.
+    Patches of attacks without this protocol are compared by untargeted harm to the task.
     """
 
     def objective(self, sample: Any) -> Objective:
-        """A new objective for the task of the sample."""
+        """A new objective for the task to which the sample belongs."""
         ...
 
 
@@ -191,14 +200,16 @@ class WithTaskOptions(Protocol):
     """An attack whose options depend on the task, such as its learning rate."""
 
     def settings(self, sample: Any) -> Any:
-        """Dataclass of the options that are used for the task of the sample; written to `attack.json`."""
+        """The options that the attack uses for the task of the sample, as a dataclass; they are written to
+        `attack.json`.
+        """
         ...
 
 
 @runtime_checkable
 class WithInputFiles(Protocol):
-    """An attack whose options name files. Their content is part of what identifies its patches."""
+    """An attack whose options name files. The content of these files is part of the identity of its patches."""
 
     def read_sha256(self) -> str | None:
-        """Hash of the content of these files; None if the options name no file."""
+        """SHA-256 hash of the content of the files that the options name; None if the options name no file."""
         ...

@@ -1,4 +1,4 @@
-"""The defense protocol: a defense cleans pictures, detects patches, or both, in front of a model."""
+"""The protocol of defenses: in front of a model, a defense cleans pictures, detects patches, or both."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class DefenseResult:
-    """What a defense returns for one sample.
+    """The result of a defense for one sample.
 
     Attributes:
-        views: cleaned (H, W, 3) uint8 pictures by camera name, of the shapes that came in.
-        mask: (H, W) float32 probabilities in 0..1 that a pixel belongs to a patch, by camera name; None where the
-            defense finds no patches.
-        score: confidence in 0..1 that the sample is attacked; None where the defense gives none.
+        views: cleaned (H, W, 3) uint8 pictures by camera name, with the shapes of the input pictures.
+        mask: (H, W) float32 probabilities in 0..1 that a pixel belongs to a patch, by camera name; None if the defense
+            locates no patches.
+        score: confidence in 0..1 that the sample is attacked; None if the defense computes none.
     """
 
     views: Mapping[str, UInt8Image]
@@ -33,7 +33,9 @@ class DefenseResult:
 
 
 class Defense(Protocol):
-    """Guards a model. A defense object holds no state between calls: what it learns is returned by `fit`."""
+    """Protects a model against patches. A defense object holds no state between calls: `fit` returns what was
+    learnt, and `apply` receives it.
+    """
 
     def fit(
         self,
@@ -42,38 +44,38 @@ class Defense(Protocol):
         model: Model | None,
         rng: np.random.Generator,
     ) -> Any:
-        """Learns from calibration samples.
+        """Learns the defense's state from calibration samples.
 
         Args:
             clean: samples without a patch, (H, W, 3) uint8 pictures by camera name.
             patched: the same scenes with a patch; empty if the user gave none.
-            model: the guarded model; None where the spec needs none.
-            rng: of all random choices.
+            model: the protected model; None if the spec needs none.
+            rng: generator of all random choices.
 
         Returns:
-            The state that `apply` receives; None where there is nothing to learn.
+            The state that `apply` receives; None if there is nothing to learn.
         """
         ...
 
     def apply(
         self, views: Mapping[str, UInt8Image], model: Model | None, state: Any, rng: np.random.Generator
     ) -> DefenseResult:
-        """Cleans one sample.
+        """Cleans the pictures of one sample, or detects patches in them.
 
         Args:
-            views: (H, W, 3) uint8 pictures by camera name; never written to.
-            model: the guarded model; None where the spec needs none.
-            state: what `fit` returned.
-            rng: of all random choices.
+            views: (H, W, 3) uint8 pictures by camera name; never changed in place.
+            model: the protected model; None if the spec needs none.
+            state: the state that `fit` returned.
+            rng: generator of all random choices.
         """
         ...
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The cleaning as torch operations, for attacks that take the defense into account.
+        """Cleans a batch with torch operations, for attacks that take the defense into account.
 
         Takes and returns (B, 3, H, W) float pictures in 0..1 by camera name. Values are those of `apply` up to
-        rounding. The gradient is exact if the spec declares `differentiable`, and that of a substitute function if it
-        declares `surrogate`.
+        rounding. The gradient is exact if the spec declares `differentiable`, and that of a substitute function if the
+        spec declares `surrogate`.
 
         Raises:
             ValueError: the spec declares `none`, or the defense is a `FittedDefense`.
@@ -81,8 +83,8 @@ class Defense(Protocol):
         ...
 
     def wrap(self, model: Model) -> Model:
-        """A model that contains the given one, for defenses that need several passes; other defenses return the model
-        itself.
+        """Returns the model to use with the defense. Defenses that need several passes return a model that
+        contains the given one; other defenses return the given model.
         """
         ...
 
@@ -92,11 +94,12 @@ class FittedDefense(Protocol):
     """A defense whose cleaning in torch depends on the model, or on the state that `fit` returned."""
 
     def forward_fitted(self, views: Mapping[str, Tensor], model: Model, state: Any) -> Mapping[str, Tensor]:
-        """The counterpart of `Defense.forward`; attacks call this method instead.
+        """Cleans a batch with torch operations, given the model and the state. Attacks call this method instead of
+        `Defense.forward`.
 
         Args:
             views: (B, 3, H, W) float pictures in 0..1 by camera name.
-            model: the guarded model; its parameters need no gradient.
+            model: the protected model; its parameters need no gradient.
             state: what `fit` returned for this model.
         """
         ...
@@ -104,7 +107,7 @@ class FittedDefense(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class DefendedBatch:
-    """The result of a defense for a batch, with gradients with respect to the pictures.
+    """The result of a defense for a batch; all tensors are differentiable with respect to the input pictures.
 
     Attributes:
         views: (B, 3, H, W) cleaned pictures in 0..1 by camera name.
@@ -120,17 +123,18 @@ class DefendedBatch:
 
 @runtime_checkable
 class DifferentiableDetector(Protocol):
-    """A defense whose score or mask has a gradient, so that an adaptive attack can lower it.
+    """A defense whose score or mask has a gradient, so an adaptive attack can lower it.
 
-    A defense that returns only a score must implement this, because otherwise it has no gradient for an attack.
+    A defense that returns only a score must implement this protocol, because otherwise an attack has no gradient.
     """
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Any) -> DefendedBatch:
-        """Cleaned pictures, masks and scores of a batch. Attacks call it instead of `forward` and `forward_fitted`.
+        """Computes cleaned pictures, masks and scores of a batch. Attacks call this method instead of `forward`
+        and `forward_fitted`.
 
         Args:
             views: (B, 3, H, W) float pictures in 0..1 by camera name.
-            model: the guarded model; its parameters may need no gradient.
+            model: the protected model; its parameters may need no gradient.
             state: what `fit` returned for this model.
         """
         ...
@@ -138,7 +142,7 @@ class DifferentiableDetector(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitReport:
-    """A summary of what a defense learnt, measured on its own calibration data.
+    """A summary of what a defense has learnt, measured on its own calibration data.
 
     Attributes:
         values: numbers by name, such as the loss of the fitted function and that of the best constant.
@@ -151,8 +155,8 @@ class FitReport:
 
 @runtime_checkable
 class ReportsFit(Protocol):
-    """A state, returned by `fit`, that can summarise what was learnt."""
+    """A state, returned by a defense's `fit`, that can summarise what was learnt."""
 
     def fit_report(self) -> FitReport:
-        """The summary, measured on the calibration data."""
+        """The summary of what the defense has learnt, measured on its calibration data."""
         ...

@@ -1,6 +1,7 @@
-"""Optional protocols of tasks and evaluators: stored predictions, masked ground truth, further reports, fast intervals.
+"""Optional protocols of tasks and evaluators: stored predictions, masked ground truth, further reports, fast
+intervals.
 
-What a task or an evaluator offers is decided by `isinstance` with these runtime-checkable protocols.
+gear tests with `isinstance` which of these runtime-checkable protocols a task or an evaluator implements.
 """
 
 from __future__ import annotations
@@ -17,13 +18,15 @@ from gear.values.picture_objects import PictureObjects
 from gear.values.serial import Json
 
 Masks = Mapping[str, npt.NDArray[np.bool_]]
-"""(H, W) bool by camera name."""
+"""Masks of pixels by camera name: (H, W) bool."""
 
 Draws = npt.NDArray[np.int64]
-"""(R, N) indices of gathered samples: each row chooses N of them, possibly with repetition."""
+"""The samples of R resampled datasets: (R, N) indices of gathered samples. Each row draws N samples, possibly with
+repetition.
+"""
 
 Spread = Mapping[str, npt.NDArray[np.float64]]
-"""(R,) values by metric."""
+"""The values of metrics on R resampled datasets: (R,) by name of the metric."""
 
 
 @runtime_checkable
@@ -34,18 +37,20 @@ class KeepsPredictions(Protocol):
     """
 
     def encode_prediction(self, sample: Any, prediction: Any, info: SplitInfo) -> Encoded:
-        """The result files of one sample, by path relative to the folder of predictions, with facts as JSON."""
+        """The result files of one sample, by path relative to the folder of predictions, together with JSON data
+        (`facts`) that decoding needs.
+        """
         ...
 
     def decode_prediction(self, root: Path, sample: Any, facts: Json, info: SplitInfo) -> Any:
-        """Reads a prediction back: the exact inverse of `encode_prediction`."""
+        """Reads a stored prediction from the folder `root`: the exact inverse of `encode_prediction`."""
         ...
 
     def finalise_predictions(self, facts: Sequence[tuple[Any, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """The result files of a split, such as COCO's list of detections.
+        """The result files of a whole split, such as COCO's list of detections, as bytes by path.
 
         Args:
-            facts: scene record and facts of each sample, in order of index.
+            facts: scene record and encoded JSON data of each sample, in order of index.
             info: names and seed of the split.
         """
         ...
@@ -56,10 +61,11 @@ class Maskable(Protocol):
     """A task whose ground truth can be removed from a part of the picture, such as the patch."""
 
     def without(self, sample: Any, masks: Masks) -> Any:
-        """The sample without ground truth where the masks are True; its evaluator ignores predictions there.
+        """The sample without ground truth where the masks are True; the task's evaluator ignores predictions
+        there.
 
         Args:
-            sample: of the task; not changed.
+            sample: a sample of the task; it is not changed.
             masks: (H, W) bool by camera name.
         """
         ...
@@ -67,51 +73,58 @@ class Maskable(Protocol):
 
 @runtime_checkable
 class WithObjects(Protocol):
-    """A task of objects that are found or missed, whose twins can be compared object by object."""
+    """A task of objects that are detected or missed. Its twins (the same dataset with another patch) can be
+    compared object by object.
+    """
 
     def picture_objects(self, sample: Any, prediction: Any) -> PictureObjects:
-        """The objects of a sample that should be found, and the detections.
+        """The objects of a sample that a detector should find, and the network's detections.
 
         Raises:
-            ValueError: a detection cannot be measured.
+            ValueError: a detection cannot be evaluated.
         """
         ...
 
 
 @runtime_checkable
 class Reports(Protocol):
-    """A task with further evaluators, in addition to its main one."""
+    """A task with evaluators in addition to its main evaluator; users choose them by `gear evaluate --report NAME`."""
 
     def reports(self) -> Mapping[str, Evaluator[Any, Any]]:
-        """New, empty evaluators by name. `reference` holds the metrics that the cards of shipped weights state."""
+        """New, empty evaluators by name. `reference` is the evaluator whose metrics the cards of the shipped
+        weights state.
+        """
         ...
 
 
 @runtime_checkable
 class Resampled(Protocol):
-    """An evaluator that computes its metrics over chosen samples faster than by merging one evaluator for each
+    """An evaluator that computes its metrics on resampled datasets faster than by merging one evaluator for each
     sample.
     """
 
     def resampled(self, draws: Draws) -> Spread:
-        """Metrics by name as if the chosen samples alone had been gathered. Samples are numbered from 0 in the order of
-        the calls of `update`.
+        """The metrics by name, (R,) each, on R resampled datasets; row r of `draws` lists the samples of dataset
+        r.
 
-        NaN where a metric is undefined. Metrics that are missing from the result get no interval.
+        Samples are numbered from 0 in the order of the calls of `update`. The value is NaN where a metric is undefined.
+        Metrics that are missing from the result get no interval.
         """
         ...
 
 
 @runtime_checkable
 class Additive(Protocol):
-    """An evaluator whose metrics are functions of sums over pictures, so that merging is addition."""
+    """An evaluator whose metrics are functions of sums over pictures; two evaluators are merged by adding their
+    sums.
+    """
 
     def totals(self) -> Mapping[str, npt.NDArray[Any]]:
-        """The sums by name; names and shapes are the same for all evaluators of a class."""
+        """The sums over pictures by name; names and shapes are the same for all evaluators of a class."""
         ...
 
     def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> Spread:
-        """The metrics of R sets of sums at once.
+        """Computes the metrics from R sets of sums at once.
 
         Args:
             totals: sums by name, as `totals` gives them, with an additional first axis of length R.
@@ -124,17 +137,19 @@ class Additive(Protocol):
 
 @runtime_checkable
 class Limited(Protocol):
-    """An evaluator with metrics that stay below 1 for few samples even if all predictions are perfect."""
+    """An evaluator with metrics that stay below 1 on few samples, even if all predictions are perfect."""
 
     def ceilings(self) -> Mapping[str, float]:
-        """The metrics that perfect predictions of the gathered samples would reach, for those below 1."""
+        """The values that perfect predictions of the gathered samples would reach, by name of the metric; only
+        metrics whose value would be below 1.
+        """
         ...
 
 
 @runtime_checkable
 class Ranged(Protocol):
-    """An evaluator that states the ranges of its metrics; intervals are cut at their ends."""
+    """An evaluator that states the ranges of its metrics; confidence intervals are cut at the ends of the range."""
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """Smallest and largest possible value of a metric; infinite where it has no bound."""
+        """Smallest and largest possible value of a metric; infinite on a side without bound."""
         ...

@@ -1,7 +1,8 @@
-"""The executor protocol: an engine that makes the missing items of a job, in this process, in several, or on a cluster.
+"""The protocol of executors. An executor is an engine that makes the missing items of a job, in this process, in
+several, or on a cluster.
 
-A new engine is one module in `gear/dataset/executors` with a function `executor`; its name is the module's name.
-`gear.testing.executor_contract` tests the contract.
+A new engine is one module in `gear/dataset/executors` with a function `executor`; the engine's name is the module's
+name. `gear.testing.executor_contract` tests the contract.
 """
 
 from __future__ import annotations
@@ -11,14 +12,14 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 MOST_FAILURES = 5
-"""Number of consecutive failures after which a worker takes no further items, because the cause is not a
+"""Number of consecutive failures after which a worker takes no further items, because the cause then lies not in a
 single item.
 """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """The outcome of one item.
+    """The outcome of one item, such as a sample: made, failed, or made by another run.
 
     Attributes:
         index: index of the item.
@@ -37,20 +38,20 @@ class Outcome:
 
 
 Report = Callable[[Outcome], None]
-"""Called with the outcome of an item."""
+"""Type of the function that is called with the outcome of each item."""
 
 Work = Callable[[Iterator[int], Report], None]
-"""A function that makes the items with the given indices, one after the other, and reports one outcome for each. After
-`MOST_FAILURES` consecutive failures it ends without taking further items. It can be pickled, so that it can be sent to
-another process. Resources are opened once for all items.
+"""Type of a function that makes the items with the given indices one after the other, and reports one outcome for
+each. After `MOST_FAILURES` consecutive failures the function ends without taking further items. It can be
+pickled and sent to another process, and opens its resources once for all items.
 """
 
 
 class Executor(Protocol):
-    """An engine, such as the calling process, several processes, or a cluster."""
+    """An engine that distributes items over workers, such as the calling process, several processes, or a cluster."""
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """Makes all items. The bytes of an item do not depend on the worker.
+        """Makes all items with the given indices. The bytes of an item do not depend on the worker that makes it.
 
         Args:
             work: called once in each worker, or several times with a part of the items.

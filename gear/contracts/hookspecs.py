@@ -19,29 +19,35 @@ hookimpl = pluggy.HookimplMarker(PROJECT)
 
 @hookspec
 def gear_tasks() -> Iterable[TaskSpec[Any]]:
-    """Tasks: each is a dataset format with its ground truth, its files and its metric."""
+    """Hook that returns the specs of a plugin's tasks. A task is a dataset format with its ground truth, its files
+    and its metric.
+    """
     return ()
 
 
 @hookspec
 def gear_models() -> Iterable[ModelSpec[Any]]:
-    """Models: networks that do one or several tasks."""
+    """Hook that returns the specs of a plugin's models. A model is a network that performs one or several tasks."""
     return ()
 
 
 @hookspec
 def gear_attacks() -> Iterable[AttackSpec[Any]]:
-    """Attacks: algorithms that optimise patches against a model."""
+    """Hook that returns the specs of a plugin's attacks. An attack is an algorithm that optimises patches against
+    a model.
+    """
     return ()
 
 
 @hookspec
 def gear_defenses() -> Iterable[DefenseSpec[Any]]:
-    """Defenses: algorithms that clean pictures or detect patches in front of a model."""
+    """Hook that returns the specs of a plugin's defenses. A defense cleans pictures or detects patches in front of
+    a model.
+    """
     return ()
 
 
 @hookspec
 def gear_metrics() -> Iterable[MetricSpec[Any]]:
-    """Metrics: further metrics for tasks of gear or of another package."""
+    """Hook that returns the specs of a plugin's metrics for existing tasks, of gear or of another package."""
     return ()

@@ -1,4 +1,6 @@
-"""Legends, which explain the colours of a task's previews."""
+"""Legends: explanations of the colours in a task's previews (pictures of samples with labels, boxes or depth drawn
+in).
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ Rgb = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ColourBar:
-    """A continuous scale of colours, drawn from left to right.
+    """A legend for a continuous scale of colours, drawn from left to right.
 
     Attributes:
         quantity: what the colours show, with its unit: `depth (m)`.
@@ -26,7 +28,7 @@ class ColourBar:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ColourNames:
-    """Colours that stand for names, such as classes.
+    """A legend for colours that stand for names, such as classes.
 
     Attributes:
         entries: (name, RGB 0..255) in the order in which they are listed.
@@ -40,8 +42,8 @@ Legend = ColourBar | ColourNames
 
 @runtime_checkable
 class WithLegends(Protocol):
-    """A task that explains the colours of its previews."""
+    """A task that provides legends for the colours of its previews."""
 
     def legends(self) -> Mapping[str, Legend]:
-        """Legends by name of the preview, for those of `Task.preview` whose colours need one."""
+        """Legends by name of the preview, for those previews of `Task.preview` whose colours need an explanation."""
         ...

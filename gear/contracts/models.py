@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 
 
 class Model(Protocol):
-    """A network that predicts, gives losses and gradients, and exposes feature maps."""
+    """A network that predicts, computes losses with gradients, and names layers whose feature maps can be read."""
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """The task's prediction for one sample. Ground truth is never passed in.
+        """The prediction for one sample, in the form that the task defines. Ground truth is not available to the
+        model.
 
         Args:
             views: (H, W, 3) uint8 sRGB pictures by camera name.
@@ -30,7 +31,8 @@ class Model(Protocol):
         ...
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """Outputs of a batch, or its losses where targets are given; differentiable with respect to the pictures.
+        """Computes the outputs of a batch, or its losses if targets are given; both are differentiable with
+        respect to the pictures.
 
         Args:
             views: (B, 3, H, W) float pictures in 0..1 by camera name.
@@ -42,19 +44,21 @@ class Model(Protocol):
         ...
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """Modules whose outputs are feature maps, by the tap names of the spec."""
+        """The modules whose outputs are feature maps that defenses and attacks read, by the names in the spec's
+        `taps`.
+        """
         ...
 
 
 @runtime_checkable
 class Trainable(Protocol):
-    """A model whose weights gear reads and writes, and that `gear train` can train.
+    """A model that `gear train` can train, and whose weights gear reads and writes.
 
-    Its losses are those of `Model.forward` with the batch's samples.
+    Its losses are those of `Model.forward` with the batch's samples as targets.
     """
 
     def module(self) -> nn.Module:
-        """The network; its state dict has the keys under which the weights are saved."""
+        """The torch module of the network; its state dict has the keys under which the weights are saved."""
         ...
 
 
@@ -69,17 +73,17 @@ class BatchPredictor(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe:
-    """Defaults for training a network.
+    """Default settings for training a network.
 
     Attributes:
         optimiser: AdamW, or SGD with momentum 0.9.
-        learning_rate: its maximum; it rises at the start and falls along a cosine.
-        weight_decay: of weights; biases and normalisation have none.
+        learning_rate: largest learning rate; the rate rises at the start and falls along a cosine.
+        weight_decay: decay of weights; biases and normalisation layers have none.
         batch: samples per step.
         epochs: passes over the data.
         crop_px: height and width of random crops; None trains on whole pictures.
         scales: range of random resizing before the crop; (1, 1) for none.
-        gradient_norm: limit of the gradient's norm; 0 for none.
+        gradient_norm: limit of the gradient's norm; 0 for no limit.
     """
 
     optimiser: Literal["adamw", "sgd"] = "adamw"
@@ -94,13 +98,13 @@ class Recipe:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PublishedWeights:
-    """Weights that their authors publish; gear downloads nothing.
+    """Weights that a network's authors publish; gear does not download them.
 
     Attributes:
         data: training data.
-        source: where a user finds the file.
-        licence: of the weights, as far as their authors state it.
-        size_mb: of the file, 10^6 bytes.
+        source: address at which a user finds the file.
+        licence: licence of the weights, as far as their authors state it.
+        size_mb: size of the file, 10^6 bytes.
     """
 
     data: str

@@ -1,4 +1,6 @@
-"""The renderer protocol: what a renderer is given and what it returns."""
+"""The protocol of renderers: their input (a posed MuJoCo model and cameras) and their output (colour, depth and
+geom ids).
+"""
 
 from __future__ import annotations
 
@@ -16,32 +18,35 @@ if TYPE_CHECKING:
     import mujoco
 
 Quality = Literal["film", "fast"]
-"""`film`: 2x2 supersampling, averaged in linear light; `raster` takes one sample where four show the same.
+"""Quality of rendering. `film`: 2x2 supersampling, averaged in linear light. `fast`: one sample per pixel with
+gear's own edge filter.
 
-`fast`: one sample per pixel with gear's own edge filter. `gear.render.raster.renderer`, `gear.render.filament` and
-`gear.render.classic` implement both.
+With `film`, `raster` takes one sample where four samples would be equal. `gear.render.raster.renderer`,
+`gear.render.filament` and `gear.render.classic` implement both qualities.
 """
 
 FULL_SCALE_LUX = 38400.0
-"""Radiance, in cd/m², that is full scale at Filament's fixed exposure (f/16, 1/125 s, ISO 100)."""
+"""Luminance in cd/m² that gives the largest pixel value at Filament's fixed exposure (f/16, 1/125 s, ISO 100).
+Intensities of lights in lux are divided by this value.
+"""
 
 NO_OWN_RGBA = (0.5, 0.5, 0.5, 1.0)
-"""MuJoCo's default colour; a geom with it has the colour of its material."""
+"""MuJoCo's default colour (RGBA) of a geom; a geom with this colour is rendered in the colour of its material."""
 
 Bools = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Stage:
-    """A compiled world with all objects placed for one sample.
+    """A compiled MuJoCo model with all objects posed for one sample: the input of a renderer.
 
     Attributes:
         model: the render model; the same for all samples.
         data: poses of the sample; kinematics, lights and cameras are up to date.
         paint_rgb: linear albedo (0..1) by geom id, for geoms whose colour this sample chose.
-        faces: sRGB albedo, (H, W, 3) uint8, by geom id of the surface's face; all of the same size.
-        is_absent: (ngeom,) bool, geoms of actors that wait out of sight, under the ground: a renderer may leave them
-            out. None where there are none.
+        faces: pictures on the surfaces: sRGB albedo, (H, W, 3) uint8, by geom id of the face; all of the same size.
+        is_absent: (ngeom,) bool, geoms of actors that this sample does not use and that wait under the ground; a
+            renderer may leave them out. None if there are none.
     """
 
     model: mujoco.MjModel
@@ -53,7 +58,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RendererInfo:
-    """Renderer, graphics driver and device, as written to every manifest.
+    """Name, graphics driver and device of a renderer, as written to every manifest.
 
     Attributes:
         name: `raster`, `filament` or `classic`.
@@ -72,13 +77,13 @@ class RendererInfo:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RawView:
-    """What a renderer returns for one camera: aligned arrays, row 0 at the top.
+    """The output of a renderer for one camera: pixel-aligned arrays, row 0 at the top.
 
     Attributes:
-        linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`, linear in the albedo of every face; None where no
+        linear_rgb: (H, W, 3) uint16, 0..`LINEAR_FULL_SCALE`, linear in the albedo of every surface's face; None if no
             colour was requested.
-        depth_m: (H, W) float32 distance along the optical axis; NaN where there is nothing.
-        geom_id: (H, W) int32 MuJoCo geom ids; -1 where there is nothing.
+        depth_m: (H, W) float32 distance along the optical axis; NaN where no geom was hit.
+        geom_id: (H, W) int32 MuJoCo geom ids; -1 where no geom was hit.
     """
 
     linear_rgb: UInt16Image | None
@@ -87,7 +92,9 @@ class RawView:
 
 
 def has_own_colour(model: mujoco.MjModel) -> Bools:
-    """(ngeom,) bool: whether a geom's own rgba colours it in MuJoCo, and not that of its material."""
+    """The (ngeom,) bool mask of the geoms that MuJoCo renders in their own rgba colour, not in the colour of their
+    material.
+    """
     is_said = (model.geom_rgba != np.array(NO_OWN_RGBA, np.float32)).any(axis=1)
     return np.asarray(is_said | (model.geom_matid < 0), np.bool_)
 
@@ -97,7 +104,7 @@ class Renderer(Protocol):
 
     @property
     def info(self) -> RendererInfo:
-        """Renderer, graphics driver and device."""
+        """Name, graphics driver and device of this renderer."""
         ...
 
     def render(
@@ -114,7 +121,7 @@ class Renderer(Protocol):
             stage: the posed model.
             cameras: resolved cameras of the scene.
             colour: whether `linear_rgb` is rendered as well.
-            shapes: views of these cameras of a stage that differs in paint and faces alone; their depth and ids are
+            shapes: views of the same cameras on a stage that differs only in paint and faces; their depth and ids are
                 reused, which saves two passes.
         """
         ...

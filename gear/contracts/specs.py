@@ -1,4 +1,6 @@
-"""Specs: what a plugin offers, as data. A spec is quick to make and imports nothing heavy; `build` imports the rest."""
+"""Specs: declarations of plugins as data. Making a spec is quick and imports no heavy package; only `build`
+imports them.
+"""
 
 from __future__ import annotations
 
@@ -15,22 +17,25 @@ ConfigT = TypeVar("ConfigT")
 ProductT = TypeVar("ProductT", covariant=True)
 
 PROTOCOL_VERSION = 1
-"""Increased when a protocol changes so that older plugins no longer fit."""
+"""Version of the plugin protocols; increased when a protocol changes in a way that breaks older plugins."""
 
 Gradient = Literal["differentiable", "surrogate", "none"]
-"""How gradients pass a defense: exactly, through a substitute function, or not at all."""
+"""How gradients pass a defense: exactly (`differentiable`), through a substitute function (`surrogate`), or not at
+all (`none`).
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spec(Generic[ConfigT, ProductT]):
-    """What every plugin declares.
+    """Base class of specs: the declarations of every plugin.
 
     Attributes:
-        name: by which users ask for it; matches `[a-z][a-z0-9_]*`.
-        summary: one line.
+        name: name by which users select the plugin; matches `[a-z][a-z0-9_]*`.
+        summary: description in one line.
         config: frozen dataclass of the options, all with defaults.
-        build: makes the product from the options; imports what is heavy.
-        protocol: version of the plugin protocol that it was written for.
+        build: function that makes the task, model, attack, defense or evaluator from the options; imports heavy
+            packages.
+        protocol: version of the plugin protocol for which the plugin was written.
     """
 
     name: str
@@ -41,17 +46,17 @@ class Spec(Generic[ConfigT, ProductT]):
 
 
 def no_notes(_options: Any) -> tuple[str, ...]:
-    """The notes of a task whose options never need one: none."""
+    """The default of `TaskSpec.notes`: no notes, whatever the options."""
     return ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
-    """A task: a dataset format with its ground truth and metric.
+    """The spec of a task, that is, of a dataset format with its ground truth and metric.
 
     Attributes:
         views: camera names of the default rig, the reference camera first.
-        layout: one line on the files that it writes.
+        layout: one line about the files that the task writes.
         original_name: name in CARLA-GeAR's configuration files and JSON; "" where CARLA-GeAR does not have the task.
         metric: the metric by which training chooses among checkpoints, of the evaluator or of a report
             (`<report>.<metric>`); "" chooses by the loss.
@@ -68,12 +73,12 @@ class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelSpec(Spec[ConfigT, Model]):
-    """A network.
+    """The spec of a model, that is, a network.
 
     Attributes:
-        tasks: names of its tasks.
+        tasks: names of the tasks that it performs.
         views: names of the cameras whose pictures it takes.
-        taps: names of the feature maps that it exposes.
+        taps: names of the feature maps that defenses and attacks can read.
         has_gradients: whether `forward` is differentiable with respect to the pixels.
         recipe: training defaults; None where `gear train` cannot train it.
         published: weights that its authors publish.
@@ -106,14 +111,14 @@ class ModelSpec(Spec[ConfigT, Model]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttackSpec(Spec[ConfigT, Attack]):
-    """An attack.
+    """The spec of an attack.
 
     Attributes:
         tasks: names of the tasks that it can attack; empty for any.
         needs_gradients: whether the model must have gradients.
-        needs_probes: whether the dataset must have the probes of the exact compositor.
+        needs_probes: whether the dataset must have probes: each sample rendered with the surface black and white.
         max_surfaces: number of surfaces that it can optimise jointly.
-        is_control: whether it uses no model, so that attacks are compared with it.
+        is_control: whether it is a control, which uses no model and with which attacks are compared.
     """
 
     tasks: tuple[str, ...] = ()
@@ -125,13 +130,13 @@ class AttackSpec(Spec[ConfigT, Attack]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefenseSpec(Spec[ConfigT, Defense]):
-    """A defense.
+    """The spec of a defense.
 
     Attributes:
-        tasks: names of the tasks that it can guard; empty for any.
-        outputs: what it returns: cleaned `images`, a `mask` of the patch, a `score` that the sample is attacked.
+        tasks: names of the tasks whose models it can protect; empty for any.
+        outputs: kinds of results: cleaned `images`, a `mask` of the patch, a `score` that the sample is attacked.
         gradient: how gradients pass it.
-        taps: names of the model's feature maps that it needs.
+        taps: names of the model's feature maps that it reads.
         needs_calibration: whether `fit` must be called before `apply`.
         needs_model: whether `apply` needs the model; defenses with `taps` do.
     """
@@ -146,14 +151,15 @@ class DefenseSpec(Spec[ConfigT, Defense]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetricSpec(Spec[ConfigT, Evaluator[Any, Any]]):
-    """A further metric for existing tasks, shown by `gear evaluate --report NAME`.
+    """The spec of a metric that a plugin adds to existing tasks; `gear evaluate --report NAME` shows it.
 
-    `build` returns a new, empty evaluator at every call. Its `update` is given the task's samples and predictions.
+    `build` returns a new, empty evaluator at every call. The evaluator's `update` receives the task's samples and
+    predictions.
 
     Attributes:
         tasks: names of the tasks whose samples and predictions it understands; at least one.
         metric: name of the evaluator's main metric, by which predictions are compared.
-        unit: of its metrics, such as `m` or `px`; "" for shares and counts.
+        unit: unit of its metrics, such as `m` or `px`; "" for shares and counts.
         less_is_better: whether the main metric is an error.
     """
 

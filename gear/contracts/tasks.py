@@ -1,4 +1,6 @@
-"""The protocol of tasks: a task places cameras, measures ground truth, writes and reads files, and has a metric."""
+"""The protocol of tasks. A task defines the cameras, measures ground truth, converts samples to files and back,
+and has a metric.
+"""
 
 from __future__ import annotations
 
@@ -36,18 +38,18 @@ PredictionT_contra = TypeVar("PredictionT_contra", contravariant=True)
 
 NO_PATCH, RANDOM_PATCH = "none", "random"
 CONTROLS = (NO_PATCH, RANDOM_PATCH)
-"""Labels of the controls with which patches are compared."""
+"""Labels of the control datasets with which patches are compared: without a patch, and with random noise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplitInfo:
-    """Names and seed of the split that a sample belongs to.
+    """Names and seed of the split to which a sample belongs.
 
     Attributes:
         town, scene, split: names.
-        seed: of the split.
+        seed: seed of the split.
         patch_label: `none`, `random`, or name and hash of the patch.
-        created: ISO date for formats that state one; it is part of the configuration, so that the same configuration
+        created: ISO date for formats that store one. The date is part of the configuration, so the same configuration
             gives the same bytes.
     """
 
@@ -61,11 +63,11 @@ class SplitInfo:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Encoded:
-    """A sample, or a prediction, as files.
+    """A sample, or a prediction, converted to files.
 
     Attributes:
         files: bytes by path relative to the dataset's root, with `/` between folders.
-        facts: JSON data that `decode` and `finalise` need; stored in the sidecar.
+        facts: JSON data that `decode` and `finalise` need; stored in the sidecar, the JSON file of the sample.
     """
 
     files: Mapping[str, bytes]
@@ -74,11 +76,12 @@ class Encoded:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Auxiliary:
-    """A file of a sample in addition to those of its task, such as a probe.
+    """A file of a sample in addition to the task's files, such as a probe (the sample with a black or white
+    surface).
 
     Attributes:
-        path: relative to the dataset's root; the file's hash is among `files` of the sidecar.
-        facts: JSON that is needed to read the file.
+        path: path relative to the dataset's root; the file's hash is among `files` of the sidecar.
+        facts: JSON data that is needed to read the file.
     """
 
     path: str
@@ -87,14 +90,14 @@ class Auxiliary:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sidecar:
-    """What gear stores about each sample in `gear/<split>/samples/<index>.json`.
+    """The metadata that gear stores about each sample, in `gear/<split>/samples/<index>.json`.
 
     Attributes:
         record: the complete scene.
         surfaces: visibility and corners of each patch surface in each view.
-        facts: what the task's `encode` returned.
+        facts: JSON data that the task's `encode` returned.
         files: sha256 of each of the sample's files, by path relative to the dataset's root.
-        auxiliary: further files by name; empty unless the collection asked for them.
+        auxiliary: further files by name; empty unless the collection requested them.
     """
 
     record: SceneRecord
@@ -105,10 +108,10 @@ class Sidecar:
 
 
 class Evaluator(Protocol[SampleT_contra, PredictionT_contra]):
-    """A metric over a dataset; samples are added one by one."""
+    """A metric over a dataset, to which samples are added one by one."""
 
     def update(self, sample: SampleT_contra, prediction: PredictionT_contra) -> Mapping[str, float]:
-        """Adds one sample.
+        """Adds one sample with its prediction.
 
         Returns:
             Metrics of this sample alone, by name; empty if the metric is not defined for a single sample.
@@ -131,7 +134,7 @@ class Task(Protocol[SampleT, PredictionT]):
     """
 
     def rig(self) -> Rig:
-        """The cameras and where they are mounted on the ego car."""
+        """The cameras of the task and their mounting positions on the ego car."""
         ...
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> SampleT:
@@ -144,30 +147,30 @@ class Task(Protocol[SampleT, PredictionT]):
         ...
 
     def encode(self, sample: SampleT, info: SplitInfo) -> Encoded:
-        """The files of one sample, without index files that several samples share."""
+        """Converts one sample to files, without index files that several samples share."""
         ...
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """The index files of a split, such as COCO's JSON, by path relative to the dataset's root.
+        """The index files of a split, such as COCO's JSON, as bytes by path relative to the dataset's root.
 
         Args:
-            sidecars: of all samples of the split, in order of index.
+            sidecars: stored metadata of all samples of the split, in order of index.
             info: names and seed of the split.
         """
         ...
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> SampleT:
-        """Reads one sample back from its files: the exact inverse of `encode`.
+        """Reads one sample from its files: the exact inverse of `encode`.
 
         Args:
-            root: of the dataset.
-            sidecar: of the sample.
+            root: folder of the dataset.
+            sidecar: stored metadata of the sample.
             info: names and seed of the split.
         """
         ...
 
     def as_prediction(self, sample: SampleT) -> PredictionT:
-        """The ground truth as a perfect prediction, with which evaluators are tested."""
+        """The ground truth of a sample in the form of a perfect prediction, with which evaluators are tested."""
         ...
 
     def evaluator(self) -> Evaluator[SampleT, PredictionT]:
@@ -175,5 +178,5 @@ class Task(Protocol[SampleT, PredictionT]):
         ...
 
     def preview(self, sample: SampleT) -> Mapping[str, UInt8Image]:
-        """Pictures of a sample for people, with labels, boxes or depth drawn in: (H, W, 3) uint8 by name."""
+        """Pictures of a sample for people, by name: (H, W, 3) uint8, with labels, boxes or depth drawn in."""
         ...

@@ -5,10 +5,10 @@ A General Toolbox for Identifying Object Detection Errors", ECCV 2020), with its
 detection explains at most one object. In three rounds, each detection, by decreasing score, chooses the object with the
 largest overlap among those that no detection has chosen yet:
 
-1. an object of their class, at an IoU of at least 0.5: the object is `found`, or, where the detection lies at another
-   place in space, `moved`. This is the matching of `found_share` (`gear.metrics.single_picture`);
+1. an object of its class, at an IoU of at least 0.5: the object is `found`, or, where the detection has another
+   position in space, `moved`. This is the matching of `found_share` (`gear.metrics.single_picture`);
 2. an object of another class, at an IoU of at least 0.5: `misclassified` (TIDE's classification error);
-3. an object of their class, at an IoU of at least 0.1: `moved` (TIDE's localisation error).
+3. an object of its class, at an IoU of at least 0.1: `moved` (TIDE's localisation error).
 
 An object that no detection chooses is `missed`. A detection that chooses no object is a `duplicate` if it overlaps any
 object by at least 0.5, else `ignored` if at least half of it lies in an ignored box, else `background`.

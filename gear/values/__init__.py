@@ -1,1 +1,3 @@
-"""Values that all other packages exchange: frozen, typed, with units and frames in their names. NumPy only."""
+"""Value types that all other packages exchange: frozen dataclasses, typed, with units and frames in the names.
+Depends on NumPy only.
+"""

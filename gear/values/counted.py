@@ -1,8 +1,8 @@
-"""Numbers of things in sentences."""
+"""Formats a number with its noun, for messages."""
 
 from __future__ import annotations
 
 
 def counted(count: int, thing: str) -> str:
-    """`1 sample`, `2 samples`: a number with its noun, which takes an `s` in the plural."""
+    """Formats a number with its noun, which takes an `s` in the plural: `1 sample`, `2 samples`."""
     return f"{count} {thing}" + "s" * (count != 1)

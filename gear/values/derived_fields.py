@@ -1,4 +1,6 @@
-"""Dataclasses whose fields follow from other dataclasses, so that a field and its document stand in one place."""
+"""Makes dataclasses whose fields are derived from other dataclasses, so each field and its description are written
+only once.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,11 @@ HEADING = "Attributes:"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DerivedField:
-    """One additional field of a class.
+    """A field that is added to a dataclass.
 
     Attributes:
         name: name of the field.
-        kind: its type; a real one, not its text.
+        kind: type of the field, as a type object and not as text.
         field: default and metadata, as `dataclasses.field` makes them.
     """
 
@@ -30,19 +32,21 @@ class DerivedField:
 
 
 def attribute_lines(kind: type[Any], *, without: Iterable[str] = ()) -> str:
-    """The lines below `Attributes:` in a class's docstring, without those that begin with some names."""
+    """The lines below `Attributes:` in the docstring of the class `kind`, without the attributes that `without`
+    names.
+    """
     _, _, section = (textwrap.dedent("    " + (kind.__doc__ or ""))).partition(f"{HEADING}\n")
     left_out = tuple(f"    {name}:" for name in without)
     return "\n".join(line for line in section.rstrip().splitlines() if not line.startswith(left_out))
 
 
 def with_fields(fields: Iterable[DerivedField], attributes: str) -> Callable[[type[T]], type[T]]:
-    """A decorator that makes a class a frozen, keyword-only dataclass with more fields than are written in it.
+    """A decorator that makes a class a frozen, keyword-only dataclass and adds fields to it.
 
-    The class's own fields come first, except those whose metadata is not empty (such as `places`), which come last.
+    The class's own fields come first. Own fields with metadata (such as `places`) come last, after the added ones.
 
     Args:
-        fields: the additional fields in order.
+        fields: the added fields in order.
         attributes: lines of their descriptions, as in an `Attributes:` section.
 
     Raises:

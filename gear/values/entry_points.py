@@ -1,6 +1,6 @@
-"""Entry points of installed distributions, read one distribution at a time.
+"""Reads the entry points of installed distributions, one distribution at a time.
 
-`importlib.metadata.entry_points` fails as a whole when the `entry_points.txt` of any distribution has a malformed line.
+`importlib.metadata.entry_points` fails as a whole if the `entry_points.txt` of any distribution has a malformed line.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ class DamagedDistribution:
 
 
 def installed_entry_points(group: str) -> tuple[list[EntryPoint], list[DamagedDistribution]]:
-    """The entry points of a group, and the distributions whose entry points cannot be read, by name.
+    """The entry points of a group, and the distributions whose entry points cannot be read, sorted by name.
 
-    Of a distribution that lies on the path several times the first one counts, as for `import`.
+    If a distribution is on the path several times, the first one counts, as for `import`.
     """
     found: list[EntryPoint] = []
     damaged: list[DamagedDistribution] = []
@@ -51,7 +51,9 @@ def installed_entry_points(group: str) -> tuple[list[EntryPoint], list[DamagedDi
 
 
 def identity(distribution: importlib.metadata.Distribution) -> tuple[str, str]:
-    """Name and version of a distribution; where its metadata are damaged, as the name of its folder says them."""
+    """Name and version of a distribution; if its metadata are damaged, name and version are taken from the name of
+    its folder.
+    """
     try:
         name, version = str(distribution.name or ""), str(distribution.version or "")
     except Exception:

@@ -12,11 +12,12 @@ class GearError(Exception):
 
 
 class FieldError(ValueError):
-    """A value that a config class refuses. The reader turns it into a `ConfigError` with file, line and column.
+    """A value that a config class refuses. The config reader converts it to a `ConfigError` with file, line and
+    column.
 
     Attributes:
-        field: name of the refused field; nested ones with dots.
-        problem: what is wrong with its value.
+        field: name of the refused field; nested names with dots.
+        problem: description of what is wrong with the value.
     """
 
     def __init__(self, field: str, problem: str) -> None:
@@ -41,7 +42,7 @@ class ConfigError(GearError):
 
 
 class UnknownNameError(GearError):
-    """A name that is not known. The text suggests the known name that is spelled most alike."""
+    """A name that is unknown. The error's text suggests the known name with the most similar spelling."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str] = (), hint: str = "") -> None:
         names = tuple(sorted(known))
@@ -60,7 +61,7 @@ class UnknownNameError(GearError):
 
 
 class DuplicateNameError(GearError):
-    """A name that several plugins share, given without the package."""
+    """A plugin name that several packages use, given without the name of the package."""
 
     def __init__(self, kind: str, name: str, choices: Iterable[str]) -> None:
         listed = tuple(choices)
@@ -72,7 +73,7 @@ class DuplicateNameError(GearError):
 
 
 class PluginError(GearError):
-    """A plugin that failed: which one, at which stage, and how."""
+    """A plugin that failed; the text states which plugin, at which stage, and the cause."""
 
     def __init__(self, plugin: str, stage: str, problem: str) -> None:
         super().__init__(plugin, stage, problem)
@@ -83,7 +84,9 @@ class PluginError(GearError):
 
 
 class BackendError(GearError):
-    """A renderer that cannot start on this machine. The text says what to install or which renderer to use instead."""
+    """A renderer that cannot start on this machine. The text states what to install or which renderer to use
+    instead.
+    """
 
     def __init__(self, backend: str, problem: str, remedy: str) -> None:
         super().__init__(backend, problem, remedy)
@@ -94,7 +97,7 @@ class BackendError(GearError):
 
 
 class PatchError(GearError):
-    """A patch file or folder that cannot be read or does not fit."""
+    """A patch file or folder that cannot be read or does not fit the dataset."""
 
     def __init__(self, path: Path | str, problem: str) -> None:
         super().__init__(str(path), problem)
@@ -116,11 +119,13 @@ class DatasetError(GearError):
 
 
 class SamplesFailedError(DatasetError):
-    """A split whose other samples are made, while some could not be; notes in the dataset say why."""
+    """A split of which some samples could not be made; all other samples are made. Notes in the dataset state the
+    causes.
+    """
 
 
 class ReplaceableError(DatasetError):
-    """Existing output that was made with other settings, or is damaged; `--force` replaces it."""
+    """Existing output that was made with other settings, or is damaged; the option `--force` replaces it."""
 
     def __init__(self, path: Path | str, problem: str, *, split: str = "") -> None:
         super().__init__(path, problem)
@@ -132,7 +137,7 @@ class ReplaceableError(DatasetError):
 
 
 class OutdatedError(ReplaceableError):
-    """Existing output of the same settings that was made from other input: other pictures, or another patch."""
+    """Existing output with the same settings that was made from other input: other pictures, or another patch."""
 
 
 class TownError(GearError):

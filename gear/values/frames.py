@@ -1,4 +1,6 @@
-"""Frames: pixel-aligned colour, depth and geom ids of the cameras of one sample, and tables of geoms and objects."""
+"""Rendered frames: pixel-aligned colour, depth and geom ids of the cameras of one sample, and tables that describe
+geoms and objects.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +20,12 @@ FloatImage = npt.NDArray[np.float32]
 IdImage = npt.NDArray[np.int32]
 
 LINEAR_FULL_SCALE = 1020
-"""Largest value of linear frames: the sum of four 8-bit samples, so that 2 x 2 supersampling keeps ten bits."""
+"""Largest value of linear colour, 1020: the sum of four 8-bit samples, so 2 x 2 supersampling keeps ten bits."""
 
 STATIC_OBJECT_BASE = 1000
-"""First object id of countable objects of the town, such as traffic lights; actors have smaller ids."""
+"""First object id of the town's countable objects, such as traffic lights; actors (vehicles, people) have smaller
+ids.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -56,10 +60,11 @@ class GeomTable:
     """Label, object and surface of each geom of the render model; arrays are indexed by geom id.
 
     Attributes:
-        label_code: (ngeom,) uint8, codes of `gear.values.labels`; 255 for geoms that are never seen.
-        object_id: (ngeom,) int32, the actor's id, `STATIC_OBJECT_BASE` + n for countable things of the town, -1 for
-            the rest.
-        surface_index: (ngeom,) int16, index into `SceneRecord.surfaces` for the face that takes the patch, else -1.
+        label_code: (ngeom,) uint8, codes of `gear.values.labels`; 255 for geoms that are never rendered.
+        object_id: (ngeom,) int32, the actor's id, `STATIC_OBJECT_BASE` + n for countable objects of the town, -1 for
+            all other geoms.
+        surface_index: (ngeom,) int16, index into `SceneRecord.surfaces` for the face that shows the patch, otherwise
+            -1.
     """
 
     label_code: npt.NDArray[np.uint8]
@@ -69,14 +74,14 @@ class GeomTable:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Shape:
-    """The visible triangles of an asset, in the asset's frame.
+    """The visible triangles of an asset, such as a car, in the asset's frame.
 
     Attributes:
-        vertices_m: (N, 3) float64.
-        faces: (M, 3) int32.
-        face_label_code: (M,) uint8.
+        vertices_m: (N, 3) float64 vertices, metres.
+        faces: (M, 3) int32 vertex indices of the triangles.
+        face_label_code: (M,) uint8 label code of each triangle.
         box_centre_m: (3,) centre of the tight box along the frame's axes.
-        box_size_m: (3,) its length (x), width (y), height (z).
+        box_size_m: (3,) length (x), width (y), height (z) of that box.
     """
 
     vertices_m: npt.NDArray[np.float64]
@@ -88,18 +93,19 @@ class Shape:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SceneObject:
-    """A countable object: an actor, or an object of the town such as a traffic light or a bench.
+    """A countable object: an actor (vehicle, pedestrian), or an object of the town such as a traffic light or a
+    bench.
 
     Attributes:
         id: object id, as in `GeomTable.object_id`.
-        asset: name of its MJCF; for objects of the town the body's name.
-        label_code: label of its main part: a cyclist is a bicycle that has geoms of a rider.
-        kitti_type: KITTI's type of the whole, or None.
-        is_ego: whether it carries the cameras (never labelled).
+        asset: name of the object's MJCF; for objects of the town the body's name.
+        label_code: label of the main part: a cyclist is a bicycle that has geoms of a rider.
+        kitti_type: KITTI's type of the whole object, or None.
+        is_ego: whether the object is the ego car, which carries the cameras and is never labelled.
         world_from_object: pose.
-        shape: its triangles.
-        key_points: named points in its own frame, metres, such as a person's `left_knee`; empty for assets that name
-            none. `key_points_m` has them in the world.
+        shape: visible triangles.
+        key_points: named points in the object's frame, metres, such as a person's `left_knee`; empty for assets that
+            name none. `key_points_m` returns them in the world frame.
     """
 
     id: int
@@ -113,7 +119,7 @@ class SceneObject:
 
     @property
     def key_points_m(self) -> dict[str, Vec3]:
-        """The key points in the world, by name, metres."""
+        """The object's key points by name, such as a person's `left_knee`, in the world frame, metres."""
         if not self.key_points:
             return {}
         placed = self.world_from_object.apply(list(self.key_points.values()))
@@ -122,7 +128,7 @@ class SceneObject:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Frame:
-    """All views of one sample, with the tables that explain their ids.
+    """All views of one sample, with the tables that describe their geom ids and objects.
 
     Attributes:
         views: views by camera name.

@@ -2,8 +2,8 @@
 
 Frames: the world is x east, y north, z up. Cameras are x right, y down, z forward. Actors are x forward, y left, z up,
 with the origin on the ground in the middle of the footprint. Surfaces are x right and y down for a viewer in front of
-them, z into the board. Pixels: in index pixels the centre of the first pixel is (0, 0), so that a symmetric pinhole has
-cx = (W - 1) / 2.
+them, z into the board. Pixels: in index pixels the centre of the first pixel is (0, 0), so a symmetric pinhole has cx =
+(W - 1) / 2.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ Array = npt.NDArray[np.float64]
 
 
 class FrameMismatchError(ValueError):
-    """Two transforms were chained whose inner frames differ."""
+    """Error for two chained transforms `a_from_b @ c_from_d` whose inner frames, b and c, differ."""
 
 
 def frozen(array: npt.ArrayLike, shape: tuple[int, ...] | None = None) -> Array:
     """A read-only float64 copy of an array.
 
     Args:
-        array: anything that NumPy takes for an array.
-        shape: the shape that it must have; None for any.
+        array: any value that NumPy converts to an array.
+        shape: the required shape; None for any.
 
     Raises:
-        ValueError: the shape differs.
+        ValueError: the array has another shape.
     """
     copy = np.array(array, dtype=np.float64)
     if shape is not None and copy.shape != shape:
@@ -39,13 +39,13 @@ def frozen(array: npt.ArrayLike, shape: tuple[int, ...] | None = None) -> Array:
 
 
 def wrap_angle_rad(angle_rad: float) -> float:
-    """The equivalent angle in [-pi, pi)."""
+    """The equivalent angle in [-pi, pi), in radians."""
     return (angle_rad + math.pi) % (2 * math.pi) - math.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidTransform:
-    """The transform `dst_from_src`: it takes coordinates in frame `src` to coordinates in frame `dst`.
+    """The rigid transform `dst_from_src`, which converts coordinates in frame `src` to coordinates in frame `dst`.
 
     Attributes:
         dst, src: frame names, checked whenever transforms are chained.
@@ -61,7 +61,7 @@ class RigidTransform:
 
     @staticmethod
     def from_parts(dst: str, src: str, rotation: npt.ArrayLike, translation_m: npt.ArrayLike) -> RigidTransform:
-        """From a (3, 3) rotation and a (3,) translation in metres."""
+        """Makes a transform from a (3, 3) rotation and a (3,) translation in metres."""
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
         matrix[:3, 3] = translation_m
@@ -69,23 +69,25 @@ class RigidTransform:
 
     @staticmethod
     def from_yaw(dst: str, src: str, position_m: npt.ArrayLike, yaw_rad: float) -> RigidTransform:
-        """Turned about z by `yaw_rad`, counter-clockwise seen from above, then moved to `position_m`."""
+        """Makes a transform for a frame `src` that is rotated about z by `yaw_rad` (counter-clockwise seen from
+        above) and whose origin is at `position_m` in `dst`.
+        """
         c, s = math.cos(yaw_rad), math.sin(yaw_rad)
         return RigidTransform.from_parts(dst, src, [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], position_m)
 
     @property
     def rotation(self) -> Array:
-        """(3, 3) rotation matrix."""
+        """The (3, 3) rotation matrix."""
         return self.matrix[:3, :3]
 
     @property
     def translation_m(self) -> Array:
-        """(3,) position of the origin of `src` in `dst`, metres."""
+        """The (3,) position of the origin of `src` in `dst`, metres."""
         return self.matrix[:3, 3]
 
     @property
     def yaw_rad(self) -> float:
-        """Angle of the x axis of `src` about the z axis of `dst`, counter-clockwise, in radians."""
+        """Angle of the x axis of `src` about the z axis of `dst`, counter-clockwise seen from above, in radians."""
         return math.atan2(self.matrix[1, 0], self.matrix[0, 0])
 
     def inverse(self) -> RigidTransform:
@@ -102,7 +104,7 @@ class RigidTransform:
         return RigidTransform(self.dst, other.src, self.matrix @ other.matrix)
 
     def apply(self, points_m: npt.ArrayLike) -> Array:
-        """(..., 3) points in `src` to (..., 3) points in `dst`."""
+        """Converts (..., 3) points in frame `src` to (..., 3) points in frame `dst`, metres."""
         return np.asarray(points_m, dtype=np.float64) @ self.rotation.T + self.translation_m
 
 
@@ -112,7 +114,7 @@ CAMERA_FROM_ACTOR_AXES = frozen([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
-    """A pinhole without skew, in index pixels.
+    """Intrinsics of a pinhole camera without skew, in index pixels (the centre of the first pixel is (0, 0)).
 
     Attributes:
         width_px, height_px: size of the picture.
@@ -129,17 +131,17 @@ class Intrinsics:
 
     @staticmethod
     def from_hfov(width_px: int, height_px: int, hfov_rad: float) -> Intrinsics:
-        """A symmetric pinhole with this horizontal field of view in radians."""
+        """Makes the intrinsics of a symmetric pinhole from the horizontal field of view in radians."""
         return Intrinsics(width_px, height_px, width_px / (2 * math.tan(hfov_rad / 2)))
 
     @property
     def fx_px(self) -> float:
-        """Horizontal focal length."""
+        """Horizontal focal length in pixels."""
         return self.focal_px
 
     @property
     def fy_px(self) -> float:
-        """Vertical focal length."""
+        """Vertical focal length in pixels."""
         return self.focal_px if self.focal_y_px is None else self.focal_y_px
 
     @property
@@ -176,17 +178,17 @@ class Intrinsics:
 
     @property
     def matrix(self) -> Array:
-        """(3, 3) calibration matrix K in index pixels, read-only."""
+        """The (3, 3) calibration matrix K in index pixels, read-only."""
         return frozen([[self.fx_px, 0.0, self.cx_px], [0.0, self.fy_px, self.cy_px], [0.0, 0.0, 1.0]])
 
     def project(self, points_camera_m: npt.ArrayLike) -> Array:
-        """(..., 3) camera points with z > 0 to (..., 2) index pixels."""
+        """Projects (..., 3) points in the camera frame, with z > 0, to (..., 2) index pixels."""
         points = np.asarray(points_camera_m, dtype=np.float64)
         scaled = points[..., :2] / points[..., 2:3] * (self.fx_px, self.fy_px)
         return np.asarray(scaled + np.array([self.cx_px, self.cy_px]))
 
     def unproject(self, pixels: npt.ArrayLike, depth_m: npt.ArrayLike) -> Array:
-        """(..., 2) index pixels and (...) planar depths to (..., 3) camera points."""
+        """Converts (..., 2) index pixels and (...) planar depths in metres to (..., 3) points in the camera frame."""
         uv = np.asarray(pixels, dtype=np.float64)
         z = np.asarray(depth_m, dtype=np.float64)[..., None]
         return np.concatenate([(uv - (self.cx_px, self.cy_px)) / (self.fx_px, self.fy_px) * z, z], axis=-1)

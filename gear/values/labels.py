@@ -1,7 +1,7 @@
-"""The semantic labels of gear, and what Cityscapes, COCO and KITTI call them.
+"""The semantic labels of gear, and their names in Cityscapes, COCO and KITTI.
 
-`docs/reference/mjcf.md` is this table in words. A kind of vehicle is one row of it, a `VehicleKind`: whatever differs
-between kinds of vehicles is read from that row.
+`docs/reference/mjcf.md` describes this table in words. A kind of vehicle is one entry of the table, a `VehicleKind`;
+every property that differs between kinds of vehicles is read from this entry.
 
 The colours of the classes are Cityscapes' own, in `gear/formats/cityscapes.py`.
 """
@@ -108,10 +108,10 @@ VEHICLES: dict[str, VehicleKind] = {label.name: label for label in LABELS if isi
 """Kinds of vehicles by name, in the order of their codes."""
 
 LABEL_BY_NAME: dict[str, Label] = {label.name: label for label in LABELS}
-"""Labels by the name that MJCF default classes start with."""
+"""Labels by name. In MJCF, the name of a geom's default class starts with this name."""
 
 OPEN_GROUND_CODES = tuple(LABEL_BY_NAME[name].code for name in ("road", "road_marking", "parking", "ground"))
-"""Level ground under the sky: it gets wet, and water stands on it."""
+"""Label codes of level ground in the open, which gets wet in rain and on which puddles form."""
 
 GROUND_CODES = (*OPEN_GROUND_CODES, *(LABEL_BY_NAME[name].code for name in ("sidewalk", "terrain")))
 """Label codes of the ground on which road users stand."""

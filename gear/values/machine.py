@@ -1,4 +1,6 @@
-"""What this machine allows a process to use: processor cores and memory, as containers and batch systems limit them."""
+"""Finds the processor cores and the memory that this process may use, within the limits of containers and batch
+systems.
+"""
 
 from __future__ import annotations
 
@@ -11,19 +13,20 @@ _CONTROL_GROUPS = Path("/sys/fs/cgroup")
 
 
 def cores() -> int:
-    """Number of cores that this process may use.
+    """Number of processor cores that this process may use.
 
-    It is the number in the process's affinity, or the rounded-up quota of its control group if that is smaller: a
-    container with a quota of 1.5 cores sees all cores of its machine, and gets no more than 2.
+    The result is the number of cores in the process's affinity, or the rounded-up quota of its control group if that is
+    smaller. A container with a quota of 1.5 cores, for example, sees all cores of its machine but may use only 2.
     """
     allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, min([allowed, *(math.ceil(quota) for quota in _quotas())]))
 
 
 def free_memory_bytes() -> int | None:
-    """Bytes of memory that this process can still use; None where the system does not say.
+    """Bytes of memory that this process can still use; None if the system does not report them.
 
-    It is the memory that Linux reports as available, or what the process's control groups have left if that is less.
+    The result is the memory that Linux reports as available, or what the process's control groups have left if that is
+    less.
     """
     try:
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()

@@ -1,4 +1,4 @@
-"""`MUJOCO_GL`, which MuJoCo and dm_control read when they are imported, checked before they are."""
+"""Checks the environment variable `MUJOCO_GL` before MuJoCo and dm_control read it at their import."""
 
 from __future__ import annotations
 
@@ -8,17 +8,19 @@ import sys
 from gear.values.errors import GearError
 
 BACKENDS = ("egl", "osmesa")
-"""Ways to OpenGL without a window: the values that gear follows."""
+"""Values of `MUJOCO_GL` that gear follows: the ways to OpenGL without a window."""
 
 IGNORED = ("", "glfw", "on", "enable", "enabled", "true", "1", "off", "disable", "disabled", "false", "0")
-"""Values that both libraries accept and that say nothing about rendering without a window."""
+"""Values of `MUJOCO_GL` that MuJoCo and dm_control accept but that select no rendering without a window; gear
+ignores them.
+"""
 
 
 def check_mujoco_gl() -> None:
-    """Refuses a value of `MUJOCO_GL` with which MuJoCo or dm_control cannot be imported, or that needs a window.
+    """Refuses a value of `MUJOCO_GL` that gear can neither follow nor ignore.
 
-    The value is written in lower case into the environment, since dm_control takes no other. Once MuJoCo is imported
-    nothing is checked any more.
+    An accepted value is written into the environment in lower case, because dm_control accepts no other spelling. If
+    MuJoCo is already imported, nothing is checked.
 
     Raises:
         GearError: the value is neither one of `BACKENDS` nor one of `IGNORED`.

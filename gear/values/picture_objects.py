@@ -18,12 +18,13 @@ DetectionRole = Literal["found", "misclassified", "moved", "duplicate", "ignored
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureObject:
-    """An object that a detector should find.
+    """An object of the ground truth that a detector should find.
 
     Attributes:
-        object_id: id of the object, the same in every sample of a sequence and in twins.
-        label: name of its class.
-        box_px: in edge pixels.
+        object_id: id of the object, the same in every sample of a sequence and in twins (the same dataset with another
+            patch).
+        label: name of the object's class.
+        box_px: 2D box in edge pixels.
         position_m: middle of the object in the camera's frame (x right, y down, z forward).
     """
 
@@ -35,11 +36,11 @@ class PictureObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureDetection:
-    """A detection of a network.
+    """One detection of a network.
 
     Attributes:
-        label: name of its class.
-        box_px: in edge pixels.
+        label: name of the detected class.
+        box_px: 2D box in edge pixels.
         score: confidence; higher is more certain.
     """
 
@@ -50,15 +51,15 @@ class PictureDetection:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PictureObjects:
-    """The objects that a detector should find in a picture, and its detections.
+    """The objects that a detector should find in a picture, and the detector's detections.
 
     Attributes:
         camera: name of the view that boxes and positions belong to.
         objects: N objects.
         detections: M detections of any score.
-        ignored_px: boxes, in edge pixels, in which a detection that finds no object is no false alarm.
-        is_in_place: (N, M) bool: whether a detection that fits an object in the picture also fits it in space; None for
-            tasks without a third dimension.
+        ignored_px: boxes, in edge pixels, in which a detection that matches no object is no false alarm.
+        is_in_place: (N, M) bool: whether a detection that matches an object in the picture also matches it in 3D space;
+            None for tasks without a third dimension.
     """
 
     camera: str
@@ -70,13 +71,13 @@ class PictureObjects:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PatchDistance:
-    """The distance of an object or a detection from the patch.
+    """The distance of an object or a detection from the patches in the picture.
 
     Attributes:
         is_on_patch: whether the centre of its box, or more than half of the box, lies on visible pixels of a patch.
-        pixels: from its box to the nearest visible pixel of a patch; None where no patch is visible.
-        metres: from its middle to the middle of the nearest visible patch; None where no patch is visible, and for
-            detections.
+        pixels: distance from its box to the nearest visible pixel of a patch; None if no patch is visible.
+        metres: distance from its middle to the middle of the nearest visible patch; None if no patch is visible, and
+            for detections.
     """
 
     is_on_patch: bool
@@ -86,14 +87,14 @@ class PatchDistance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObjectOutcome:
-    """The outcome for one object.
+    """The outcome for one object: whether a network detected it, and how.
 
     Attributes:
         object_id, label, box_px: as in `PictureObject`.
-        state: see `gear.metrics.object_matching`.
+        state: `found`, `misclassified`, `moved` or `missed`, as `gear.metrics.object_matching` defines them.
         detected_as: class of the detection that explains the state; None for a missed object.
-        score: of that detection.
-        patch: distance from the patch.
+        score: score of the detection that explains the state; None for a missed object.
+        patch: distance of the object from the patch.
     """
 
     object_id: int
@@ -107,13 +108,14 @@ class ObjectOutcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectionOutcome:
-    """The outcome for one confident detection.
+    """The outcome for one confident detection: which role it has among the objects of the picture.
 
     Attributes:
         label, box_px, score: as in `PictureDetection`.
-        role: see `gear.metrics.object_matching`.
-        is_false_alarm: whether it fits no object of its class, and less than half of it lies in an ignored box.
-        patch: distance from the patch.
+        role: `found`, `misclassified`, `moved`, `duplicate`, `ignored` or `background`, as
+            `gear.metrics.object_matching` defines them.
+        is_false_alarm: whether it matches no object of its class, and less than half of it lies in an ignored box.
+        patch: distance of the detection from the patch.
     """
 
     label: str
@@ -126,7 +128,7 @@ class DetectionOutcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PictureOutcomes:
-    """The outcomes of the objects and the confident detections of one picture; JSON-ready.
+    """The outcomes of all objects and all confident detections of one picture; JSON-ready.
 
     Attributes:
         objects: outcomes of the objects, in the order of the ground truth.

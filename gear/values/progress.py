@@ -1,4 +1,4 @@
-"""The callbacks that every long-running verb takes, for progress and for warnings."""
+"""Callbacks for progress and warnings, which every long-running verb (a command as a Python function) accepts."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 Progress = Callable[[int, int], None]
-"""Called with (done, total). The first call counts the items that an earlier run finished; a total of 0
-means unknown.
+"""Type of the progress callback, called with (done, total). The first call counts the items that an earlier run
+finished; a total of 0 means unknown.
 """
 
 Warn = Callable[[str], None]
-"""Called with one line about a setting that is allowed but may be unintended."""
+"""Type of the warning callback, called with one line about a setting that is allowed but may be unintended."""
 
 
 def _no_progress(done: int, total: int) -> None: ...
@@ -22,12 +22,12 @@ def _no_warning(line: str) -> None: ...
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Callbacks:
-    """The callbacks of a running verb; by default they do nothing.
+    """The callbacks of a running verb (a command as a Python function); by default they do nothing.
 
     Attributes:
-        on_progress: called after every sample, or step of an optimisation.
+        on_progress: called after every sample, or after every step of an optimisation.
         on_fit_progress: called after every calibration sample that a defense reads for the first time.
-        on_warning: called with one line, each line once.
+        on_warning: called with a warning of one line; equal warnings are passed on once if the object was made by `of`.
     """
 
     on_progress: Progress = _no_progress
@@ -42,8 +42,8 @@ class Callbacks:
         on_fit_progress: Progress | None = None,
         on_warning: Warn | None = None,
     ) -> Callbacks:
-        """Makes callbacks from the arguments of a verb, of which any may be None; a repeated warning is
-        passed on once.
+        """Makes callbacks from the arguments of a verb; None stands for a callback that does nothing. A repeated
+        warning is passed on only once.
         """
         warned: set[str] = set()
 
@@ -59,7 +59,7 @@ class Callbacks:
         )
 
     def and_also(self, others: Callbacks) -> Callbacks:
-        """Callbacks that call both these and the others."""
+        """Callbacks that call first those of this object, then those of `others`."""
 
         def both_progress(done: int, total: int) -> None:
             self.on_progress(done, total)

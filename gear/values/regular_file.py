@@ -1,6 +1,6 @@
-"""Reads files whose paths come from users or data; refuses everything but regular files.
+"""Reads files whose paths come from users or data, and refuses everything but regular files.
 
-For a device, a FIFO or a socket, `open` or `read` could wait for ever or fill the memory.
+On a device, a FIFO or a socket, `open` or `read` could wait for ever or fill the memory.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ KINDS = (
 
 
 class NotAFileError(OSError):
-    """The path exists and is no regular file. An `OSError`, so that callers that expect those report it as one line."""
+    """Error for an existing path that is no regular file. Code that handles `OSError` handles it as well."""
 
     def __init__(self, path: Path, kind: str) -> None:
         number = errno.EISDIR if kind == "folder" else errno.EINVAL
@@ -28,7 +28,7 @@ class NotAFileError(OSError):
 
 
 def check_regular(path: str | Path) -> Path:
-    """Checks that a path is a regular file, or a link to one, and returns it.
+    """Checks that a path is a regular file, or a link to a regular file, and returns the path.
 
     Raises:
         NotAFileError: the path is a folder, a device, a FIFO or a socket.
@@ -40,14 +40,14 @@ def check_regular(path: str | Path) -> Path:
 
 
 def read_regular(path: str | Path, *, most_bytes: int | None = None) -> bytes:
-    """The bytes of a regular file.
+    """Reads the bytes of a regular file.
 
     Args:
-        path: the file, or a link to one.
+        path: the file, or a link to a file.
         most_bytes: largest number of bytes to read; None for all.
 
     Raises:
-        NotAFileError: it is a folder, a device, a FIFO or a socket.
+        NotAFileError: the path is a folder, a device, a FIFO or a socket.
         OSError: the path does not exist or cannot be read.
     """
     checked = check_regular(path)  # before it is opened: opening some devices has effects

@@ -1,4 +1,6 @@
-"""Folders of gear's data: inside the package when it is installed, next to the package in a checkout."""
+"""Locates gear's data folders: inside the package when gear is installed, next to the package in a checkout of the
+repository.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +12,10 @@ from pathlib import Path
 def data_dir(name: str) -> Path:
     """The path of one of gear's data folders.
 
+    An installed wheel holds the folder as `gear/data/<name>`; a checkout of the repository holds it as `<name>`.
+
     Args:
         name: `mjcf` or `configs`.
-
-    An installed wheel carries it as `gear/data/<name>`; in a checkout it is `<name>` at the top.
 
     Raises:
         FileNotFoundError: the installation is incomplete.

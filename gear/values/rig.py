@@ -1,4 +1,4 @@
-"""Camera rigs: named cameras on the ego car."""
+"""Camera rigs: the named cameras on the ego car, with their intrinsics and mounting poses."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from gear.values.geometry import CAMERA_FROM_ACTOR_AXES, Intrinsics, RigidTransf
 from gear.values.scene import CameraRecord, Pose, Vec3
 
 LEAST_FOCAL, MOST_FOCAL = 0.043, 58.0
-"""Smallest and largest focal length as a share of the picture's width: those of fields of view of 170 and
-of 1 degree.
+"""Smallest and largest focal length, as multiples of the picture's width (fx) or height (fy): those of fields of
+view of 170 degrees and 1 degree.
 """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraMount:
-    """One camera on the car, looking ahead.
+    """One camera of the ego car, with its intrinsics and its mounting pose.
 
     Attributes:
-        name: key of its view: `left`, `right`, ….
+        name: key of the camera's view: `left`, `right`, ….
         width_px, height_px: size of the picture.
-        hfov_deg: horizontal field of view, 1 to 170 degrees; not used where `focal_px` is given.
-        focal_px: horizontal focal length fx; None for the one of `hfov_deg`.
+        hfov_deg: horizontal field of view, 1 to 170 degrees; not used if `focal_px` is given.
+        focal_px: horizontal focal length fx; None for the focal length that follows from `hfov_deg`.
         focal_y_px: vertical focal length fy; None for the same as the horizontal one.
         principal_px: principal point (cx, cy) in index pixels; None for the middle of the picture.
-        position_m: in the ego frame: x forward, y left, z up, the origin on the ground.
+        position_m: position in the ego frame: x forward, y left, z up, the origin on the ground.
         yaw_deg, pitch_deg, roll_deg: rotation to the left, downwards, and clockwise as seen from behind the camera; 0
             is straight ahead and level.
     """
@@ -64,7 +64,7 @@ class CameraMount:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """The pinhole that the options describe, in index pixels."""
+        """The pinhole intrinsics that follow from the camera's options, in index pixels."""
         focal_px = self.focal_px
         if focal_px is None:
             focal_px = Intrinsics.from_hfov(self.width_px, self.height_px, math.radians(self.hfov_deg)).focal_px
@@ -72,7 +72,7 @@ class CameraMount:
 
     @property
     def ego_from_camera(self) -> RigidTransform:
-        """The camera's pose in the car's frame: yaw, then pitch, then roll."""
+        """The camera's pose in the ego car's frame: rotated by yaw, then pitch, then roll."""
         cy, sy = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
         cp, sp = math.cos(math.radians(self.pitch_deg)), math.sin(math.radians(self.pitch_deg))
         cr, sr = math.cos(math.radians(self.roll_deg)), math.sin(math.radians(self.roll_deg))
@@ -85,12 +85,12 @@ class CameraMount:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rig:
-    """The cameras of a task, on one car.
+    """The cameras of a task, mounted on the ego car.
 
     Attributes:
-        cameras: the first one is the reference camera, which must have the boards in view.
-        follows_road: False keeps the rig level (yaw only), as the loaders of CARLA-GeAR require; True gives it the
-            car's pitch and roll.
+        cameras: the cameras; the first one is the reference camera, which must have the boards in view.
+        follows_road: False keeps the rig level (yaw only), as the loaders of CARLA-GeAR require; True rotates the rig
+            with the car's pitch and roll.
     """
 
     cameras: tuple[CameraMount, ...]
@@ -104,7 +104,7 @@ class Rig:
             raise FieldError("cameras", f"two cameras share a name: {', '.join(names)}")
 
     def place(self, world_from_ego: RigidTransform) -> tuple[CameraRecord, ...]:
-        """The records of the cameras for a pose of the car."""
+        """The records of all cameras, with their poses in the world, for a pose of the ego car."""
         base = world_from_ego
         if not self.follows_road:
             base = RigidTransform.from_yaw("world", "ego", world_from_ego.translation_m, world_from_ego.yaw_rad)

@@ -1,4 +1,6 @@
-"""Random numbers: every purpose derives its own generator from the one seed, by name."""
+"""Random numbers: a separate random generator for every purpose, derived from the seed of the split and the name
+of the purpose.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ from gear.values.errors import GearError
 
 
 def check_seed(seed: int) -> None:
-    """Refuses negative seeds.
+    """Checks that a seed is not negative.
 
     Raises:
         GearError: the seed is negative.
@@ -21,13 +23,14 @@ def check_seed(seed: int) -> None:
 
 
 def derive_rng(seed: int, *path: str | int) -> np.random.Generator:
-    """An independent generator for one named purpose, such as `derive_rng(7, "scene", 12)`.
+    """An independent random generator for one named purpose, such as `derive_rng(7, "scene", 12)`.
 
-    A sample draws the same numbers alone, after resuming, or with any number of workers, since no generator is shared.
+    No generator is shared. Therefore a sample draws the same numbers when made alone, after resuming, or with any
+    number of workers.
 
     Args:
         seed: the seed of the split.
-        *path: names and numbers of the purpose.
+        *path: names and numbers that identify the purpose.
     """
     digest = hashlib.blake2b(json.dumps([seed, *path]).encode(), digest_size=16).digest()
     return np.random.default_rng(int.from_bytes(digest, "little"))

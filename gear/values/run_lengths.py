@@ -1,7 +1,7 @@
-"""COCO's compressed run-length strings.
+"""Decodes COCO's compressed run-length strings, which store masks.
 
-Each character holds five bits of a number, lowest first; its sixth bit says that more characters follow. From the third
-run on, the difference to the run before the last one is stored.
+Each character holds five bits of a number, lowest bits first; its sixth bit states that more characters follow. From
+the third run on, the string stores differences: run n minus run n - 2.
 """
 
 from __future__ import annotations
@@ -10,17 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 MOST_CHARACTERS = 7
-"""Characters of one run: 35 bits, more than any picture has pixels."""
+"""Largest number of characters of one run: 35 bits, enough for more pixels than any picture has."""
 
 
 def run_lengths(counts: str) -> npt.NDArray[np.int64]:
-    """Decodes a compressed string.
+    """Decodes one of COCO's compressed run-length strings.
 
     Args:
         counts: the string, as in COCO's `counts`.
 
     Returns:
-        (N,) int64 lengths of the runs in order; the first run is of zeros.
+        (N,) int64 lengths of the runs in order; the runs are alternately of zeros and of ones, the first one of zeros.
 
     Raises:
         ValueError: the string is malformed.

@@ -1,6 +1,6 @@
 """Scenes as data: a `SceneRecord` describes one sample completely, and is stored with the sample.
 
-A record is a pure function of (config, seed, index). Nothing in it depends on the patch.
+A record is a pure function of (config, seed, index). No part of it depends on the patch.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ Quat = tuple[float, float, float, float]
 Role = Literal["ego", "npc", "parked", "carrier", "pedestrian"]
 
 POSE_DIGITS = 6
-"""Decimals of positions in metres. Quaternions have nine; records are then equal across machines."""
+"""Number of decimals to which positions in metres are rounded. Quaternions have nine. Rounded records are equal
+across machines.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,13 +38,13 @@ class Pose:
 
     @staticmethod
     def from_transform(transform: RigidTransform) -> Pose:
-        """The pose of a transform, rounded to the precision of records."""
+        """The pose that equals a transform, rounded to the precision of records."""
         position = tuple(round(float(v), POSE_DIGITS) + 0.0 for v in transform.translation_m)
         quat = tuple(round(float(v), 9) + 0.0 for v in _quat_from_rotation(transform.rotation))
         return Pose(position_m=(position[0], position[1], position[2]), quat_wxyz=(quat[0], quat[1], quat[2], quat[3]))
 
     def transform(self, dst: str, src: str) -> RigidTransform:
-        """The transform `dst_from_src` between frames of these names."""
+        """The pose as a rigid transform `dst_from_src`, with the given frame names."""
         w, x, y, z = np.asarray(self.quat_wxyz) / np.linalg.norm(self.quat_wxyz)
         rotation = [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -73,17 +75,21 @@ def _quat_from_rotation(rotation: np.ndarray) -> np.ndarray:
 
 
 NIGHT_DEG = 10.0
-"""Degrees below the horizon at which the sun's light is gone from the sky."""
+"""Depth of the sun below the horizon, in degrees, from which on the sky has no sunlight."""
 
 RAIN_COVER, RAIN_COVER_GROWTH = 0.82, 0.18
-"""Share of the sky under clouds in the lightest rain, and by how much the heaviest rain has more."""
+"""Share of the sky under clouds in the lightest rain, and the amount by which the share is larger in the heaviest
+rain.
+"""
 
 RAIN_EXPOSURE_COVER = 0.8
-"""Share of clouds that the camera's exposure is set for in any rain."""
+"""Smallest share of the sky under clouds, 0..1, for which the camera's exposure is set in any rain."""
 
 
 MOST = 1_000_000
-"""Upper limit of amounts that are not percentages; CARLA has no limit, but 32-bit numbers in pictures do."""
+"""Upper limit of weather parameters that are not percentages. CARLA has no limit, but 32-bit numbers in pictures
+have.
+"""
 
 
 def _bounded(default: float, low: int, high: int, unit: str = "") -> Any:
@@ -136,34 +142,38 @@ class Weather:
 
     @property
     def night(self) -> float:
-        """0 while the sun is up, 1 once its light is gone from the sky, 10 degrees below the horizon."""
+        """Darkness of the sky, 0..1: 0 while the sun is above the horizon, 1 from 10 degrees below the horizon."""
         depth = min(max(-self.sun_altitude_deg / NIGHT_DEG, 0.0), 1.0)
         return depth * depth * (3 - 2 * depth)
 
     @property
     def cloud_cover(self) -> float:
-        """Share of the sky under clouds, 0..1. Rain falls from clouds, also where `cloudiness` has none."""
+        """Share of the sky under clouds, 0..1. In rain the share is at least that of the lightest rain, even if
+        `cloudiness` is 0.
+        """
         if self.precipitation <= 0:
             return self.cloudiness / 100
         return max(self.cloudiness / 100, RAIN_COVER + RAIN_COVER_GROWTH * (self.precipitation / 100))
 
     @property
     def exposure_cover(self) -> float:
-        """Share of clouds that the camera's exposure is set for, 0..1; at least `RAIN_EXPOSURE_COVER` in any rain."""
+        """Share of the sky under clouds, 0..1, for which the camera's exposure is set; at least
+        `RAIN_EXPOSURE_COVER` in any rain.
+        """
         return max(self.cloudiness, 100 * RAIN_EXPOSURE_COVER if self.precipitation > 0 else 0.0) / 100
 
 
 WEATHER_PARAMETERS: dict[str, dataclasses.Field[Any]] = {
     field.name: field for field in dataclasses.fields(Weather) if field.metadata
 }
-"""The numbers of a weather by name, with default and range."""
+"""The numeric parameters of a weather by name, as dataclass fields with default and range."""
 
 
 def check_weather(name: str, value: float) -> None:
-    """Refuses a number of a weather out of its range.
+    """Checks that a weather parameter lies in its range.
 
     Raises:
-        FieldError: names the parameter, its range and the value.
+        FieldError: the value is out of range; the error names the parameter, its range and the value.
     """
     low, high, unit = (WEATHER_PARAMETERS[name].metadata[key] for key in ("low", "high", "unit"))
     if not low <= value <= high:
@@ -175,16 +185,16 @@ def check_weather(name: str, value: float) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActorRecord:
-    """One vehicle or pedestrian.
+    """One vehicle or pedestrian of a scene.
 
     Attributes:
         id: id of the actor, at least 1, the same in all frames of a sequence.
-        asset: name of its MJCF.
+        asset: name of the actor's MJCF.
         role: `ego` carries the cameras, `carrier` carries a surface; `npc` drives, `parked` stands, `pedestrian` walks.
-        world_from_actor: its pose; its frame is x forward, y left, z up, with the origin on the ground in the middle of
-            the footprint.
+        world_from_actor: pose; the actor's frame is x forward, y left, z up, with the origin on the ground in the
+            middle of the footprint.
         velocity_world_mps: linear velocity in the world, m/s.
-        paint_rgb: linear albedo, 0..1, of its `.paint` geoms; None for the asset's colours.
+        paint_rgb: linear albedo, 0..1, of the actor's `.paint` geoms; None for the asset's colours.
     """
 
     id: int
@@ -197,14 +207,14 @@ class ActorRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurfaceRecord:
-    """One rectangle that a patch is shown on.
+    """One surface of a scene: a rectangle on a board or a vehicle that shows a patch.
 
     Attributes:
-        name: `surface_0`, `surface_1`, …: takes `patch_0`, `patch_1`, ….
+        name: `surface_0`, `surface_1`, …; the surface shows `patch_0`, `patch_1`, ….
         asset: name of the MJCF of its board, or of its actor.
         actor_id: the actor whose body is its parent, or None for the world.
-        parent_from_surface: frame x right, y down as its viewer sees it, z into the board, origin in the middle of
-            the face.
+        parent_from_surface: pose; the surface's frame is x right, y down for a viewer in front, z into the board,
+            origin in the middle of the face.
         width_m, height_m: size of the face.
     """
 
@@ -218,10 +228,11 @@ class SurfaceRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LensRecord:
-    """Radial distortion of one camera. With the camera's size and pinhole it determines how pixels move.
+    """Radial distortion of one camera's lens. Together with the camera's size and pinhole it determines how pixels
+    move.
 
     Attributes:
-        k1, k2: a pinhole's (x, y), in focal lengths, appears at (x, y) (1 + k1 r² + k2 r⁴).
+        k1, k2: a point at (x, y) in the pinhole's picture, in focal lengths, appears at (x, y) (1 + k1 r² + k2 r⁴).
         focal_px: horizontal focal length of the distorted picture; longer than the pinhole's where the corners would
             otherwise be empty.
     """
@@ -233,13 +244,13 @@ class LensRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraRecord:
-    """One camera of one sample: a pinhole without skew, perhaps with a lens before it.
+    """One camera of one sample: a pinhole without skew, optionally with a lens.
 
     Attributes:
-        name: key of its view: `left`, `right`, ….
+        name: key of the camera's view: `left`, `right`, ….
         width_px, height_px: size of the picture.
         focal_px: horizontal focal length fx of the pinhole.
-        world_from_camera: its pose; camera axes are x right, y down, z forward.
+        world_from_camera: pose; camera axes are x right, y down, z forward.
         lens: distortion of colour, depth and ids; None for none. Projections with `intrinsics` are the pinhole's.
         focal_y_px: vertical focal length fy; None for the same as `focal_px`.
         principal_px: principal point (cx, cy) in index pixels; None for the middle of the picture.
@@ -256,12 +267,12 @@ class CameraRecord:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """The pinhole, in index pixels."""
+        """The intrinsics of the camera's pinhole, in index pixels; the lens is not included."""
         return Intrinsics(self.width_px, self.height_px, self.focal_px, self.focal_y_px, self.principal_px)
 
     @property
     def world_from_camera_transform(self) -> RigidTransform:
-        """The camera's pose as a transform."""
+        """The camera's pose as a rigid transform from the camera's frame to the world."""
         return self.world_from_camera.transform("world", "camera")
 
 
@@ -301,10 +312,10 @@ class SceneRecord:
         return next(actor for actor in self.actors if actor.role == "ego")
 
     def actor(self, actor_id: int) -> ActorRecord:
-        """The actor with an id.
+        """The record of the actor with the id `actor_id`.
 
         Raises:
-            KeyError: no actor has it.
+            KeyError: no actor has this id.
         """
         for actor in self.actors:
             if actor.id == actor_id:
@@ -312,10 +323,10 @@ class SceneRecord:
         raise KeyError(actor_id)
 
     def camera(self, name: str) -> CameraRecord:
-        """The camera with a name.
+        """The record of the camera with the name `name`.
 
         Raises:
-            KeyError: no camera has it.
+            KeyError: no camera has this name.
         """
         for camera in self.cameras:
             if camera.name == name:
@@ -323,7 +334,7 @@ class SceneRecord:
         raise KeyError(name)
 
     def world_from_surface(self, surface: SurfaceRecord) -> RigidTransform:
-        """The pose of a surface in the world, on its board or on its actor."""
+        """The pose of a surface in the world, computed from its pose on its board or on its actor."""
         if surface.actor_id is None:
             return surface.parent_from_surface.transform("world", surface.name)
         world_from_actor = self.actor(surface.actor_id).world_from_actor.transform("world", "actor")

@@ -1,4 +1,4 @@
-"""Frozen dataclasses to JSON and back, by the declared types of their fields."""
+"""Converts frozen dataclasses to JSON and back, according to the declared types of their fields."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get
 from gear.values.errors import FieldError
 
 Json = Any
-"""Whatever `json.loads` gives: None, bool, int, float, str, list, dict with string keys."""
+"""Type of a JSON value as `json.loads` returns it: None, bool, int, float, str, list, or dict with string keys."""
 
 T = TypeVar("T")
 
 PLACES = {"places": True}
-"""Key in the metadata of a field that holds file, line and column of each given value. The config reader fills this
-field; it is no key of the config and is not written.
+"""Metadata of the field of a config that stores the position (file, line and column) of each value in the config
+file. The config reader fills this field; it is no key of the config and is not written.
 """
 
 SHOWN = 60
-"""Largest number of characters of a wrong value in an error message."""
+"""Largest number of characters of an invalid value that an error message quotes."""
 
 
 def to_json(value: Any) -> Json:
-    """A value as JSON: dataclasses become dicts, tuples become lists.
+    """Converts a value to JSON: dataclasses become dicts, tuples become lists.
 
     Raises:
         TypeError: a value has no JSON form.
@@ -42,26 +42,28 @@ def to_json(value: Any) -> Json:
 
 
 def is_places_field(field: dataclasses.Field[Any]) -> bool:
-    """Whether a field holds the places of the others, and is no key of the config; see `PLACES`."""
+    """Whether a field stores the positions (file, line, column) of the other fields' values in a config file; such
+    a field is no key of the config (`PLACES`).
+    """
     return PLACES.items() <= field.metadata.items()
 
 
 @cache
 def type_hints(cls: Any) -> dict[str, Any]:
-    """The resolved annotations of a class, by field."""
+    """The types of a class's attributes by name, with text annotations resolved."""
     return get_type_hints(cls)
 
 
 def from_json(kind: type[T], value: Json, where: str = "") -> T:
-    """Reads JSON into a declared type.
+    """Converts a JSON value to a declared type, such as a dataclass.
 
     Args:
         kind: a dataclass, or any type that its fields may have.
-        value: the JSON.
+        value: the JSON value.
         where: key of `value`, for errors.
 
     Raises:
-        FieldError: a key is unknown or missing, or a value has another type; names the key.
+        FieldError: a key is unknown or missing, or a value has another type; the error names the key.
     """
     return cast(T, _read(kind, value, where))
 

@@ -1,4 +1,4 @@
-"""A vehicle mix: factors on the usual frequencies of some kinds of vehicles."""
+"""Vehicle mixes: factors, by kind of vehicle, on the usual frequencies of vehicles."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ MAX_FACTOR = 1000.0
 
 
 def check_mix(name: str, mix: Mapping[str, float]) -> None:
-    """Checks that a mix names kinds of vehicles and leaves at least one kind.
+    """Checks that a vehicle mix names known kinds of vehicles and that at least one kind remains.
 
     Args:
         name: the field that holds the mix, for the error.
-        mix: factors by kind; 0 means never.
+        mix: factors on the usual frequencies, by kind of vehicle; 0 means never.
 
     Raises:
         FieldError: a kind is unknown, a factor is out of range, or every kind has the factor 0.
@@ -30,5 +30,7 @@ def check_mix(name: str, mix: Mapping[str, float]) -> None:
 
 
 def product_of(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
-    """The mix that applies both mixes: the product of their factors, for every kind that one of them names."""
+    """Combines two vehicle mixes (factors on frequencies, by kind): the products of their factors, for every kind
+    that either mix names.
+    """
     return {kind: first.get(kind, 1.0) * second.get(kind, 1.0) for kind in VEHICLES if kind in {*first, *second}}
