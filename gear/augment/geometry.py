@@ -17,7 +17,7 @@ from gear.values.ground_truth import BoxPx
 
 SampleT = TypeVar("SampleT", bound=Sample)
 PADDING_LEVEL = 114
-"""Grey level, 0..255, with which a window is padded where it extends beyond the picture."""
+"""Grey level, 0..255, of the padding in the part of a window that lies beyond the picture."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,7 +174,7 @@ def clipped(box_px: BoxPx, frame_px: BoxPx) -> BoxPx:
 
 
 def box_area(box_px: BoxPx) -> float:
-    """Area of a box in square pixels; 0 if its sides are in the wrong order."""
+    """Area of a box in square pixels; 0 if right is left of left, or bottom above top."""
     left, top, right, bottom = box_px
     return max(0.0, right - left) * max(0.0, bottom - top)
 

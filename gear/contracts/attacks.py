@@ -79,7 +79,7 @@ class Monitor(Protocol):
     """
 
     def resume(self) -> State | None:
-        """The last state that an interrupted run of the same attack reported; None for a new run."""
+        """The last state that an interrupted run of this attack reported; None for a new run."""
         ...
 
     def step(
@@ -104,7 +104,9 @@ class Monitor(Protocol):
 
 
 class Attack(Protocol):
-    """Optimises patches against a model. `WithObjective`, `WithTaskOptions` and `WithInputFiles` are optional."""
+    """Optimises patches against a model. An attack may also implement `WithObjective`, `WithTaskOptions` and
+    `WithInputFiles`.
+    """
 
     def optimise(
         self,

@@ -58,7 +58,7 @@ class KeepsPredictions(Protocol):
 
 @runtime_checkable
 class Maskable(Protocol):
-    """A task whose ground truth can be removed from a part of the picture, such as the patch."""
+    """A task that can remove ground truth from a part of the picture, such as the patch."""
 
     def without(self, sample: Any, masks: Masks) -> Any:
         """The sample without ground truth where the masks are True; the task's evaluator ignores predictions

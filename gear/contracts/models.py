@@ -1,7 +1,7 @@
 """The protocol of models. torch is imported for type checkers only.
 
-Without targets, `forward` returns outputs whose names are the same for every network of a task, so that losses and
-attacks work with any network. Semantic segmentation: `logits` (B, C, H, W) at the picture's size, C = 19 Cityscapes
+Without targets, `forward` returns outputs whose names are the same for every network of a task. Losses and attacks
+therefore work with any network. Semantic segmentation: `logits` (B, C, H, W) at the picture's size, C = 19 Cityscapes
 train ids or 34 label ids. Depth: `depth_m` (B, H, W) in metres at the picture's size. Detectors and stereo networks
 return the raw outputs of their heads by name, batch first; attacks maximise their losses.
 """
@@ -67,7 +67,9 @@ class BatchPredictor(Protocol):
     """A model that predicts several samples at once, which is faster on most machines."""
 
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[Any]:
-        """The predictions of `Model.predict` for each sample, in order; pictures may differ in size."""
+        """The prediction for each sample, in order; each equals the result of `Model.predict`. Pictures may differ
+        in size.
+        """
         ...
 
 

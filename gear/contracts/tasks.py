@@ -38,7 +38,7 @@ PredictionT_contra = TypeVar("PredictionT_contra", contravariant=True)
 
 NO_PATCH, RANDOM_PATCH = "none", "random"
 CONTROLS = (NO_PATCH, RANDOM_PATCH)
-"""Labels of the control datasets with which patches are compared: without a patch, and with random noise."""
+"""Labels of the control datasets with which patches are compared: without a patch, and with a random patch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,9 +128,10 @@ class Evaluator(Protocol[SampleT_contra, PredictionT_contra]):
 
 
 class Task(Protocol[SampleT, PredictionT]):
-    """A dataset format with its ground truth. A task holds its options and no state between calls.
+    """A dataset format with its ground truth. A task object holds its options and no state between calls.
 
-    `encode` and `finalise` return bytes and write nothing: `gear.dataset` writes, hashes and resumes.
+    `encode` and `finalise` return bytes and write no files; `gear.dataset` writes and hashes the files and resumes
+    interrupted runs.
     """
 
     def rig(self) -> Rig:

@@ -1,9 +1,9 @@
 """A laser scan from four depth views around one point, in the pattern of the Velodyne HDL-64E at 10 Hz.
 
-The scanner has 64 beams from 2.0 degrees above to 24.9 degrees below the horizon, one firing per 0.1729 degrees of
-azimuth, and a range of up to 120 m (HDL-64E S2 manual; Geiger et al., Vision meets Robotics: The KITTI Dataset, 2013).
-Each beam takes the depth of the pixel that it hits, and its point lies on the ray through the middle of that pixel. The
-point is therefore exact; its direction differs from that of the beam by at most half a pixel, 0.04 degrees.
+The scanner has 64 beams from 2.0 degrees above to 24.9 degrees below the horizon. Each beam fires once per 0.1729
+degrees of azimuth and measures up to 120 m (HDL-64E S2 manual; Geiger et al., Vision meets Robotics: The KITTI Dataset,
+2013). Each beam takes the depth of the pixel that it hits, and its point lies on the ray through the middle of that
+pixel. The point is therefore exact; its direction differs from that of the beam by at most half a pixel, 0.04 degrees.
 """
 
 from __future__ import annotations

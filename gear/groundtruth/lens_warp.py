@@ -58,8 +58,8 @@ class LensWarp:
         return (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
 
     def mask(self, mask: Mask, window: Window, wanted: Window) -> Mask:
-        """Warps a silhouette from the pinhole's to the distorted picture by nearest neighbour, as depth and ids
-        are warped.
+        """Warps a silhouette from the pinhole's to the distorted picture by nearest neighbour, in the same way as
+        depth and ids.
 
         Args:
             mask: (h, w) bool silhouette of the pinhole camera.

@@ -81,7 +81,7 @@ def bounds(triangles_px: Array) -> Window:
 
 
 def fill(triangles_px: Array, window: Window) -> Mask:
-    """Rasterises the silhouette of (T, 3, 2) triangles inside a window.
+    """Rasterises the silhouette of (T, 3, 2) triangles inside a window, as a mask.
 
     Args:
         triangles_px: corners in index pixels.

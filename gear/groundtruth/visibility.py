@@ -13,8 +13,8 @@ Preset = Literal["kitti", "coco", "carla_gear"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VisibilityLimits:
-    """Limits that an object must reach to be labelled. An object below them is a region to ignore: neither detecting
-    nor missing it counts as an error.
+    """Limits that an object must reach to become a label. Below them the object becomes a region to ignore:
+    neither detecting nor missing it counts as an error.
 
     Attributes:
         max_distance_m: from the camera to the middle of the object's 3D box; None for any distance.

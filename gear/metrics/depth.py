@@ -61,9 +61,10 @@ class DepthTruth(Protocol):
 class DepthEvaluator:
     """Evaluator of monocular depth: gathers the metrics of every picture and averages them.
 
-    Metrics without a prefix are those of KITTI's devkit: over all pixels whose ground truth its 16-bit pictures can
-    hold (up to 256 m), with predictions clipped to the range of these pictures. Metrics with the prefix `eigen_` use
-    ground truth between 1 mm and `max_depth_m` inside the crop, with predictions clipped to the same range.
+    Metrics without a prefix are the metrics of KITTI's devkit. They count the pixels whose true depth fits into the
+    devkit's 16-bit pictures (up to 256 m); predictions are clipped to the range of these pictures. Metrics with the
+    prefix `eigen_` count the pixels inside the crop with a true depth between 1 mm and `max_depth_m`; predictions are
+    clipped to this range.
     """
 
     _wants_devkit = True
@@ -129,8 +130,8 @@ class DepthEvaluator:
         return {name: float(np.mean(np.sort(values))) if values else float("nan") for name, values in known.items()}
 
     def resampled(self, draws: Draws) -> Spread:
-        """The metrics of R resampled datasets, (R,) each: means over the pictures whose indices row r of `draws`
-        lists.
+        """The metrics of R resampled datasets, (R,) each. Row r of `draws` lists the picture indices of dataset r,
+        over which the mean is taken.
         """
         values = {name: np.array(self.metrics.get(name, []), np.float64) for name in self._names()}
         return {name: _known_means(one[draws]) for name, one in values.items() if len(one)}
@@ -163,12 +164,14 @@ class NearDepth(DepthEvaluator):
         return _renamed(super().update(sample, prediction))
 
     def result(self) -> Mapping[str, float]:
-        """Means over pictures of `d1`, `rmse_m`, `d2`, `d3`, `abs_rel`, `sq_rel`, `rmse_log`, `log10` and `silog`."""
+        """The metrics by name: `d1`, `rmse_m`, `d2`, `d3`, `abs_rel`, `sq_rel`, `rmse_log`, `log10` and `silog`,
+        as means over pictures.
+        """
         return _renamed(super().result())
 
     def resampled(self, draws: Draws) -> Spread:
-        """The metrics of R resampled datasets, (R,) each, with the names of `result`: means over the pictures
-        whose indices row r of `draws` lists.
+        """The metrics of `result` for R resampled datasets, (R,) each. Row r of `draws` lists the picture indices
+        of dataset r, over which the mean is taken.
         """
         return _renamed(super().resampled(draws))
 

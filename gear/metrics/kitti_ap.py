@@ -1,10 +1,10 @@
 """KITTI's object evaluation: average precision of 2D boxes, of footprints and of 3D boxes, and orientation
 similarity.
 
-The evaluation follows the rules of the devkit. It uses 41 score thresholds. Labels of similar classes and labels beyond
-the difficulty are ignored, and detections in DontCare regions are no false alarms. `r11` is the mean precision over 11
-recalls; `r40` is the mean over 40 recalls, which replaced `r11` in 2019. With fewer than 41 labels of a class a perfect
-detector stays below 1 in both means, because fewer recall steps exist. This is the benchmark's own definition;
+The evaluation follows the rules of the devkit. It uses up to 41 score thresholds. Labels of similar classes and labels
+beyond the difficulty are ignored, and detections in DontCare regions are no false alarms. `r11` is the mean precision
+over 11 recalls; `r40` is the mean over 40 recalls, which replaced `r11` in 2019. With fewer than 41 labels of a class a
+perfect detector stays below 1 in both means, because fewer recall steps exist. This is the benchmark's own definition;
 `ceilings` gives the largest possible values.
 """
 

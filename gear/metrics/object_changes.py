@@ -1,5 +1,5 @@
-"""The effect of a patch on the objects of a picture: the picture is compared, object by object, with its twin, the
-same picture with another patch or none.
+"""The effect of a patch on the objects of a picture. The picture is compared, object by object, with its twin: the
+same picture with another patch or without one.
 
 Twins contain the same objects, which are identified by id and class. Only objects that are found in the twin are
 compared. An object that is missed in the picture is `hidden`; an object that is detected wrongly there is
@@ -54,7 +54,7 @@ class ObjectChange:
 
 
 def found_in_twin(now: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectOutcome, ...]:
-    """The outcomes in the picture `now` for the objects that are found in `twin`, the same picture with another
+    """The outcomes, in the picture `now`, of the objects that are found in `twin`, the same picture with another
     patch.
     """
     found = {(thing.object_id, thing.label) for thing in twin.objects if thing.state == "found"}

@@ -37,8 +37,8 @@ from gear.values.picture_objects import (
 )
 
 LEAST_OVERLAP = 0.1
-"""IoU from which a detection of the object's class is attributed to the object, as `moved` where the IoU stays
-below 0.5.
+"""Smallest IoU at which a detection of the object's class explains the object. Below an IoU of 0.5 the object
+counts as `moved`.
 """
 
 

@@ -1,4 +1,4 @@
-"""Distances of boxes from the visible pixels of the patches in a picture."""
+"""Measures the distances of boxes from the visible pixels of the patches in a picture."""
 
 from __future__ import annotations
 

@@ -1,1 +1,3 @@
-"""Networks: torch modules with the parameter names of the published weights, their losses, and weights files."""
+"""gear's networks: torch modules with the parameter names of the published weights, their losses, and their
+weights files.
+"""

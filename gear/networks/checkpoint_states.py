@@ -31,7 +31,7 @@ prefix.
 """
 
 LEAST_SHARE = 0.2
-"""A prefix is tried if at least this share of an entry's keys starts with it."""
+"""Smallest share of an entry's keys that must start with a prefix; only such prefixes are tried."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -49,7 +49,7 @@ class Network(nn.Module, ABC):
         self.eval()
 
     def module(self) -> nn.Module:
-        """The graph; its state dict is what weights files store."""
+        """The torch module of the network; weights files store its state dict."""
         return self.graph
 
     def forward(self, views: Mapping[str, Tensor], targets: Sequence[Any] | None = None) -> Mapping[str, Tensor]:
@@ -169,7 +169,7 @@ def as_batch(
 ) -> dict[str, Tensor]:
     """Stacks pictures of one size into the input of `Model.forward`: (B, 3, H, W) float32 in 0..1 by camera name.
 
-    If a device is given, the pictures are copied to it as bytes and converted to float32 there.
+    If `device` is not None, the pictures are copied to this device as bytes and converted to float32 there.
     """
     stacked = {name: _channels_first([sample[name] for sample in samples]) for name in views}
     return {name: torch.from_numpy(one).to(device).float().div_(255) for name, one in stacked.items()}

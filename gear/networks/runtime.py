@@ -62,7 +62,7 @@ def is_quick_in_half(device: torch.device) -> bool:
 
 
 def autocast(device: torch.device, precision: Literal["auto", "float32", "bfloat16"]) -> torch.autocast:
-    """A context in which a graph runs in the given precision; `auto` leaves the choice to torch."""
+    """A context in which a network runs in the precision `precision`; `auto` leaves the choice to torch."""
     return torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16")
 
 

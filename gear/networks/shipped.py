@@ -32,11 +32,13 @@ class WeightsFile:
     """Header of a safetensors file: shapes of the tensors, and metadata.
 
     gear writes these metadata, as far as they are known: `model`, `task`, `gear` (version), `source` and
-    `source_sha256` (of a published file), `licence`, `command`, `seed`, `look_hash` (hash of the appearance of the
-    training pictures) and `measured_look_hash` (the same for the pictures on which the metrics were measured, if it
-    differs). These are stored as JSON: `data` (training data), `metrics` (values by name), `intervals` (their 95 %
-    bounds), `options` (of the model, such as `input_scale`), `look` (`gear.measuring.appearance_hash.Look`) and
-    `averaged` (hashes of the two weights files that were averaged). `look` is an older name of the appearance.
+    `source_sha256` (of a published file), `licence`, `command` and `seed`. `look_hash` identifies the appearance
+    (assets, light and renderer) of the training pictures, and `measured_look_hash` that of the pictures on which the
+    metrics were measured, if it differs.
+
+    These values are stored as JSON: `data` (training data), `metrics` (values by name), `intervals` (their 95 %
+    bounds), `options` (of the model, such as `input_scale`), `look` (the appearance,
+    `gear.measuring.appearance_hash.Look`) and `averaged` (hashes of the two weights files that were averaged).
 
     Attributes:
         path: path of the file.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 class GearError(Exception):
-    """An error that the user can correct. Its text says in one line what is wrong, where, and what to do."""
+    """An error that the user can correct. Its text states in one line what is wrong, where, and what to do."""
 
 
 class FieldError(ValueError):

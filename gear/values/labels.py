@@ -21,7 +21,7 @@ class Label:
 
     Attributes:
         code: small number of the label inside gear's label maps; 0 is the sky.
-        name: the word that the default class of a geom starts with in MJCF.
+        name: the first word in the name of a geom's default class in MJCF.
         cityscapes_id: Cityscapes label id (0..33).
         coco_id: COCO category id (1..90), or None where COCO has no such category.
         kitti_type: KITTI type of an actor of this class, or None.
@@ -38,14 +38,14 @@ class Label:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleKind(Label):
-    """The label of a kind of vehicle, with what traffic and light need to know of the kind.
+    """The label of a kind of vehicle, with the properties that traffic and light need.
 
     Attributes:
         weight: how often one asset of the kind is drawn, relative to one car; the asset's own `actor.weight` multiplies
             it.
         mass_kg: mass of its body in the placement model. Only the shape of the inertia matters for how it settles.
         headlamps: number of headlamps, 0 to 2; two stand apart, one stands in the middle.
-        is_two_wheeler: whether it rides at the right edge of its lane and is never parked in a bay.
+        is_two_wheeler: whether the vehicle rides at the right edge of its lane and is never parked in a bay.
         max_speed_mps: the highest speed that is drawn for it. A kind slower than traffic on motorways keeps off them.
         cruise_mps: the highest speed at which it drives through a sequence.
         has_lit_interior: whether its windows show a lit interior at night.
@@ -105,7 +105,7 @@ LABELS: tuple[Label, ...] = (
 """All labels, in the order of their codes."""
 
 VEHICLES: dict[str, VehicleKind] = {label.name: label for label in LABELS if isinstance(label, VehicleKind)}
-"""Kinds of vehicles by name, in the order of their codes."""
+"""Vehicle labels (`VehicleKind`) by name, in the order of their codes."""
 
 LABEL_BY_NAME: dict[str, Label] = {label.name: label for label in LABELS}
 """Labels by name. In MJCF, the name of a geom's default class starts with this name."""

@@ -1,4 +1,6 @@
-"""Objects and detections of one picture, and the outcome of each of them."""
+"""Objects and detections of one picture, and their outcomes: which objects are detected, and which detections are
+wrong.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """AdaBins (monocular depth with adaptive bins) as a gear network.
 
-The position encoding of AdaBins' transformer has room for at most 500 patches of 32 x 32 pixels, and the transformer
+The position encoding of AdaBins' transformer has room for at most 500 patches of 32 x 32 pixels. The transformer also
 needs at least one token more than it has queries. A picture with more patches (2048 x 1024 has 2048) is reduced, a
-picture with fewer patches is enlarged, both at their aspect ratio. The predicted depth is resized back. KITTI's 1216 x
+picture with fewer patches is enlarged; the aspect ratio is kept. The predicted depth is resized back. KITTI's 1216 x
 352 has 418 patches and is not resized.
 """
 
@@ -36,9 +36,10 @@ code.
 
 
 class AdaBins(DepthNetwork):
-    """AdaBins (Bhat et al., CVPR 2021).
+    """AdaBins (Bhat et al., CVPR 2021) as a gear network: monocular depth with bins that are chosen for each
+    picture.
 
-    Its outputs are `depth_m` (B, H, W) and `bin_centres_m` (B, bins), both in metres.
+    Its outputs are `depth_m` (B, H, W) and `bin_centres_m` (B, bins); all in metres.
     """
 
     options: AdaBinsOptions

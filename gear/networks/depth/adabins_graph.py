@@ -126,7 +126,7 @@ class Decoder(nn.Module):
 
 class Up(nn.Module):
     """One upsampling step: the coarse map is interpolated to the size of the encoder's map, then two convolutions
-    process both.
+    process both maps.
     """
 
     def __init__(self, inputs: int, outputs: int) -> None:
@@ -186,14 +186,14 @@ class PatchTransformer(nn.Module):
 
 
 def patches(height: int, width: int) -> int:
-    """Number of transformer tokens for a picture of this height and width."""
+    """Number of transformer tokens (patches) for a picture of this height and width in pixels."""
     rows, columns = (-(-side // 2) // PATCH_PX for side in (height, width))
     return rows * columns
 
 
 def fitting(height: int, width: int, least: int, most: int = MOST_PATCHES) -> tuple[int, int]:
-    """The height and width nearest to those of a picture, at its aspect ratio, for which `patches` lies between
-    `least` and `most`.
+    """The picture size nearest to `height` x `width`, at the same aspect ratio, whose number of transformer tokens
+    lies between `least` and `most`.
 
     Args:
         height, width: size of the picture.

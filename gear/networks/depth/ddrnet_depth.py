@@ -22,7 +22,9 @@ it.
 """
 
 RANGE_M = (0.05, 1000.0)
-"""Range to which predicted depths are clamped, in metres, so that all numbers are finite."""
+"""Smallest and largest predicted depth in metres; predictions are clamped to this range, so all losses and metrics
+are finite.
+"""
 
 LAST_STD = 0.05
 
@@ -31,9 +33,9 @@ RMS_UNIT_M = 20.0
 
 
 def ddrnet_depth_graph() -> DDRNet23Slim:
-    """DDRNet-23-slim with one output channel and random weights.
+    """Builds DDRNet-23-slim with one output channel and random weights.
 
-    The last layer has small weights, so that predictions are near 10 m at the start of training.
+    The last layer has small weights, so predictions are near 10 m at the start of training.
     """
     graph = DDRNet23Slim(1, auxiliary=False)
     nn.init.normal_(graph.final_layer.conv2.weight, std=LAST_STD)

@@ -39,9 +39,9 @@ their outputs are the keys.
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Renames the keys of published weights to those of transformers.
+    """Renames the keys of GLPDepth's published weights to the parameter names of the GLPN in transformers.
 
-    Keys that already have transformers' names, and unknown keys, are kept.
+    Keys that already have transformers' names, and unknown keys, are not changed.
     """
     renamed: dict[str, Tensor] = {}
     for key, tensor in state.items():

@@ -34,8 +34,8 @@ def silog(
     """Scale-invariant logarithmic error: scale * sqrt(mean(g^2) - balance * mean(g)^2).
 
     g is the difference of the logarithms of predicted and true depth. The formula is the square root of equation 3 in
-    Eigen et al., NeurIPS 2014. GLPDepth (arXiv 2201.07436, equation 3) uses balance 0.5; AdaBins (CVPR 2021, equation
-    4) uses balance 0.85 and scale 10, see `adabins_silog`.
+    Eigen et al., NeurIPS 2014. GLPDepth (arXiv 2201.07436, equation 3) uses balance 0.5. AdaBins (CVPR 2021, equation
+    4) uses balance 0.85 and scale 10; `adabins_silog` computes this variant.
 
     Args:
         predicted_m: (B, H, W) predicted depth, above 0.

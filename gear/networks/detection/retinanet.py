@@ -27,7 +27,7 @@ LITE_TAPS = (1, 2, 4, 6)
 
 FIRST_STRIDE_PX = 8
 LEVELS = 5
-"""Number of feature maps, at 1/8 to 1/128 of the graph's input."""
+"""Number of feature maps of the pyramid, at 1/8 to 1/128 of the graph's input."""
 
 
 class RetinaNetDetector(Detector):
@@ -39,8 +39,8 @@ class RetinaNetDetector(Detector):
     """
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The outputs by name: those of the classification and the box head, and the anchors in pixels of the
-        picture.
+        """The outputs by name: outputs of the classification head and of the box head, and the anchors in pixels
+        of the picture.
         """
         outputs = self.run_for_losses(pictures)
         anchors_px = outputs[ANCHORS] / self.shrinkage(picture_size(outputs))

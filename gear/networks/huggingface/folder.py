@@ -1,4 +1,6 @@
-"""Opens networks of transformers from a folder, without network access, pickles, or code from the folder."""
+"""Opens networks of transformers from a local folder. The internet is not accessed, and neither pickles nor code
+in the folder are run.
+"""
 
 from __future__ import annotations
 

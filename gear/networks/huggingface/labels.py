@@ -1,4 +1,4 @@
-"""Maps class names of other data sets to those of Cityscapes and COCO."""
+"""Maps class names of other data sets to the class names of Cityscapes and COCO."""
 
 from __future__ import annotations
 

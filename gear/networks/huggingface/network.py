@@ -163,7 +163,7 @@ class FolderSegmenter(FolderNetwork):
         return logits
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The mean cross-entropy over the pixels whose true class the network has, by name."""
+        """The loss by name: the mean cross-entropy over the pixels whose true class the network has."""
         ids = train_ids(targets, self.device)
         known = torch.tensor([train_id for train_id, indexes in enumerate(self._indexes) if indexes])
         is_known = torch.isin(ids, known.to(self.device))
@@ -206,8 +206,8 @@ class FolderDepth(FolderNetwork):
         return {DEPTH: said.clamp(min=NEAREST_M)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The mean absolute difference between the logarithms of predicted and true depth, over the pixels with
-        ground truth.
+        """The loss by name: the mean absolute difference between the logarithms of predicted and true depth, over
+        the pixels with ground truth.
         """
         truth = torch.from_numpy(np.stack([sample.depth_m for sample in targets])).to(self.device)
         is_known = torch.isfinite(truth)

@@ -1,4 +1,4 @@
-"""Options of networks of Hugging Face. The module does not import torch, so that plugin specs load quickly."""
+"""Options of networks of Hugging Face. The module does not import torch, so plugin specs load quickly."""
 
 from __future__ import annotations
 

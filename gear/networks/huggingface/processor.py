@@ -1,4 +1,4 @@
-"""The steps of a Hugging Face image processor in torch, so that gradients can pass through them."""
+"""The steps of a Hugging Face image processor, written in torch; therefore gradients pass through them."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def upsample(features: Tensor, size: torch.Size) -> Tensor:
 
 
 class SpatialPath(nn.Module):
-    """Four convolutions that give 128 channels at 1/8 of the picture's sides."""
+    """The spatial path of BiSeNet: four convolutions that compute 128 channels at 1/8 of the picture's sides."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -134,8 +134,8 @@ class BiSeNetX39(nn.Module):
             auxiliary: whether the maps of the training heads are returned as well.
 
         Returns:
-            Maps (B, classes, h, w): the main head's at 1/8 of the picture's sides, then those of the training heads at
-            1/16 and 1/8.
+            Maps (B, classes, h, w): the map of the main head at 1/8 of the picture's sides, then the maps of the
+            training heads at 1/16 and 1/8.
         """
         spatial = self.spatial_path(pictures)
         eighth, sixteenth, thirty_second = self.context_path(pictures)

@@ -72,7 +72,7 @@ class DDRNet23Slim(nn.Module):
             auxiliary: whether the map of the second head is returned as well.
 
         Returns:
-            Maps (B, channels, H / 8, W / 8): the main head's, then the second head's.
+            Maps (B, channels, H / 8, W / 8): the map of the main head, then the map of the second head.
         """
         relu = functional.relu
         eighth = self.layer2(relu(self.layer1(self.conv1(pictures))))

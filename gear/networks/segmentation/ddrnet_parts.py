@@ -86,7 +86,7 @@ def stage(inputs: int, planes: int, stride: int = 1) -> nn.Sequential:
 
 
 def pre_activated(convolution: nn.Conv2d, *pooling: nn.Module) -> nn.Sequential:
-    """A sequence of pooling (if any), batch normalisation, ReLU and convolution."""
+    """A sequence of layers: pooling (if any), batch normalisation, ReLU, convolution."""
     norm = nn.BatchNorm2d(convolution.in_channels)
     return nn.Sequential(*pooling, norm, nn.ReLU(inplace=True), convolution)
 

@@ -1,8 +1,8 @@
 """Finds the most likely class of each pixel from small logit maps, without storing logits at the picture's size.
 
-Logits at the size of a 2048 x 1024 picture take 160 MB, and writing and reading them took two fifths of the time of a
-fast network. Here the small maps are interpolated in bands of rows that fit into the CPU's cache. The values equal
-those of `torch.nn.functional.interpolate`.
+Logits at the size of a 2048 x 1024 picture take 160 MB. Writing and reading them took two fifths of the time of a fast
+network. Here the small maps are interpolated in bands of rows that fit into the CPU's cache. The values equal the
+values of `torch.nn.functional.interpolate`.
 """
 
 from __future__ import annotations

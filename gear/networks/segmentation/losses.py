@@ -24,7 +24,7 @@ class SegmentedSample(Protocol):
 
     @property
     def label_ids(self) -> npt.NDArray[np.uint8]:
-        """(H, W) uint8 Cityscapes label ids of the picture."""
+        """The (H, W) uint8 Cityscapes label ids of the picture."""
         ...
 
 

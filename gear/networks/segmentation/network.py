@@ -66,7 +66,7 @@ class SemsegNetwork(Network):
         self._losses = losses
 
     def taps(self) -> Mapping[str, nn.Module]:
-        """The modules, by name, whose outputs are feature maps: those of the graph's own `taps()`."""
+        """The modules, by name, whose outputs are feature maps; the graph's own `taps()` provides them."""
         taps: Mapping[str, nn.Module] = self.graph.taps()  # type: ignore[operator]
         return taps
 

@@ -77,7 +77,9 @@ class Xception39(nn.Module):
         self.layer3 = _stage(two * EXPANSION, three, last)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Three feature maps of (B, 3, H, W) pictures: 64 channels at 1/8 of the sides, 128 at 1/16, 256 at 1/32."""
+        """Computes three feature maps of (B, 3, H, W) pictures: 64 channels at 1/8 of the sides, 128 at 1/16, 256
+        at 1/32.
+        """
         eighth = self.layer1(self.maxpool(self.conv1(pictures)))
         sixteenth = self.layer2(eighth)
         return eighth, sixteenth, self.layer3(sixteenth)

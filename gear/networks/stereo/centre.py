@@ -109,7 +109,7 @@ class Head(nn.Module):
         self.start_at(0.0)
 
     def start_at(self, value: float) -> None:
-        """Sets the bias of the output layer to `value`, so that every output is about `value` before training."""
+        """Sets the bias of the output layer to `value`; before training every output is then about `value`."""
         assert self.out.bias is not None
         nn.init.constant_(self.out.bias, value)
 

@@ -39,7 +39,9 @@ ALMOST_ZERO = 1e-6
 
 
 class LabelledObject(Protocol):
-    """Protocol of an object that the losses accept; `gear.plugins.tasks.stereo3d.Object3d` implements it."""
+    """Protocol of the labelled objects that the losses accept: 3D box, 2D box and occlusion;
+    `gear.plugins.tasks.stereo3d.Object3d` implements it.
+    """
 
     @property
     def kitti_type(self) -> str: ...  # noqa: D102
@@ -54,7 +56,7 @@ class LabelledObject(Protocol):
 
 
 class LabelledPair(Protocol):
-    """Protocol of a sample that the losses accept."""
+    """Protocol of the samples that the losses accept: labelled objects of a pair of pictures, and the calibration."""
 
     @property
     def calibration(self) -> Calibration: ...  # noqa: D102
@@ -113,9 +115,9 @@ class CentreTargets:
 def centre_targets(samples: Sequence[LabelledPair], kinds: Sequence[str], grid: Grid) -> CentreTargets:
     """Computes the training targets of a batch from its labelled objects.
 
-    The cell of an object is that of the centre of its visible 2D box, which lies in the picture even if the object
-    leaves it. If two objects have the same cell, it belongs to the nearer one. Objects of other kinds and ignored
-    objects are no targets, and empty cells inside their boxes do not count.
+    An object belongs to the cell that contains the centre of its visible 2D box. This centre lies in the picture even
+    if the object extends beyond it. If two objects have the same cell, the cell belongs to the nearer object. Objects
+    of other kinds and ignored objects are no targets, and empty cells inside their boxes do not count.
 
     Args:
         samples: the batch.

@@ -21,8 +21,8 @@ def sides(boxes: Tensor) -> Tensor:
 def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
     """The (…, 4) codes of boxes relative to anchors, which the network learns to predict.
 
-    A code holds the shift of the centre (x, y) in units of the anchor's sides, and the logarithms of the ratios of
-    width and height to those of the anchor.
+    A code holds the shift of the centre (x, y) in units of the anchor's sides, and the logarithms of the size ratios
+    (width, height) between box and anchor.
     """
     own, wanted = sides(anchors), sides(boxes)
     middle, target = anchors[..., :2] + own / 2, boxes[..., :2] + wanted / 2

@@ -1,4 +1,4 @@
-"""The graph of Stereo R-CNN (Li, Chen, Shen, CVPR 2019), with its authors' parameter names.
+"""The torch module of Stereo R-CNN (Li, Chen, Shen, CVPR 2019), with its authors' parameter names.
 
 A ResNet-101 with a feature pyramid processes each picture. A region proposal network reads both pyramids and proposes
 pairs of boxes. The second stage predicts for each pair a class, a refined pair, size and heading. From the left box it
@@ -24,7 +24,7 @@ ANCHOR_SIDES = (32, 64, 128, 256, 512)
 STRIDES = (4, 8, 16, 32, 64)
 POOLED = 7
 KEYPOINT_CELLS = 28
-"""Number of columns into which a box is divided to classify the position of a keypoint."""
+"""Number of columns into which a box is divided; the position of a keypoint is predicted as one of these columns."""
 
 CORNERS = 4
 LEVEL_AT_SIDE = 224.0
@@ -35,7 +35,7 @@ VARIANCES = "loss_log_variances"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoRcnnShape:
-    """Numbers that determine the size of the network; the defaults are the authors'.
+    """Numbers that determine the size of Stereo R-CNN; the defaults are the authors' values.
 
     Attributes:
         blocks: number of blocks in each of the four stages.
@@ -53,7 +53,7 @@ class StereoRcnnShape:
 
 
 class Bottleneck(nn.Module):
-    """ResNet bottleneck as in Caffe: the first convolution has the stride."""
+    """Bottleneck residual block of ResNet as in Caffe: the first convolution, not the second one, has the stride."""
 
     def __init__(self, inputs: int, width: int, stride: int) -> None:
         super().__init__()
@@ -242,7 +242,7 @@ def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
 
 
 def is_norm(module: nn.Module) -> bool:
-    """Whether a layer is a batch normalisation."""
+    """Whether a layer is a batch normalisation layer."""
     return isinstance(module, nn.BatchNorm2d)
 
 

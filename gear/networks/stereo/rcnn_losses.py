@@ -62,7 +62,7 @@ class CarTargets:
     ignored: Tensor
 
     def to(self, device: torch.device) -> CarTargets:
-        """A copy of the targets on another torch device."""
+        """A copy of these training targets on another torch device."""
         return CarTargets(**{field.name: getattr(self, field.name).to(device) for field in fields(self)})
 
 
@@ -238,8 +238,8 @@ class SampledPairs:
 
 
 def sample_pairs(left: Tensor, right: Tensor, cars: CarTargets, draws: torch.Generator) -> SampledPairs:
-    """Samples box pairs from proposals and ground truth: a quarter of the pairs overlap a car in both pictures,
-    the other pairs overlap a car only partly.
+    """Samples box pairs from proposals and ground truth: at most a quarter of the pairs overlap a car in both
+    pictures; all further pairs overlap a car only partly, or none if the picture has no car.
 
     Args:
         left, right: (P, 4) proposals.

@@ -48,7 +48,7 @@ class StereoRcnnNetwork(Network):
     ) -> Mapping[str, Tensor]:
         """Computes the outputs for a batch, or the six losses if `targets` are given.
 
-        Each loss L is weighted by its learned logarithmic variance s: L exp(-s) + s. Anchors and box pairs for the
+        Each loss L is weighted by its learned logarithm s of a variance: L exp(-s) + s. Anchors and box pairs for the
         losses are sampled with `options.seed`, so each call samples the same ones. In training mode torch's own
         generator samples them anew for every picture.
         """
