@@ -14,8 +14,8 @@ from gear.values.ground_truth import BoxPx
 from gear.values.scene import CameraRecord, Vec3
 
 EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-"""The 12 edges of a box, as pairs of corner numbers. The bits of a corner number state its side: 4 for x, 2 for y,
-1 for z.
+"""The 12 edges of a 3D box, as pairs of corner numbers. The bits of a corner number state its side: 4 for x, 2 for
+y, 1 for z.
 """
 
 _CORNERS = frozen([[(i >> 2 & 1) - 0.5, (i >> 1 & 1) - 0.5, i & 1] for i in range(8)])

@@ -13,17 +13,18 @@ Preset = Literal["kitti", "coco", "carla_gear"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VisibilityLimits:
-    """Limits that an object must reach to become a label. Below them the object becomes a region to ignore:
-    neither detecting nor missing it counts as an error.
+    """Limits that an object must reach to become a label.
+
+    Below the limits the object becomes a region to ignore: neither detecting nor missing it counts as an error.
 
     Attributes:
-        max_distance_m: from the camera to the middle of the object's 3D box; None for any distance.
-        min_height_px: height of the box that the format writes.
-        min_box_area_px2: area of the tight box of the visible pixels.
-        min_visible_fraction: visible share of the silhouette inside the picture, 0..1. The part outside the picture
-            does not count: formats have a field of their own for it.
-        min_visible_px: visible pixels that a label needs.
-        min_pixels_px: visible pixels that a region to ignore needs; an object with fewer is left out.
+        max_distance_m: largest distance from the camera to the middle of the object's 3D box; None for any distance.
+        min_height_px: smallest height of the box that the format writes.
+        min_box_area_px2: smallest area of the tight box of the visible pixels.
+        min_visible_fraction: smallest visible share of the silhouette inside the picture, 0..1. The part outside the
+            picture does not count, because formats have a field of their own for it.
+        min_visible_px: smallest number of visible pixels of a label.
+        min_pixels_px: smallest number of visible pixels of a region to ignore; an object with fewer is left out.
     """
 
     max_distance_m: float | None = None
@@ -85,18 +86,18 @@ further limits by gear.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Visibility:
-    """Option of a task: a preset of limits, and limits that replace those of the preset.
+    """Option of a task: a preset of visibility limits, and limits that replace those of the preset.
 
     Attributes:
-        preset: `kitti` labels objects from 25 px of height with a tenth of them visible, `coco` those with 100 visible
-            pixels, `carla_gear` those of the CARLA-GeAR paper: within 200 m, with a visible box of 900 px², a tenth of
-            them and 100 pixels visible.
-        max_distance_m: from the camera to the middle of the object's 3D box.
-        min_height_px: height of the box that the format writes.
-        min_box_area_px2: area of the tight box of the visible pixels.
-        min_visible_fraction: visible share of the silhouette inside the picture, 0 to 1.
-        min_visible_px: visible pixels that a label needs.
-        min_pixels_px: visible pixels that a region to ignore needs.
+        preset: `kitti` labels objects from 25 px of height with a tenth of them visible, `coco` objects with 100
+            visible pixels, `carla_gear` the objects of the CARLA-GeAR paper: within 200 m, with a visible box of 900
+            px², a tenth of them and 100 pixels visible.
+        max_distance_m: largest distance from the camera to the middle of the object's 3D box.
+        min_height_px: smallest height of the box that the format writes.
+        min_box_area_px2: smallest area of the tight box of the visible pixels.
+        min_visible_fraction: smallest visible share of the silhouette inside the picture, 0 to 1.
+        min_visible_px: smallest number of visible pixels of a label.
+        min_pixels_px: smallest number of visible pixels of a region to ignore.
     """
 
     SHORTHAND: ClassVar[str] = "preset"

@@ -28,7 +28,11 @@ class CocoEvaluator(Generic[SampleT]):
     """
 
     def __init__(self, as_picture: Callable[[SampleT], Picture]) -> None:
-        """Args: as_picture: converts a sample to its COCO picture with annotations."""
+        """Makes an evaluator without samples.
+
+        Args:
+            as_picture: function that converts a sample to its COCO picture with annotations.
+        """
         self._as_picture = as_picture
         self.pictures: list[Picture] = []
         self.detections: list[tuple[Detection, ...]] = []

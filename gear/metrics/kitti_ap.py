@@ -51,7 +51,12 @@ class KittiEvaluator(Generic[SampleT]):
         labels_of: Callable[[SampleT], Sequence[KittiLabel]],
         ignored_of: Callable[[SampleT], Sequence[BoxPx]] = lambda _: (),
     ) -> None:
-        """Args: labels_of: returns the lines of a sample's label file, including DontCare regions."""
+        """Makes an evaluator without samples.
+
+        Args:
+            labels_of: function that returns the lines of a sample's label file, including DontCare regions.
+            ignored_of: function that returns a sample's ignored 2D boxes in index pixels.
+        """
         self._labels_of, self._ignored_of = labels_of, ignored_of
         self.pictures: list[PictureBoxes] = []
 

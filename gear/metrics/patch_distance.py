@@ -21,9 +21,11 @@ class PatchArea:
     """The visible pixels and the positions of the patches in one picture, from which distances are measured."""
 
     def __init__(self, mask: npt.NDArray[np.bool_], middles_m: Sequence[Vec3] = ()) -> None:
-        """Args:
-        mask: (H, W) visible pixels of all patches.
-        middles_m: middle of each visible patch in the camera's frame.
+        """Stores the visible patches of one picture.
+
+        Args:
+            mask: (H, W) bool, the visible pixels of all patches.
+            middles_m: middle of each visible patch in the camera's frame, metres.
         """
         self._mask, self._middles_m = mask, middles_m
         self._distance_px: npt.NDArray[np.float32] | None = None

@@ -36,7 +36,7 @@ class KeptCopy(Generic[Made]):
         self._made: Made | None = None
 
     def __reduce__(self) -> tuple[type[KeptCopy[Made]], tuple[()]]:
-        """Copies and pickles of this object contain no value, so that a copy of a network computes its own."""
+        """Copies and pickles this object without its value; a copy of a network therefore computes its own value."""
         return type(self), ()
 
     def of(self, graph: nn.Module, make: Callable[[], Made]) -> Made | None:

@@ -17,8 +17,8 @@ from gear.networks.network import Normalise
 from gear.networks.segmentation.ddrnet import DDRNet23Slim
 
 MIDDLE_M = 10.0
-"""Depth in metres that a network output of 0 stands for. It is a typical depth in streets, so training starts near
-it.
+"""Depth in metres that corresponds to a network output of 0. It is a typical depth in streets, so training starts
+near it.
 """
 
 RANGE_M = (0.05, 1000.0)

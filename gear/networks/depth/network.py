@@ -36,7 +36,7 @@ class DepthNetwork(Network):
     has_quick_copy = True
 
     def __init__(self, graph: nn.Module, options: DepthOptions, *, input_scale: float = 1.0) -> None:
-        """Wraps a graph.
+        """Makes a gear network from the torch module of a depth network.
 
         Args:
             graph: torch module.

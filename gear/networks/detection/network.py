@@ -81,7 +81,7 @@ class Detector(Network):
     def __init__(
         self, graph: nn.Module, options: DetectorOptions, *, sizing: Sizing, categories: Sequence[int | None]
     ) -> None:
-        """Wraps a graph.
+        """Makes a gear network from a detection model of torchvision.
 
         Args:
             graph: detection model of torchvision.

@@ -147,7 +147,8 @@ class SegmentationLosses:
         self.easy, self.least, self.auxiliary_weight, self.weights = easy, least, auxiliary_weight, tuple(weights)
 
     def __call__(self, outputs: Mapping[str, Tensor], targets: Sequence[SegmentedSample]) -> dict[str, Tensor]:
-        """Losses by name: `cross_entropy` for the output `logits`, and one weighted loss for each training head.
+        """Computes the losses by name: `cross_entropy` for the output `logits`, and one weighted loss for each
+        training head.
 
         Args:
             outputs: (B, 19, H, W) logits by name, at the size of the labels or as `sampled_logits` returns them.

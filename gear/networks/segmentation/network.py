@@ -52,7 +52,7 @@ class SemsegNetwork(Network):
     def __init__(
         self, graph: nn.Module, options: SegmentationOptions, losses: Losses, *, input_scale: float = 1.0
     ) -> None:
-        """Wraps a graph.
+        """Makes a gear network from the torch module of a segmentation network.
 
         Args:
             graph: torch module, as described for the class.

@@ -134,7 +134,7 @@ class CentreGraph(nn.Module, ABC):
     """
 
     def __init__(self, shape: StereoCentreShape, channels: Sequence[int], pyramid: int) -> None:
-        """Builds everything after the trunk.
+        """Builds the matching layers, the pyramid and the heads; subclasses build the trunk.
 
         Args:
             shape: size of the network.

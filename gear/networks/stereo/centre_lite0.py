@@ -22,7 +22,9 @@ than a hundredth of the trunk's own map.
 
 
 class StereoCentreLite0(CentreGraph, OnLite0):
-    """The torch module of the network; parameters of the trunk have timm's names."""
+    """The torch module of the centre-based stereo network with EfficientNet-Lite0 as trunk; parameters of the
+    trunk have timm's names.
+    """
 
     corrects_surface = True
 

@@ -39,8 +39,8 @@ def _channels(shape: StereoCentreShape) -> list[int]:
 
 
 class StereoCentre(CentreGraph):
-    """The torch module of the network: both pictures pass the stem and one stage of the ResNet; the left features
-    and the correlation volume pass the later stages.
+    """The torch module of the centre-based stereo network with a ResNet-18 as trunk. Left and right picture pass
+    the stem and one stage of the ResNet; the left features and the correlation volume pass the later stages.
     """
 
     stem: nn.Module
