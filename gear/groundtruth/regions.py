@@ -1,4 +1,6 @@
-"""Boxes around the connected parts of a mask, such as the visible parts of a patch."""
+"""Finds boxes around the connected parts of a mask, such as the visible parts of a patch, and shares of objects
+inside a mask.
+"""
 
 from __future__ import annotations
 

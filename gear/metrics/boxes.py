@@ -26,8 +26,8 @@ def iou_2d(a: Array, b: Array) -> Array:
 
 
 def share_of_first(a: Array, b: Array) -> Array:
-    """The (N, M) intersection areas of (N, 4) boxes `a` and (M, 4) boxes `b`, divided by the area of the box from
-    `a`.
+    """The (N, M) shares of each box of `a` that lie inside each box of `b`, 0..1; (N, 4) and (M, 4) boxes (left,
+    top, right, bottom).
     """
     return _over(intersections_px2(a, b), np.broadcast_to(_areas(a)[:, None], (len(a), len(b))))
 

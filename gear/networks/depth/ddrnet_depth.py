@@ -1,6 +1,4 @@
-"""gear's own fast depth network: DDRNet-23-slim with one output channel, from which depth follows as 10 m *
-exp(channel).
-"""
+"""gear's own fast depth network: DDRNet-23-slim with one output channel; depth is 10 m * exp(channel)."""
 
 from __future__ import annotations
 

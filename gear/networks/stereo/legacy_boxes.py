@@ -30,7 +30,8 @@ def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
 
 
 def decode(codes: Tensor, anchors: Tensor) -> Tensor:
-    """The (…, 4) boxes for (…, 4) codes relative to (…, 4) anchors.
+    """The (…, 4) boxes for (…, 4) codes (shift of the centre, logarithms of the size ratios) relative to (…, 4)
+    anchors.
 
     As in the authors' code, right and bottom are larger by one pixel than the exact inverse of `encode` would give.
     """
