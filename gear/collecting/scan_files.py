@@ -6,11 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.contracts.tasks import Auxiliary
-from gear.dataset.layout import auxiliary_path
+from gear.dataset.layout import SCANS, auxiliary_path
 from gear.dataset.probe_files import AuxiliaryFiles
 from gear.formats.kitti_object import SCAN, format_points
 
-KIND = "scans"
+KIND = SCANS
 
 
 def scan_files(points: npt.NDArray[np.float32], split: str, index: int) -> AuxiliaryFiles:

@@ -14,7 +14,7 @@ from typing import Literal
 
 from gear.dataset.files import inside, read_bytes, sha256, write_whole
 from gear.dataset.guarded_paths import owned, remove_file
-from gear.dataset.layout import GEAR, manifest_path, split_folder
+from gear.dataset.layout import CARD, CARDS, CROISSANT, GEAR, manifest_path, split_folder
 from gear.dataset.locks import turn
 from gear.dataset.plan import read_plan
 from gear.dataset.sealed_json import is_sealed, is_whole, load_sealed, sealed_json
@@ -23,9 +23,6 @@ from gear.formats.dataset_card import SplitFacts, card
 from gear.formats.sample_parts import Part, column_of, parts
 from gear.values.errors import DatasetError
 from gear.values.serial import Json
-
-CARD, CROISSANT = "README.md", "croissant.json"
-CARDS = (CARD, CROISSANT)
 
 FIRST = ("leftimg8bit", "images", "image_2")
 """Names of the folders with camera pictures in the formats of the tasks; a card lists them first."""

@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import PurePosixPath
+
 GEAR = "gear"
+
+CARD, CROISSANT = "README.md", "croissant.json"
+CARDS = (CARD, CROISSANT)
+"""The files in the root that describe the dataset."""
+
+PROBES, SCANS = "probes", "scans"
+"""Kinds of auxiliary files of a sample."""
 
 
 def split_folder(split: str) -> str:
@@ -24,6 +33,16 @@ def sidecar_path(split: str, index: int) -> str:
 def auxiliary_path(split: str, kind: str, index: int, name: str) -> str:
     """The path of an additional file of a sample; `kind` is its folder, such as `probes` or `scans`."""
     return f"{split_folder(split)}/{kind}/{index:06d}_{name}"
+
+
+def is_reserved(relative: str, split: str) -> bool:
+    """Whether no sample of a split can have a file of that path: a card, or a file below `gear/` that is no auxiliary
+    file of the split. Letters that differ only in case are equal, as they are for some file systems.
+    """
+    parts = PurePosixPath(relative.casefold()).parts
+    if parts[:1] != (GEAR,):
+        return "/".join(parts) in {card.casefold() for card in CARDS}
+    return len(parts) != 4 or parts[1] != split.casefold() or parts[2] not in (PROBES, SCANS)
 
 
 def plan_path(split: str) -> str:

@@ -14,7 +14,7 @@ from pathlib import Path
 from gear.dataset.files import inside, read_bytes, write_whole
 from gear.dataset.guarded_paths import owned, remove_file, remove_tree
 from gear.dataset.hashing import in_threads
-from gear.dataset.layout import GEAR, patch_path, sidecar_path, split_folder
+from gear.dataset.layout import GEAR, is_reserved, patch_path, sidecar_path, split_folder
 from gear.dataset.locks import is_at_work
 from gear.dataset.plan import Plan, differences, read_plan, write_plan
 from gear.dataset.reading import check_hash
@@ -188,9 +188,8 @@ def _copy_sample(parts: Parts, out: Path, index: int) -> None:
     if target.is_file() and read_bytes(target) == data:  # of a merge that was stopped
         return
     files = read_sidecar(inside(first, relative)).files
-    own = f"{split_folder(parts.split)}/"
     for name, digest in sorted(files.items()):
-        if name.startswith((f"{own}samples/", f"{own}begun/", f"{own}plan.json", f"{own}manifest.json")):
+        if is_reserved(name, parts.split):
             raise DatasetError(inside(first, relative), f"names {name}, which is no file of a sample")
         _put(out, name, check_hash(first, name, digest))
     _put(out, relative, data)

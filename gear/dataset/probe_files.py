@@ -22,7 +22,7 @@ import numpy as np
 from gear.camera.response import Encoding, Response
 from gear.contracts.tasks import Auxiliary, Sidecar
 from gear.dataset.files import inside
-from gear.dataset.layout import auxiliary_path, sidecar_path
+from gear.dataset.layout import PROBES, auxiliary_path, sidecar_path
 from gear.dataset.reading import Dataset, check_hash
 from gear.dataset.sealed_json import REPAIR
 from gear.dataset.sidecar import no_sidecar
@@ -34,7 +34,7 @@ from gear.values.serial import from_json
 AuxiliaryFiles = Mapping[str, tuple[Auxiliary, bytes]]
 """Additional files of a sample (such as probes) with their metadata and bytes, by name in the sample's sidecar."""
 
-KIND = "probes"
+KIND = PROBES
 _SHADES = ("black", "white")
 _RESPONSE = ("exposure", "contrast", "encoding")
 _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 6, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_PAETH]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from gear.contracts.tasks import Sidecar
+from gear.dataset.layout import is_reserved
 from gear.values.errors import FieldError
 from gear.values.ground_truth import SurfaceTruth
 from gear.values.run_lengths import run_lengths
@@ -41,7 +42,7 @@ def check_numbers(content: Json, name: str) -> None:
 
 
 def check_sidecar(sidecar: Sidecar) -> None:
-    """Checks the scene record and the surfaces of a sidecar for impossible values.
+    """Checks the scene record, the surfaces and the names of files of a sidecar for impossible values.
 
     The task's own metadata (`facts`) are not checked here, but by the task when it reads them.
 
@@ -52,6 +53,9 @@ def check_sidecar(sidecar: Sidecar) -> None:
     _check_record(record)
     for place, truth in enumerate(sidecar.surfaces):
         _check_surface(truth, record, f"surfaces[{place}]")
+    for name in sidecar.files:
+        if is_reserved(name, record.split):
+            raise FieldError("files", f"names {name}, which is no file of a sample")
 
 
 def _check_record(record: SceneRecord) -> None:

@@ -22,6 +22,7 @@ from gear.dataset.layout import (
     begun_path,
     claim_path,
     failed_path,
+    is_reserved,
     manifest_path,
     patch_path,
     plan_path,
@@ -385,16 +386,16 @@ def remove_split(root: Path, split: str) -> None:
     refuse_copy(root, split)
     samples = sorted(owned(root, f"{split_folder(split)}/samples").glob("*.json"))
     notes = sorted(owned(root, begun_path(split, "x")).parent.glob("*.json"))
-    notes += sorted(owned(root, failed_path(split, 0)).parent.glob("*.json"))
     claims = sorted(owned(root, claim_path(split, 0)).parent.glob("*.claim"))
     manifest = folder / "manifest.json"
     listed = _load_if_json(manifest)
-    doomed = [_relative(root, manifest), *_files_named(listed)]
+    doomed = [_relative(root, manifest), *_files_named(listed, split)]
     for path in samples:
-        doomed += [_relative(root, path), *_files_named(_load_if_json(path))]
-    doomed += _files_of_samples(listed)
+        doomed += [_relative(root, path), *_files_named(_load_if_json(path), split)]
+    doomed += _files_of_samples(listed, split)
     for path in notes:
-        doomed += [*_files_named(_load_if_json(path)), _relative(root, path)]
+        doomed += [*_files_named(_load_if_json(path), split), _relative(root, path)]
+    doomed += [_relative(root, path) for path in owned(root, failed_path(split, 0)).parent.glob("*.json")]
     label = _patch_label(root, split)
     copies = owned(root, patch_path(label or "none", "patch_0.png")).parent
     doomed += [_relative(root, path) for path in claims]
@@ -411,16 +412,18 @@ def _relative(root: Path, path: Path) -> str:
     return path.relative_to(root).as_posix()
 
 
-def _files_named(there: Json) -> list[str]:
-    """The files that a sidecar, a manifest or a note of unfinished files names; none if it is damaged."""
+def _files_named(there: Json, split: str) -> list[str]:
+    """The files that a sidecar, a manifest or a note of unfinished files names, without files that gear never names
+    there; none if it is damaged.
+    """
     named = there if isinstance(there, list) else _names(there, "files") + _names(there, "indexes")
-    return [name for name in named if isinstance(name, str)]
+    return [name for name in named if isinstance(name, str) and not is_reserved(name, split)]
 
 
-def _files_of_samples(there: Json) -> list[str]:
+def _files_of_samples(there: Json, split: str) -> list[str]:
     """The files of samples that a manifest lists; none if it is damaged."""
     samples = there.get("samples") if isinstance(there, dict) else None
-    return [name for one in (samples if isinstance(samples, list) else ()) for name in _names(one, "files")]
+    return [name for one in (samples if isinstance(samples, list) else ()) for name in _files_named(one, split)]
 
 
 def _load_if_json(path: Path) -> Json:

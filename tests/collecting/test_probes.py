@@ -12,7 +12,7 @@ import pytest
 
 import gear
 from gear.collecting.run import CollectReport
-from gear.dataset.cards import CARDS
+from gear.dataset.layout import CARDS
 from gear.dataset.probe_files import probes_of
 from gear.formats import rle
 from gear.values.errors import DatasetError

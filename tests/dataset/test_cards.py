@@ -5,9 +5,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gear.dataset.cards import CARDS, cards, damaged_cards, write_cards
+from gear.dataset.cards import cards, damaged_cards, write_cards
 from gear.dataset.files import sha256
 from gear.dataset.json_text import load_json
+from gear.dataset.layout import CARDS
 from gear.dataset.sealed_json import load_sealed
 from gear.dataset.store import remove_split
 from gear.values.errors import DatasetError

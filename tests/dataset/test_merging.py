@@ -110,8 +110,19 @@ def change_files(path: Path, change: dict[str, str]) -> None:
         "a/../../x",
         "gear/test/plan.json",
         "gear/test/manifest.json",
-        "gear/test/samples/000001.json",
+        "gear/test/samples/000007.json",
         "gear/test/begun/x.json",
+        "gear/test/claims/000000.claim",
+        "gear/test/failed/000000.json",
+        "gear/evil/plan.json",
+        "./gear//evil/plan.json",
+        "GEAR/evil/plan.json",
+        "gear/evil/probes/000000_x.png",
+        "gear/test/probes/deeper/x.png",
+        "gear/scratch/x",
+        "gear/patches/none/patch_0.png",
+        "README.md",
+        "croissant.json",
     ],
 )
 def test_a_sidecar_that_names_a_file_of_nobodys_sample_is_refused(
@@ -119,9 +130,18 @@ def test_a_sidecar_that_names_a_file_of_nobodys_sample_is_refused(
 ) -> None:
     victim = tmp_path / "victim.png"
     victim.write_bytes(b"mine")
-    change_files(halves[0] / sidecar_path("test", 0), {place: sha256(b"mine")})
+    data = b"mine"
+    if ".." not in place and not place.startswith("/"):
+        named = halves[0] / place
+        named.parent.mkdir(parents=True, exist_ok=True)
+        if not named.exists():
+            named.write_bytes(data)
+        data = named.read_bytes()
+    change_files(halves[0] / sidecar_path("test", 0), {place: sha256(data)})
+    before = find_parts(halves, "test")
     with pytest.raises(DatasetError, match=r"is not a path inside|is no file of a sample"):
-        merged(halves, tmp_path / "out")
+        prepare_merge(tmp_path / "out", [before.plan])
+        copy_samples(before, tmp_path / "out", lambda done, total: None)
     assert victim.read_bytes() == b"mine"
 
 

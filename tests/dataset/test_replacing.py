@@ -48,6 +48,30 @@ def test_a_plan_of_another_version_may_be_replaced(tmp_path: Path) -> None:
     assert str(caught.value).endswith("; use another --out, or replace split 'test' with --force")
 
 
+def test_no_file_is_deleted_that_a_note_on_a_failed_sample_names(tmp_path: Path) -> None:
+    fill(tmp_path, plan())
+    (tmp_path / "thesis.tex").write_text("mine")
+    note = tmp_path / "gear/test/failed/000001.json"
+    note.parent.mkdir()
+    note.write_text('{"files": {"thesis.tex": ""}, "indexes": {"thesis.tex": ""}}')
+    remove_split(tmp_path, "test")
+    assert tree(tmp_path) == {"thesis.tex": b"mine"}
+
+
+def test_no_file_of_another_split_is_deleted_that_a_sidecar_or_a_manifest_names(tmp_path: Path) -> None:
+    fill(tmp_path, plan("val"))
+    alone = tree(tmp_path)
+    fill(tmp_path, plan("test"))
+    reserved = {"gear/val/plan.json": "", "gear/val/manifest.json": "", "README.md": ""}
+    for name, content in (
+        ("samples/000001.json", {"files": reserved}),
+        ("manifest.json", {"samples": [{"files": reserved}]}),
+    ):
+        (tmp_path / "gear/test" / name).write_text(json.dumps(content))
+    remove_split(tmp_path, "test")
+    assert alone.items() <= tree(tmp_path).items()
+
+
 def patched(split: str, digest: str) -> Plan:
     given = plan(split, patch={"label": "random", "sha256": digest})
     return dataclasses.replace(given, info=dataclasses.replace(given.info, patch_label="random"))
