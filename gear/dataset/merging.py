@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
+from pathlib import Path, PurePosixPath
 
 from gear.dataset.files import inside, read_bytes, write_whole
 from gear.dataset.guarded_paths import owned, remove_file, remove_tree
-from gear.dataset.hashing import in_threads
+from gear.dataset.hashing import file_hash, in_threads
 from gear.dataset.layout import GEAR, is_reserved, patch_path, sidecar_path, split_folder
 from gear.dataset.locks import is_at_work
 from gear.dataset.plan import Plan, differences, read_plan, write_plan
@@ -27,6 +28,9 @@ from gear.values.serial import Json
 
 SAMPLES_AT_A_TIME = 256
 """Number of samples that are submitted to the copying threads at a time."""
+
+
+TWICE = "belongs to two samples, or is another one in two of the folders"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,18 +70,19 @@ def find_parts(roots: Sequence[Path], split: str) -> Parts:
         _refuse_other_plan(having[0], plans[0], root, plan)
         if is_at_work(inside(root, split_folder(split))):
             raise DatasetError(root, f"a run is making split {split!r} just now; wait for its end")
-    homes: list[list[int]] = [[] for _ in range(plans[0].samples)]
+    total = plans[0].samples
+    homes: dict[int, list[int]] = {}  # grows with the sidecars that are there; the plan may name any number
     for position, root in enumerate(having):
         folder = inside(root, f"{split_folder(split)}/samples")
         for path in folder.glob("*.json") if folder.is_dir() else ():
-            if path.stem.isdecimal() and int(path.stem) < len(homes):
-                homes[int(path.stem)].append(position)
-    lacking = [index for index, home in enumerate(homes) if not home]
-    if lacking:
-        problem = f"{len(lacking)} of {counted(len(homes), 'sample')} of split {split!r} are in none of the folders"
+            if path.stem.isdecimal() and path.stem == f"{int(path.stem):06d}" and int(path.stem) < total:
+                homes.setdefault(int(path.stem), []).append(position)
+    if len(homes) < total:
+        first = next(index for index in range(total) if index not in homes)
+        problem = f"{total - len(homes)} of {counted(total, 'sample')} of split {split!r} are in none of the folders"
         remedy = "collect the missing shard, or run the same `gear collect` without --shard in one of the folders"
-        raise DatasetError(having[0], f"{problem} (first: sample {lacking[0]}); {remedy}")
-    return Parts(plan=plans[0], roots=having, homes=tuple(tuple(home) for home in homes))
+        raise DatasetError(having[0], f"{problem} (first: sample {first}); {remedy}")
+    return Parts(plan=plans[0], roots=having, homes=tuple(tuple(homes[index]) for index in range(total)))
 
 
 def _refuse_other_plan(first_root: Path, first: Plan, root: Path, plan: Plan) -> None:
@@ -128,24 +133,26 @@ def copy_patches(parts: Parts, out: Path, check: Callable[[Mapping[str, Path]], 
     Args:
         parts: the source folders; if several hold the pictures, they must be equal.
         out: the target folder.
-        check: called with the paths of the pictures by name; raises an error if they are not those of the plan.
+        check: called with the paths of the pictures by name, before they are read whole; raises an error if they are not
+            those of the plan.
 
     Raises:
         DatasetError: two folders have different pictures.
     """
     label = parts.plan.patch["label"]
     chosen: dict[str, bytes] = {}
+    origin = parts.roots[0]
     for root in parts.roots:
         folder = inside(root, patch_path(label, "patch_0.png")).parent
         paths = {path.name: path for path in sorted(folder.glob("patch_*.png")) if inside(root, _of(root, path))}
-        pictures = {name: read_bytes(path) for name, path in paths.items()}
-        if not pictures:
+        if not paths:
             continue
         if not chosen:
             check(paths)
-            chosen = pictures
-        elif pictures != chosen:
-            raise DatasetError(folder, f"holds other pictures than {parts.roots[0]}; repair it with `gear verify`")
+            chosen = {name: read_bytes(path) for name, path in paths.items()}
+            origin = root
+        elif paths.keys() != chosen.keys() or not all(_holds(paths[name], data) for name, data in chosen.items()):
+            raise DatasetError(folder, f"holds other pictures than {origin}; repair it with `gear verify`")
     for name, data in chosen.items():
         _put(out, patch_path(label, name), data)
 
@@ -167,12 +174,18 @@ def copy_samples(parts: Parts, out: Path, on_progress: Progress) -> None:
     on_progress(0, total)
     for start in range(0, total, SAMPLES_AT_A_TIME):
         some = range(start, min(start + SAMPLES_AT_A_TIME, total))
-        for index, _ in zip(some, in_threads(lambda index: _copy_sample(parts, out, index), some), strict=True):
+        copy = partial(_copy_sample, parts, out, {})
+        for index, _ in zip(some, in_threads(copy, some), strict=True):
             on_progress(index + 1, total)
 
 
-def _copy_sample(parts: Parts, out: Path, index: int) -> None:
+def _copy_sample(parts: Parts, out: Path, hashes: dict[str, str], index: int) -> None:
     """Copies one sample from the first folder that has it.
+
+    Args:
+        parts, out: as of `copy_samples`.
+        hashes: by path, of the files of samples that other threads copy at the same time; gets those of this one.
+        index: of the sample.
 
     Raises:
         DatasetError: as `copy_samples`.
@@ -184,13 +197,17 @@ def _copy_sample(parts: Parts, out: Path, index: int) -> None:
         if read_bytes(inside(other, relative)) != data:
             problem = f"is another sample than that of {first}; check both folders with `gear verify`"
             raise DatasetError(inside(other, relative), problem)
-    target = owned(out, relative)
-    if target.is_file() and read_bytes(target) == data:  # of a merge that was stopped
-        return
     files = read_sidecar(inside(first, relative)).files
-    for name, digest in sorted(files.items()):
+    for name in files:
         if is_reserved(name, parts.split):
             raise DatasetError(inside(first, relative), f"names {name}, which is no file of a sample")
+    if _holds(owned(out, relative), data) and all(  # of a merge that was stopped
+        owned(out, name).is_file() and file_hash(owned(out, name)) == digest for name, digest in files.items()
+    ):
+        return
+    for name, digest in sorted(files.items()):
+        if hashes.setdefault(PurePosixPath(name).as_posix(), digest) != digest:
+            raise DatasetError(owned(out, name), TWICE)
         _put(out, name, check_hash(first, name, digest))
     _put(out, relative, data)
 
@@ -205,7 +222,12 @@ def _put(out: Path, relative: str, data: bytes) -> None:
     if not target.exists():
         write_whole(out, relative, data)
     elif read_bytes(target) != data:
-        raise DatasetError(target, "belongs to two samples, or is another one in two of the folders")
+        raise DatasetError(target, TWICE)
+
+
+def _holds(path: Path, data: bytes) -> bool:
+    """Whether a file has these bytes; a file of another size is not read."""
+    return path.is_file() and path.stat().st_size == len(data) and read_bytes(path) == data
 
 
 def _of(root: Path, path: Path) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,8 @@ import pytest
 from gear.dataset.files import sha256
 from gear.dataset.layout import sidecar_path
 from gear.dataset.locks import at_work
-from gear.dataset.merging import Parts, copy_samples, find_parts, prepare_merge
-from gear.dataset.plan import Plan
+from gear.dataset.merging import Parts, copy_patches, copy_samples, find_parts, prepare_merge
+from gear.dataset.plan import Plan, write_plan
 from gear.dataset.sealed_json import sealed_json
 from gear.dataset.store import Store
 from gear.values.errors import DatasetError
@@ -54,6 +56,46 @@ def test_a_sample_that_two_folders_have_must_be_the_same(halves: list[Path], tmp
 def test_missing_samples_are_counted_and_the_remedy_is_named(halves: list[Path]) -> None:
     with pytest.raises(DatasetError, match=r"2 of 4 samples .* \(first: sample 1\); collect the missing shard"):
         find_parts(halves[:1], "test")
+
+
+def test_a_plan_of_any_number_of_samples_costs_no_memory(tmp_path: Path) -> None:
+    fill(tmp_path, plan(samples=3), [0, 2], is_closed=False)
+    write_plan(tmp_path, plan(samples=10**12))
+    with pytest.raises(DatasetError, match=r"999999999998 of 1000000000000 samples .* \(first: sample 1\)"):
+        find_parts([tmp_path], "test")
+
+
+def test_a_sidecar_of_a_stopped_merge_counts_only_with_its_files(halves: list[Path], tmp_path: Path) -> None:
+    merged(halves, tmp_path / "out")
+    whole = tree(tmp_path / "out")
+    next(path for path in sorted((tmp_path / "out").rglob("*.png"))).unlink()
+    merged(halves, tmp_path / "out")
+    assert tree(tmp_path / "out") == whole
+    next(path for path in sorted((tmp_path / "out").rglob("*.png"))).write_bytes(b"planted")
+    with pytest.raises(DatasetError, match="belongs to two samples, or is another one"):
+        merged(halves, tmp_path / "out")
+
+
+def test_pictures_of_the_patch_are_checked_before_they_are_read(halves: list[Path], tmp_path: Path) -> None:
+    """The first folder has none; those of the others are sparse files, which would not fit the memory."""
+    (tmp_path / "c").mkdir()
+    pictures = [root / "gear/patches/none/patch_0.png" for root in (halves[1], tmp_path / "c")]
+    for picture in pictures:
+        picture.parent.mkdir(parents=True)
+        picture.write_bytes(b"small")
+    parts = dataclasses.replace(find_parts(halves, "test"), roots=(*halves, tmp_path / "c"))
+    copy_patches(parts, tmp_path / "out", lambda paths: None)
+    assert tree(tmp_path / "out") == {"gear/patches/none/patch_0.png": b"small"}
+    os.truncate(pictures[1], 1 << 42)
+    with pytest.raises(DatasetError, match=rf"c/gear/patches/none: holds other pictures than {halves[1]};"):
+        copy_patches(parts, tmp_path / "out", lambda paths: None)
+    os.truncate(pictures[0], 1 << 42)
+
+    def refuse(paths: Mapping[str, Path]) -> None:
+        raise DatasetError(paths["patch_0.png"], "is too large")
+
+    with pytest.raises(DatasetError, match="is too large"):
+        copy_patches(parts, tmp_path / "out", refuse)
 
 
 @pytest.mark.parametrize(
