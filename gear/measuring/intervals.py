@@ -136,3 +136,24 @@ def separated_interval(value: float, clusters: int) -> Interval:
 
     reach = float(optimize.brentq(excess, 1e-9, 1.0))
     return (1 - reach, 1.0) if value > 0.5 else (0.0, reach)
+
+
+def extreme_rate_interval(value: float, clusters: int, limits: Interval) -> Interval:
+    """The interval of a rate that is 0 or 1, for which all replicates are equal.
+
+    A share of 0 or 1 has the exact interval of Clopper and Pearson (Biometrika 1934), in which each cluster counts as
+    one trial. A number per picture of 0 has the exact upper end of a Poisson mean (Garwood, Biometrika 1936), 3.69 per
+    cluster. Both are conservative where samples of one cluster are less alike.
+
+    Args:
+        value: 0 or 1.
+        clusters: number of clusters on which the rate rests, at least 1.
+        limits: smallest and largest possible value: 0 and 1 of a share, 0 and infinity of a number per picture.
+    """
+    from scipy import stats
+
+    tail = (1 - CONFIDENCE) / 2
+    if not math.isfinite(limits[1]):
+        return 0.0, float(stats.chi2.isf(tail, 2)) / 2 / clusters
+    reach = float(stats.beta.isf(tail, 1, clusters))
+    return (1 - reach, 1.0) if value > 0.5 else (0.0, reach)

@@ -6,11 +6,15 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.stats import binomtest, poisson
 
 from benchmarks.coverage import BY_NAME, KINDS, coverage
 from gear.measuring.intervals import (
+    CONFIDENCE,
     LEFT_OUT,
     MOST_GROUPS,
+    extreme_rate_interval,
     jackknife_interval,
     leave_one_out,
     separated_interval,
@@ -73,6 +77,30 @@ def test_scores_that_happen_to_be_separated_may_not_always_be() -> None:
     assert auroc_interval([0.1] * 14, [0.9] * 14, range(14)) == pytest.approx((0, 1 - low))
     assert separated_interval(1.0, 200)[0] > 0.97
     assert auroc_interval([0.9], [0.1], [0]) is None
+
+
+@pytest.mark.parametrize("count", [1, 3, 14, 500])
+def test_rates_of_0_and_1_have_the_exact_intervals(count: int) -> None:
+    for events in (0, count):
+        exact = binomtest(events, count).proportion_ci(CONFIDENCE, method="exact")
+        assert extreme_rate_interval(events / count, count, (0, 1)) == pytest.approx((exact.low, exact.high))
+    low, high = extreme_rate_interval(0, count, (0, math.inf))
+    assert low == 0 and high == pytest.approx(poisson_upper(count))
+
+
+def poisson_upper(count: int) -> float:
+    """The mean of each cluster for which no event in all of them has a probability of 2.5 %."""
+    return float(brentq(lambda mean: poisson.pmf(0, mean * count) - 0.025, 0, 10))
+
+
+@pytest.mark.parametrize("limits", [(0.0, 1.0), (0.0, math.inf)])
+@pytest.mark.parametrize("rate", [0.02, 0.1, 0.3])
+def test_intervals_of_extreme_rates_cover_a_known_truth(limits: tuple[float, float], rate: float) -> None:
+    """Of 4000 simulated datasets of 14 streets, the share that has no event at all and misses the rate."""
+    rng = derive_rng(0, "extreme", str(limits), str(rate))
+    events = rng.binomial(1, rate, (4000, 14)) if limits[1] == 1 else rng.poisson(rate, (4000, 14))
+    is_missed = (events.sum(axis=1) == 0) & (extreme_rate_interval(0, 14, limits)[1] < rate)
+    assert is_missed.mean() <= 0.025 + 3 * math.sqrt(0.025 * 0.975 / 4000)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -11,7 +11,14 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from gear.measuring.intervals import LEFT_OUT, Interval, Values, jackknife_interval, leave_one_out
+from gear.measuring.intervals import (
+    LEFT_OUT,
+    Interval,
+    Values,
+    extreme_rate_interval,
+    jackknife_interval,
+    leave_one_out,
+)
 from gear.measuring.statistics import clustered, paired_p
 from gear.metrics.object_changes import CHANGES, OF_OBJECTS, Change, ObjectChange, changes, found_in_twin
 from gear.values.picture_objects import ObjectOutcome, PictureOutcomes
@@ -116,7 +123,11 @@ def _rate(counts: Values, bases: Values, kept: Sequence[npt.NDArray[np.int64]], 
     """
     value = _ratio(counts, bases)
     replicates = np.array([_ratio(counts[row], bases[row]) for row in kept])
-    return Estimate(value=value, interval=jackknife_interval(value, replicates, limits))
+    interval = jackknife_interval(value, replicates, limits)
+    if interval == (value, value) and value in limits:
+        streets = sum(bool(bases[row].sum() < bases.sum()) for row in kept)  # that have a base
+        interval = extreme_rate_interval(value, streets, limits)
+    return Estimate(value=value, interval=interval)
 
 
 def _ratio(counts: Values, bases: Values) -> float:

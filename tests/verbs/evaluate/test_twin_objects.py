@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
 import gear
 from gear.formats.coco import Detection
@@ -109,8 +110,19 @@ def test_twins_that_are_equal_differ_in_nothing() -> None:
     assert found.found == 1 and found.changes == ()
     for name, one in found.counts.items():
         assert (one.count, one.reverse, one.paired.mean, one.paired.p) == (0, 0, 0, 1), name
-    assert found.counts["invented"].rate.interval == (0, 0)
+    assert found.counts["invented"].rate.interval == (0, pytest.approx(3.688879 / 2)), "two streets say little"
     assert math.isnan(found.counts["hidden_on_patch"].rate.value)
+
+
+@pytest.mark.parametrize("is_lost", [False, True])
+def test_three_streets_without_a_difference_are_few(is_lost: bool) -> None:
+    """Rates of 0 and 1 rest on the three streets that show an object, and not on the fourth one."""
+    twin = [*[picture([thing(1, "found")])] * 4, picture([])]
+    now = [picture([thing(1, "missed" if is_lost else "found")])] * 4
+    found = object_changes([0, 1, 2, 3, 4], [*now, picture([])], twin, ["a", "b", "c", "c", "d"], seed=0)
+    rate = found.counts["hidden"].rate
+    exact = binomtest(3 * is_lost, 3).proportion_ci(method="exact")
+    assert rate.value == is_lost and rate.interval == pytest.approx((exact.low, exact.high))
 
 
 def test_what_a_patch_does_to_a_detector_is_shown(tmp_path: Path, small: Small, install: Install) -> None:
