@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
 
 from gear.dataset.files import inside, read_bytes, sha256, write_whole
 from gear.dataset.guarded_paths import owned, remove_file
@@ -58,6 +57,8 @@ def write_cards(root: Path, *, is_repair: bool = False) -> None:
         wanted = cards(root)
         for relative in CARDS:
             path = owned(root, relative)
+            if path.exists() and not path.is_file():
+                continue  # a folder or a FIFO is the user's own
             there = read_bytes(path) if path.exists() else None
             is_free = there is None or _is_as_written(relative, there) or (is_repair and is_own(relative, there))
             if not is_free or there == wanted.get(relative):
@@ -95,21 +96,15 @@ def cards(root: Path) -> dict[str, bytes]:
     }
 
 
-def damaged_cards(root: Path) -> dict[str, Literal["missing", "damaged"]]:
-    """The state of each description file (`README.md`, `croissant.json`) that is `missing` or `damaged`, by path.
-
-    Intact files, and files of the user with these names, are left out.
+def damaged_cards(root: Path) -> list[str]:
+    """Paths of the files that are damaged. The user's own files are right, and so is a file that is not there, because
+    datasets of earlier versions have none and a user may delete it.
     """
-    found: dict[str, Literal["missing", "damaged"]] = {}
-    is_finished = any(True for _ in _finished(root))
-    for relative in CARDS:
-        path = inside(root, relative)
-        if not path.is_file():
-            if is_finished:
-                found[relative] = "missing"
-        elif is_own(relative, data := read_bytes(path)) and not _is_as_written(relative, data):
-            found[relative] = "damaged"
-    return found
+    return [
+        relative
+        for relative in sorted(own_cards(root))
+        if not _is_as_written(relative, read_bytes(inside(root, relative)))
+    ]
 
 
 def own_cards(root: Path) -> set[str]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
@@ -19,11 +20,17 @@ from gear.dataset.plan import Plan, read_plan
 from gear.dataset.scratch import SCRATCH
 from gear.dataset.sealed_json import load_sealed
 from gear.dataset.sidecar import read_sidecar
+from gear.values.counted import counted
 from gear.values.errors import DatasetError
 from gear.values.progress import Progress
 from gear.values.serial import Json
 
 Problem = Literal["damaged", "missing", "unexpected"]
+
+MOST_MISSING = 100_000
+"""Largest number of missing samples that are listed one by one, because a plan of unknown origin may name any number of
+samples.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, order=True)
@@ -185,24 +192,31 @@ def _check_manifest(root: Path, check: SplitCheck) -> None:
 
 def _check_samples(root: Path, check: SplitCheck, on_progress: Progress | None) -> None:
     folder = inside(root, f"{split_folder(check.split)}/samples")
+    numbers = {int(path.stem) for path in folder.glob("*.json") if path.stem.isdecimal()}
     if not check.samples:  # neither the plan nor the manifest says how many
-        numbers = [int(path.stem) for path in folder.glob("*.json") if path.stem.isdecimal()]
         check.samples = max(numbers, default=-1) + 1
     manifest = check.manifest if isinstance(check.manifest, dict) else {}
     listed, hashes = manifest.get("samples", []), manifest.get("sidecars", {})
+    known = {*range(len(listed)), *(index for index in numbers if index < check.samples)}
+    known |= set(islice((index for index in range(check.samples) if index not in known), MOST_MISSING))
+    indices = sorted(known)
     if on_progress is not None:
-        on_progress(0, check.samples)
+        on_progress(0, len(indices))
 
     def findings(index: int) -> list[Finding]:
         entry = listed[index]["files"] if index < len(listed) else {}
         return list(_sample_findings(root, check, index, hashes, entry))
 
-    for index, found in enumerate(in_threads(findings, range(check.samples))):
+    for done, (index, found) in enumerate(zip(indices, in_threads(findings, indices), strict=True), 1):
         check.findings += found
         if found:
             check.broken_samples.add(index)
         if on_progress is not None:
-            on_progress(index + 1, check.samples)
+            on_progress(done, len(indices))
+    if len(indices) < check.samples:
+        first = next(index for index in range(check.samples) if index not in known)
+        more = counted(check.samples - len(indices) - 1, "more sample")
+        check.found(sidecar_path(check.split, first), "missing", f"and {more}")
 
 
 def _sample_findings(

@@ -1,11 +1,13 @@
 import dataclasses
 import itertools
+import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import yaml
 
-from gear.dataset.cards import cards, damaged_cards, write_cards
+from gear.dataset.cards import cards, damaged_cards, own_cards, write_cards
 from gear.dataset.files import sha256
 from gear.dataset.json_text import load_json
 from gear.dataset.layout import CARDS
@@ -71,24 +73,39 @@ def test_a_file_of_the_users_own_is_never_touched(tmp_path: Path, name: str) -> 
     fill(tmp_path, plan("train", 1))
     write_cards(tmp_path, is_repair=True)
     remove_split(tmp_path, "train")
-    assert (tmp_path / name).read_text() == "mine" and damaged_cards(tmp_path) == {}
+    assert (tmp_path / name).read_text() == "mine" and damaged_cards(tmp_path) == []
+
+
+@pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo])
+@pytest.mark.parametrize("name", CARDS)
+def test_a_folder_or_a_fifo_of_the_users_own_is_never_touched(
+    tmp_path: Path, name: str, make: Callable[[Path], None]
+) -> None:
+    make(tmp_path / name)
+    fill(tmp_path, plan("train", 1))
+    write_cards(tmp_path, is_repair=True)
+    assert damaged_cards(tmp_path) == [] and own_cards(tmp_path) == set(CARDS) - {name}
+    remove_split(tmp_path, "train")
+    assert (tmp_path / name).exists() and set(tree(tmp_path)) == set()
 
 
 @pytest.mark.parametrize("name", CARDS)
 def test_a_damaged_file_is_noticed_stays_and_is_repaired(tmp_path: Path, name: str) -> None:
     fill(tmp_path, plan("train", 1))
     whole = (tmp_path / name).read_bytes()
-    assert damaged_cards(tmp_path) == {}
+    assert damaged_cards(tmp_path) == []
     for position in range(0, len(whole) - 150, 97):
         spoilt = whole[:position] + bytes([whole[position] ^ 1]) + whole[position + 1 :]
         (tmp_path / name).write_bytes(spoilt)
-        assert damaged_cards(tmp_path) == {name: "damaged"}
+        assert damaged_cards(tmp_path) == [name]
     fill(tmp_path, plan("val", 1))
     assert (tmp_path / name).read_bytes() == spoilt, "somebody may have edited it"
     write_cards(tmp_path, is_repair=True)
     assert (tmp_path / name).read_bytes() == cards(tmp_path)[name]
     (tmp_path / name).unlink()
-    assert damaged_cards(tmp_path) == {name: "missing"}
+    assert damaged_cards(tmp_path) == [], "as in datasets of earlier versions"
+    write_cards(tmp_path, is_repair=True)
+    assert (tmp_path / name).read_bytes() == cards(tmp_path)[name]
 
 
 @pytest.mark.parametrize("name", CARDS)

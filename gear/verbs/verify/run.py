@@ -68,9 +68,12 @@ def _verified(
     chosen = names if split is None else [split]
     checks = {name: check_split(root, name, callbacks.on_progress if name in chosen else None) for name in names}
     findings = _findings(root, checks, chosen)
+    if sources is not None:
+        refuse_links(root)
+        if not findings:
+            write_cards(root)  # which may be missing
     if sources is None or not findings:
         return VerifyReport(root=root, files=_count(root, checks, chosen), findings=tuple(findings))
-    refuse_links(root)
     unrepaired: list[str] = []
     leftovers = any(one.detail for one in findings if one.problem == "unexpected")
     for name in chosen:
@@ -98,7 +101,7 @@ def _findings(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) 
     Files that belong to no split are found only if all splits are checked.
     """
     found = [finding for name in chosen for finding in checks[name].findings]
-    found += [Finding(path=path, problem=problem) for path, problem in damaged_cards(root).items()]
+    found += [Finding(path=path, problem="damaged") for path in damaged_cards(root)]
     unexpected = unexpected_files(root, checks.values())
     if len(chosen) < len(checks):
         folders = tuple({f"{Path(path).parent}/" for name in chosen for path in checks[name].known})

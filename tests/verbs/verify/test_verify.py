@@ -14,6 +14,7 @@ import pytest
 
 import gear
 from gear.cli.main import main
+from gear.dataset.layout import CARDS
 from gear.dataset.verification import Finding
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError
@@ -59,7 +60,8 @@ def test_a_flipped_byte_of_any_file_is_found(task: str, tmp_path: Path, copy_sma
         for text in (b"", None):
             (root / relative).write_bytes(text) if text is not None else (root / relative).unlink()
             found = gear.verify(root).findings
-            assert [(one.path, one.problem) for one in found] == [(relative, "missing" if text is None else "damaged")]
+            problems = ["missing" if text is None else "damaged"] * (text is not None or relative not in CARDS)
+            assert [(one.path, one.problem) for one in found] == [(relative, problem) for problem in problems]
             (root / relative).write_bytes(data)
 
 
@@ -103,6 +105,15 @@ def test_plan_and_manifest_repair_each_other(name: str, place: float | None, tmp
     assert not gear.verify(root).is_whole
     assert repaired(root).is_whole
     assert tree(root) == before
+
+
+def test_a_dataset_without_cards_is_whole_and_a_repair_writes_them(tmp_path: Path, copy_small: Copy) -> None:
+    root = copy_small("depth", tmp_path / "data")
+    before = tree(root)
+    for name in CARDS:
+        (root / name).unlink()
+    assert gear.verify(root).is_whole and tree(root).keys() == before.keys() - set(CARDS)
+    assert repaired(root).is_whole and tree(root) == before
 
 
 def test_a_damaged_patch_is_taken_from_where_it_is_named(tmp_path: Path, copy_small: Copy, patch: Path) -> None:

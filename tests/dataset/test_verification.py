@@ -1,0 +1,35 @@
+"""Checks of a split whose plan names many more samples than there are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gear.dataset import verification
+from gear.dataset.plan import write_plan
+from gear.dataset.verification import Finding, check_split
+from tests.dataset.splits import fill, plan
+
+
+def test_a_plan_of_any_number_of_samples_costs_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fill(tmp_path, plan(samples=4), [0, 3], is_closed=False)
+    write_plan(tmp_path, plan(samples=10**12))
+    monkeypatch.setattr(verification, "MOST_MISSING", 3)
+    calls: list[tuple[int, int]] = []
+    check = check_split(tmp_path, "test", lambda done, total: calls.append((done, total)))
+    assert check.broken_samples == {1, 2, 4} and calls[0] == (0, 5) and calls[-1] == (5, 5)
+    samples = [one for one in check.findings if "/samples/" in one.path]
+    assert [one.path[-11:] for one in samples] == ["000001.json", "000002.json", "000004.json", "000005.json"]
+    last = Finding(path="gear/test/samples/000005.json", problem="missing", detail="and 999999999994 more samples")
+    assert samples[-1] == last
+
+
+def test_a_sidecar_of_any_number_costs_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verification, "MOST_MISSING", 3)
+    fill(tmp_path, plan(samples=2), is_closed=False)
+    folder = tmp_path / "gear/test"
+    (folder / "plan.json").unlink()
+    (folder / "samples/000001.json").rename(folder / "samples/999999999999.json")
+    check = check_split(tmp_path, "test")
+    assert check.broken_samples == {1, 2, 3, 999999999999}
