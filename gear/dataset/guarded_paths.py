@@ -68,10 +68,13 @@ def owned(root: Path, relative: str) -> Path:
     return path
 
 
-def refuse_links(root: Path) -> None:
+def refuse_links(root: Path, *, with_hidden: bool = False) -> None:
     """Checks that a folder contains no links, before a command writes or deletes anything in it.
 
-    Hidden files and folders (`.git`, `.venv`) are not searched, because gear writes none.
+    Args:
+        root: the folder.
+        with_hidden: whether hidden files and folders in it (`.git`, `.venv`) are searched; gear writes none into a
+            user's folder.
 
     Raises:
         DatasetError: there is a link, or the root is a file.
@@ -84,10 +87,10 @@ def refuse_links(root: Path) -> None:
             # A folder that another run has just removed holds no link; one that cannot be read is no place of gear's.
             with contextlib.suppress(FileNotFoundError, PermissionError), os.scandir(pending.pop()) as entries:
                 for entry in entries:
-                    if entry.is_symlink():
-                        if not entry.name.startswith("."):
-                            raise _link_error(Path(entry.path))
-                    elif entry.is_dir(follow_symlinks=False) and not entry.name.startswith("."):
+                    is_searched = with_hidden or not entry.name.startswith(".")
+                    if is_searched and entry.is_symlink():
+                        raise _link_error(Path(entry.path))
+                    if is_searched and entry.is_dir(follow_symlinks=False):
                         pending.append(Path(entry.path))
 
 

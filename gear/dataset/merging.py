@@ -120,7 +120,7 @@ def prepare_merge(root: Path, plans: Sequence[Plan]) -> None:
         there[path.parent.name] = None if found is None else found.as_json()
     if any(wanted.get(split) != plan for split, plan in there.items()):
         for entry in sorted(root.iterdir()):
-            (remove_tree if entry.is_dir() else remove_file)(root, entry.name)
+            (remove_file if entry.is_symlink() or not entry.is_dir() else remove_tree)(root, entry.name)
         there = {}
     for plan in plans:
         if there.get(plan.info.split) != wanted[plan.info.split]:

@@ -9,6 +9,7 @@ from importlib.metadata import version
 from itertools import zip_longest
 from pathlib import Path
 
+from gear.config.collection import SPLIT_NAME
 from gear.contracts.tasks import SplitInfo
 from gear.dataset.files import inside, write_whole
 from gear.dataset.layout import GEAR, manifest_path, plan_path
@@ -147,6 +148,10 @@ def read_plan(root: Path, split: str) -> Plan | None:
         for field, key in (("task", "name"), ("patch", "label")):
             if not isinstance(there := getattr(plan, field), dict) or key not in there:
                 raise FieldError(f"plan.{field}", f"must have a {key}")
+        if not SPLIT_NAME.fullmatch(plan.info.split):
+            raise FieldError("plan.info.split", f"{plan.info.split!r} is not a split's name")
+        if plan.samples < 1:
+            raise FieldError("plan.samples", f"must be at least 1, got {plan.samples}")
         return plan
     except FieldError as error:
         if _manifest(root, split).get("versions", {}).get("gear") == version("mujoco-gear"):

@@ -41,7 +41,7 @@ def unfinished_place(target: Path, command: str) -> Path:
         DatasetError: the hidden folder is a link, or contains one.
     """
     unfinished = owned(target.parent, f".{target.name}.gear-{command}")
-    refuse_links(unfinished)
+    refuse_links(unfinished, with_hidden=True)
     return unfinished
 
 

@@ -6,6 +6,7 @@ https://docs.mlcommons.org/croissant/docs/croissant-spec-1.1.html.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -191,7 +192,7 @@ def _pictures(pattern: FilePattern, splits: Sequence[SplitFacts]) -> Json:
     """The record set of the pictures of one kind: picture, name of the file, split."""
     name = f"{pattern.name}_pictures"
     files = {"@id": pattern.name}
-    names = "|".join(one.name for one in splits)
+    names = "|".join(re.escape(one.name) for one in splits)
     in_split = {"extract": {"fileProperty": "fullpath"}, "transform": {"regex": f"^(?:.*/)?({names})(?:/.*)?$"}}
     return {
         "@type": "cr:RecordSet",

@@ -111,7 +111,8 @@ def card(splits: Sequence[SplitFacts], configs: Mapping[str, Mapping[str, Sequen
     """
     first, samples = splits[0], sum(split.samples for split in splits)
     category = TASK_CATEGORIES.get(first.task)
-    hub_names = {split.name: split.hub_name for split in splits}
+    names = {split.name for split in splits}
+    hub_names = {one.name: one.name if one.hub_name in names else one.hub_name for one in splits}
     lines = [
         "---",
         "license: mit",
@@ -125,10 +126,10 @@ def card(splits: Sequence[SplitFacts], configs: Mapping[str, Mapping[str, Sequen
         *(["configs:"] if configs else []),
     ]
     for place, (config, files) in enumerate(configs.items()):
-        lines += [f"- config_name: {config}", *(["  default: true"] if place == 0 else []), "  data_files:"]
+        lines += [f"- config_name: {json.dumps(config)}", *(["  default: true"] if place == 0 else []), "  data_files:"]
         for split, patterns in files.items():
             quoted = ", ".join(json.dumps(pattern) for pattern in patterns)
-            lines += [f"  - split: {hub_names[split]}", f"    path: [{quoted}]"]
+            lines += [f"  - split: {json.dumps(hub_names[split])}", f"    path: [{quoted}]"]
     lines += ["---", "", f"# {title(splits)}", "", f"{counted(samples, 'sample')} of driving scenes, made by gear."]
     lines += ["", "| split | samples | town/scene | weather | patch | seed |", "|---|---|---|---|---|---|"]
     lines += [

@@ -14,13 +14,15 @@ from typing import Any
 
 from gear.formats.exports.layout import ExportSplit, Read, check_range
 from gear.formats.sample_parts import column_of, parts_of
-from gear.values.errors import GearError
+from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json, to_json
 
 NUMBERS = ("index", "sequence", "frame")
 TEXTS = ("record", "surfaces", "facts")
 PICTURES = ("png", "tiff", "tif", "jpg", "jpeg")
 TEXT_SUFFIXES = ("txt", "json", "csv")
+
+REMEDY = "export the dataset to `webdataset`, which keeps files as they are"
 
 ROWS = 100
 """Number of rows in a row group, the part of a Parquet file that readers load at once."""
@@ -108,7 +110,10 @@ def _text(content: Json) -> str:
 
 def _value(data: bytes, path: str, suffix: str, with_features: bool) -> Any:
     if suffix in TEXT_SUFFIXES:
-        return data.decode()
+        try:
+            return data.decode()
+        except UnicodeDecodeError as error:
+            raise DatasetError(path, f"is no text in UTF-8 (byte {error.start}); {REMEDY}") from error
     return {"bytes": data, "path": path} if with_features and suffix in PICTURES else data
 
 

@@ -75,15 +75,16 @@ def export(
         hashes |= _hashes(opened.manifest)
     tree = chosen.tree(splits, lambda path: check_hash(source, path, hashes.get(path, "")), options)
     check_target(target, "export")
+    unfinished = unfinished_place(target, "export")
+    check_output(unfinished, "delete it, or use another --out")
     check_free_space(
         target,
-        _size_of(source, hashes),
+        _size_of(source, hashes) - _size_of_tree(unfinished),
         what="the exported files need",
         advice="give --out on another disk",
     )
-    check_output(unfinished_place(target, "export"), "delete it, or use another --out")
     with (
-        whole_tree(target, "export") as unfinished,
+        whole_tree(target, "export"),
         displayed(Callbacks.of(on_progress=on_progress), "export", progress=progress, unit="file") as shown,
     ):
         _write_tree(unfinished, tree, shown.on_progress)
@@ -130,6 +131,11 @@ def _size_of(root: Path, files: Iterable[str]) -> int:
     return sum(path.stat().st_size for path in paths if path.is_file())
 
 
+def _size_of_tree(root: Path) -> int:
+    """Bytes of the files that an export that was killed has left, which holds no link; they are kept or replaced."""
+    return sum(path.stat().st_size for path in root.rglob("*") if path.is_file())
+
+
 def _write_tree(root: Path, tree: Iterable[tuple[str, bytes]], on_progress: Progress) -> None:
     """Writes the missing files of an export, and deletes other files that an earlier, interrupted export wrote.
 
@@ -145,8 +151,8 @@ def _write_tree(root: Path, tree: Iterable[tuple[str, bytes]], on_progress: Prog
             write_whole(root, relative, data)
         written.add(relative)
         on_progress(len(written), 0)
-    there = [path.relative_to(root).as_posix() for path in root.rglob("*") if not path.is_dir()]
+    there = [path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_symlink() or not path.is_dir()]
     remove_files(root, [relative for relative in there if relative not in written])
     for folder in root.iterdir():
-        if folder.is_dir():
+        if folder.is_dir() and not folder.is_symlink():
             remove_empty_folders(root, folder.name)

@@ -211,6 +211,8 @@ def test_what_a_stopped_merge_of_other_folders_left_is_removed(halves: list[Path
     merged(halves, tmp_path / "out")
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.png")} == stamps, "kept"
     others: list[Path] = []
+    (tmp_path / "victim").mkdir()
+    (tmp_path / "victim/mine.txt").write_text("mine")
     given: Plan = dataclasses.replace(plan(samples=2), content={"scene": "truck", "seed": 5})
     fill(tmp_path / "c", given, is_closed=False)
     others.append(tmp_path / "c")

@@ -9,10 +9,11 @@ from typing import Any
 
 import pytest
 
-from gear.dataset.plan import Plan, differences
+from gear.dataset.plan import Plan, differences, read_plan, write_plan
 from gear.dataset.sealed_json import DamagedError
 from gear.dataset.store import Store
 from gear.testing.task_contract import INFO
+from gear.values.errors import DatasetError
 from gear.values.serial import Json, from_json
 from tests.dataset.splits import fill, plan, tree
 
@@ -102,3 +103,13 @@ def test_a_plan_that_another_program_has_damaged_is_known_by_the_manifest(tmp_pa
     with pytest.raises(DamagedError, match="the manifest is of another plan") as caught:
         Store(tmp_path, plan()).open({})
     assert "--force" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("split", "samples", "said"),
+    [("a|b", 3, r"'a\|b' is not a split's name"), ("test", 0, "must be at least 1, got 0")],
+)
+def test_a_plan_that_no_collection_has_is_refused(tmp_path: Path, split: str, samples: int, said: str) -> None:
+    write_plan(tmp_path, plan(split, samples))
+    with pytest.raises(DatasetError, match=said):
+        read_plan(tmp_path, split)

@@ -17,7 +17,7 @@ from gear.formats.png import encode_rgb
 from gear.plugins.datasets import open_dataset
 from gear.plugins.tasks.common import read_plain, read_rgb
 from gear.values.errors import DatasetError, ReplaceableError
-from tests.dataset.test_store import fill, plan, tree
+from tests.dataset.splits import fill, plan, tree
 
 
 def test_replacing_a_split_reads_each_of_its_files_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

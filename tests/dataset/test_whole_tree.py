@@ -49,6 +49,9 @@ def test_a_link_in_the_hidden_folder_is_refused(tmp_path: Path) -> None:
     hidden = unfinished_place(tmp_path / "new", "export")
     hidden.mkdir()
     (tmp_path / "victim").mkdir()
-    (hidden / "link").symlink_to(tmp_path / "victim")
-    with pytest.raises(DatasetError, match="link"):
-        unfinished_place(tmp_path / "new", "export")
+    for name in ("link", ".link", "inner/.deeper/link"):
+        (hidden / name).parent.mkdir(parents=True, exist_ok=True)
+        (hidden / name).symlink_to(tmp_path / "victim")
+        with pytest.raises(DatasetError, match="link: is a link"):
+            unfinished_place(tmp_path / "new", "export")
+        (hidden / name).unlink()

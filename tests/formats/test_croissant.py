@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import gc
 import logging
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +35,14 @@ def test_only_pictures_that_readers_decode_are_records() -> None:
     assert [one["name"] for one in content["recordSet"]] == ["splits", "png_pictures"]
     kinds = [one["encodingFormat"] for one in content["distribution"]]
     assert kinds == ["image/png", "image/tiff", "text/plain", "application/octet-stream"]
+
+
+def test_the_name_of_a_split_is_no_regular_expression() -> None:
+    facts = SplitFacts.of(replace(INFO, split="v.l"), "depth", 2, {})
+    content = croissant([facts], [FilePattern(name="a", suffix="png", globs=["a"])], {})
+    field = next(one for one in content["recordSet"][1]["field"] if one["name"] == "split")
+    regex = re.compile(field["source"]["transform"]["regex"])
+    assert regex.fullmatch("images/v.l/a.png") and not regex.fullmatch("images/val/a.png")
 
 
 @pytest.mark.slow  # importing the package takes seconds

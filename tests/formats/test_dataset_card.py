@@ -37,6 +37,14 @@ def test_a_name_with_signs_of_yaml_is_a_name() -> None:
     assert front["configs"][0]["data_files"][0]["path"] == ['a"b/*.png']
 
 
+def test_no_two_splits_have_one_name_and_no_name_is_read_as_yaml() -> None:
+    names = ("val", "validation", "on", 'a]\n  evil: "1"')
+    facts = [SplitFacts.of(dataclasses.replace(INFO, split=name), "depth", 1, {}) for name in names]
+    front = yaml.safe_load(card(facts, {"on": {name: ["a.png"] for name in names}}, "").split("---\n")[1])
+    assert front["configs"][0]["config_name"] == "on"
+    assert [one["split"] for one in front["configs"][0]["data_files"]] == list(names)
+
+
 def test_what_a_manifest_lacks_is_unknown() -> None:
     facts = SplitFacts.of(INFO, "my_task", 0, {"weather": "odd"})
     assert (facts.weather, facts.gear, facts.samples) == ("unknown", "unknown", 0)

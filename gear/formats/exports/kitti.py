@@ -19,7 +19,7 @@ def kitti_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -
 
     Splits whose first word is `test` are written to the folder `testing`, all other splits to `training`. In each of
     the two folders, ids count from 0 through all splits; `ImageSets/<split>.txt` lists the ids of a split.
-    `ImageSets/trainval.txt` joins `train` and `val`. `velodyne` exists if the dataset has laser scans (`scans: true` in
+    `ImageSets/trainval.txt` joins `train`, `val` and a split `trainval`. `velodyne` exists if the dataset has laser scans (`scans: true` in
     the configuration). The benchmark keeps the labels of `testing` secret; the export has them in `testing/label_2`.
 
     Args:
@@ -41,7 +41,7 @@ def kitti_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -
                 yield f"{pool}/velodyne/{name}.bin", read(sidecar.auxiliary[SCAN].path)
             names.append(name)
             numbers[pool] += 1
-    lists["trainval"] = sorted(lists["train"] + lists["val"])
+    lists["trainval"] = sorted(lists["trainval"] + lists["train"] + lists["val"])
     for split_name, names in lists.items():
         yield f"ImageSets/{split_name}.txt", "".join(f"{name}\n" for name in names).encode()
 

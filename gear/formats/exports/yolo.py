@@ -11,6 +11,7 @@ from gear.formats.coco import CATEGORIES
 from gear.formats.exports.layout import ExportSplit, Layout, Read, Tree
 from gear.formats.mask_polygons import joined_polygons, mask_polygons
 from gear.formats.rle import decode_crop
+from gear.values.errors import DatasetError
 from gear.values.serial import Json
 
 DIGITS = 6
@@ -43,15 +44,22 @@ def yolo_tree(splits: Sequence[ExportSplit], read: Read, options: YoloOptions) -
         splits: the finished splits of the dataset.
         read: function that returns the bytes of a file of the dataset, by path relative to its root.
         options: options of this layout.
+
+    Raises:
+        DatasetError: an annotation belongs to no picture.
     """
     for split in splits:
         name = split.info.split
-        content = json.loads(read(f"annotations/instances_{name}.json"))
+        index = f"annotations/instances_{name}.json"
+        content = json.loads(read(index))
         lines: dict[int, list[str]] = {picture["id"]: [] for picture in content["images"]}
         sizes = {picture["id"]: (picture["width"], picture["height"]) for picture in content["images"]}
         for annotation in content["annotations"]:
             if not annotation["iscrowd"]:
                 picture = annotation["image_id"]
+                if picture not in lines:
+                    problem = f"has an annotation of picture {picture!r}, which is not in its list `images`"
+                    raise DatasetError(index, f"{problem}; collect the split again")
                 lines[picture].append(_line(annotation, *sizes[picture], options))
         for picture in content["images"]:
             file = picture["file_name"]

@@ -76,6 +76,12 @@ def test_all_lists_of_the_benchmark_are_there() -> None:
         }
 
 
+def test_a_split_that_is_called_as_the_joined_list_is_in_it() -> None:
+    splits = [split_of(replace(INFO, split=name), "stereo3d", *records((0,))) for name in ("test", "trainval", "val")]
+    files = dict(kitti_tree(splits, str.encode, NoOptions()))
+    assert files["ImageSets/trainval.txt"] == b"000000\n000001\n" and files["ImageSets/val.txt"] == b"000001\n"
+
+
 def test_scans_come_along_and_night_tests_are_tests() -> None:
     split = split_of(replace(INFO, split="test_night"), "stereo3d", *records((2,)))
     scan = Auxiliary(path="gear/test_night/scans/000002_velodyne.bin", facts={})

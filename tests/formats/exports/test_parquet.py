@@ -5,8 +5,10 @@ from typing import Any
 
 import pytest
 
+from gear.formats.exports.layout import ExportSplit
+from gear.formats.parquet_files import ParquetOptions, parquet_files
 from gear.plugins.datasets import open_dataset
-from gear.values.errors import GearError
+from gear.values.errors import DatasetError, GearError
 from gear.values.scene import SceneRecord
 from gear.values.serial import from_json
 from gear.verbs.export import export
@@ -30,6 +32,17 @@ def test_a_row_is_a_sample_with_the_bytes_of_its_files(tmp_path: Path) -> None:
         assert row["label_2"] == (data / f"val/label_2/{index:06d}.txt").read_text()
         assert from_json(SceneRecord, json.loads(row["record"])) == sidecar.record
         assert json.loads(row["facts"]) == sidecar.facts
+
+
+def test_text_that_is_not_utf_8_is_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    data = dataset(tmp_path / "data", "stereo3d")
+    sidecars = [open_dataset(data, "val").sidecar(0)]
+    split = ExportSplit(info=open_dataset(data, "val").plan.info, task="stereo3d", sidecars=sidecars)
+    with pytest.raises(
+        DatasetError, match=r"val/calib/000000.txt: is no text in UTF-8 \(byte 2\); export the dataset to"
+    ):
+        list(parquet_files(split, lambda _: b"P0\xff", ParquetOptions()))
 
 
 def test_the_same_dataset_gives_the_same_files_of_limited_size(tmp_path: Path) -> None:

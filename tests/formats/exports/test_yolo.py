@@ -1,3 +1,5 @@
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -6,10 +8,13 @@ import yaml
 from matplotlib.path import Path as Outline
 
 from gear.formats.coco import CATEGORY_NAMES
+from gear.formats.exports.yolo import YoloOptions, yolo_tree
 from gear.formats.rle import decode
 from gear.plugins.datasets import open_dataset
+from gear.testing.task_contract import INFO
+from gear.values.errors import DatasetError
 from gear.verbs.export import export
-from tests.formats.exports.trees import dataset
+from tests.formats.exports.trees import dataset, split_of
 
 
 def filled(corners: np.ndarray, height: int, width: int) -> np.ndarray:
@@ -48,6 +53,16 @@ def test_boxes_and_polygons_are_those_of_the_dataset(tmp_path: Path, masks: str)
             corners = np.array(polygon.split()[1:], dtype=float).reshape(-1, 2) * (width, height)
             assert np.array_equal(filled(corners.round(), height, width), decode(thing.rle, height, width))
     assert ignored > 0, "the picture has a crowd, which the format cannot say"
+
+
+def test_an_annotation_of_no_picture_is_one_line(tmp_path: Path) -> None:
+    data = dataset(tmp_path / "data", "detect2d")
+    path = "annotations/instances_val.json"
+    content = json.loads((data / path).read_text())
+    content["annotations"][0] |= {"image_id": 77, "iscrowd": 0}
+    split = split_of(replace(INFO, split="val"), "detect2d")
+    with pytest.raises(DatasetError, match=f"{path}: has an annotation of picture 77, which is not in its list"):
+        list(yolo_tree([split], lambda _: json.dumps(content).encode(), YoloOptions()))
 
 
 def test_a_dataset_without_train_names_another_split_there(tmp_path: Path) -> None:

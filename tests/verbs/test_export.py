@@ -1,0 +1,105 @@
+"""Exports: new folders, disks, exports that are stopped or killed, links."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from gear.values.errors import DatasetError, GearError
+from gear.verbs.export import export
+from tests.dataset.splits import fill, plan, tree
+
+
+def test_exports_go_into_new_folders_and_fit_their_task(tmp_path: Path) -> None:
+    fill(tmp_path / "a", plan())
+    assert export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b") == 3
+    assert len(list((tmp_path / "b").rglob("proj_depth/groundtruth/image_02/*.png"))) == 3
+    assert not (tmp_path / "b/gear").exists()
+    with pytest.raises(DatasetError, match="is not empty"):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
+    with pytest.raises(DatasetError, match="the layout 'kitti' is for stereo3d"):
+        export(tmp_path / "a", layout="kitti", out=tmp_path / "c")
+
+
+def test_an_export_that_does_not_fit_its_disk_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fill(tmp_path / "a", plan())
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=1000))
+    with pytest.raises(GearError, match=r"the exported files need about .* kB, and 1 kB are free there"):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+def test_the_files_of_a_killed_export_need_no_room_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fill(tmp_path / "a", plan())
+    export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "whole")
+    shutil.copytree(tmp_path / "whole", tmp_path / ".b.gear-export")
+    next(path for path in (tmp_path / ".b.gear-export").rglob("*.png")).unlink()
+    size = sum(len(data) for path, data in tree(tmp_path / "a").items() if "/" in path and not path.startswith("gear/"))
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=size - 1000))
+    with pytest.raises(GearError, match="the exported files need"):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "c")
+    assert export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b") == 3
+    assert tree(tmp_path / "b") == tree(tmp_path / "whole")
+
+
+def test_an_export_that_is_stopped_leaves_nothing_and_can_be_given_again(tmp_path: Path) -> None:
+    fill(tmp_path / "a", plan())
+
+    def stop(written: int, _: int) -> None:
+        if written == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b", on_progress=stop)
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+    assert export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b") == 3
+
+
+def test_an_export_that_is_killed_shows_nothing_and_the_same_command_goes_on(tmp_path: Path) -> None:
+    fill(tmp_path / "a", plan())
+    export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "whole")
+    script = (
+        "import os, sys\nfrom gear.verbs.export import export\n"
+        "export(sys.argv[1], layout='kitti-depth', out=sys.argv[2],"
+        " on_progress=lambda written, _: written == 4 and os._exit(9))"
+    )
+    killed = subprocess.run([sys.executable, "-c", script, str(tmp_path / "a"), str(tmp_path / "b")], check=False)
+    assert killed.returncode == 9 and not (tmp_path / "b").exists()
+    unfinished = tmp_path / ".b.gear-export"
+    stray, first = unfinished / "stray/of_another.png", next(path for path in unfinished.rglob("*.*") if path.is_file())
+    stray.parent.mkdir()
+    stray.write_bytes(b"stray")
+    before = first.stat().st_ino
+    assert export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b") == 3
+    assert tree(tmp_path / "b") == tree(tmp_path / "whole") and not unfinished.exists()
+    assert (tmp_path / "b" / first.relative_to(unfinished)).stat().st_ino == before, "what was there was not rewritten"
+
+
+def test_an_export_writes_through_no_link(tmp_path: Path) -> None:
+    fill(tmp_path / "a", plan())
+    victim, unfinished = tmp_path / "victim", tmp_path / ".b.gear-export"
+    victim.mkdir()
+    (victim / "mine.txt").write_text("mine")
+    unfinished.mkdir()
+    (unfinished / "train").symlink_to(victim)
+    with pytest.raises(DatasetError, match="train: is a link"):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
+    hidden = unfinished / "val/.inner/link"
+    hidden.parent.mkdir(parents=True)
+    (unfinished / "train").rename(hidden)
+    with pytest.raises(DatasetError, match="link: is a link"):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
+    hidden.rename(unfinished / "train")
+    shutil.rmtree(unfinished / "val")
+    unlinked = unfinished / "train"
+    unlinked.unlink()
+    unfinished.rmdir()
+    unfinished.symlink_to(victim)
+    with pytest.raises(DatasetError, match=r"\.b\.gear-export: is a link"):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
+    assert tree(victim) == {"mine.txt": b"mine"} and not (tmp_path / "b").exists()
