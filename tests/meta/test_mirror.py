@@ -10,7 +10,6 @@ ROOT = Path(__file__).parents[2]
 DRAWN = "it needs a graphics context; tests/render compare the pictures of the renderers"
 WITHOUT = {
     "gear.camera.effects.effect": "the base class of effects; tests/camera/effects test every effect through it",
-    "gear.formats.parquet_files": "tests/formats/exports/test_parquet.py and test_hf.py read the files that it writes",
     "gear.render.filament": DRAWN,
     "gear.render.raster.gl": DRAWN,
     "gear.render.raster.scene": DRAWN,
