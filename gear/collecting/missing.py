@@ -15,14 +15,24 @@ from gear.contracts.executors import MOST_FAILURES, Executor, Outcome, Report
 from gear.dataset.claims import Claims
 from gear.dataset.executors.processes import Processes
 from gear.dataset.failures import clear_failures, failures_folder, note_failure, noted_failures
+from gear.dataset.files import inside
+from gear.dataset.layout import sidecar_path
 from gear.dataset.shards import Shard
 from gear.dataset.store import Store
 from gear.values.counted import counted
-from gear.values.errors import GearError, SamplesFailedError
+from gear.values.errors import BackendError, DatasetError, SamplesFailedError, WorkerInterruptedError
 from gear.values.progress import Callbacks
 
 FRESH_TRIES = 2
 """Number of further attempts to make a sample that failed, each in a new process."""
+
+MOST_IDLE = 8
+"""Number of rounds in a row without a new sample in this machine's dataset after which a run ends. The pauses between
+them add up to a minute, since a network disk may show another machine's files that late.
+"""
+
+SILENT_S = 10.0
+"""Seconds of waiting for other runs after which the run says for whom it waits."""
 
 POLL_S = 0.5
 """Seconds between two checks of the samples that other runs are making."""
@@ -49,8 +59,7 @@ def collect_missing(job: Job, store: Store, part: Shard, executor: Executor, cal
     try:
         making.run()
     finally:
-        for outcome in making.failed.values():
-            note_failure(store.root, store.split, outcome, making.tries[outcome.index])
+        making.note_failures()
     making.raise_failures()
     return making.made
 
@@ -104,18 +113,38 @@ class _Making:
                 if index in noted:
                     clear_failures(self.store.root, self.store.split, [index])
                 self.callbacks.on_progress(finished, total)
-                forecast.sample_done(index)
+                if inside(self.store.root, sidecar_path(self.store.split, index)).exists():  # a network disk lags
+                    forecast.sample_done(index)
 
+        idle = 0
         while pending:
+            before = set(pending)
             self._try_all(pending, report)
             self._try_again(report)
             if self.gave_up:
                 return
             pending = self._wait_for_others()
+            idle = idle + 1 if before == set(pending) else 0
+            if idle:
+                self._pause(idle)
             there = total - len(self.store.missing(self.part))
             if there > finished:
                 finished = there
                 self.callbacks.on_progress(finished, total)
+
+    def _pause(self, idle: int) -> None:
+        """Waits after a round that has left its samples missing.
+
+        Raises:
+            DatasetError: there were too many such rounds.
+        """
+        if idle >= MOST_IDLE:
+            problem = (
+                "the workers report samples that do not appear there; engines of several machines need an --out that "
+                "all of them share"
+            )
+            raise DatasetError(self.store.root, problem)
+        time.sleep(POLL_S * 2 ** (idle - 1))
 
     def _try_all(self, pending: Sequence[int], report: Report) -> None:
         """Tries each sample once; those that other runs have claimed are left out."""
@@ -142,7 +171,11 @@ class _Making:
                     return
                 try:
                     fresh.run(partial(make_samples, self.job), [index], report)
-                except GearError as error:
+                except WorkerInterruptedError:
+                    raise
+                except BackendError as error:
+                    if index not in self.failed:  # the worker died after it had made the sample
+                        break
                     report(replace(self.failed[index], error=f"{self.failed[index].error}; then: {error}"))
                 in_row = in_row + 1 if index in self.failed else 0
                 if index not in self.failed:
@@ -154,27 +187,53 @@ class _Making:
         Returns:
             Indices of the samples that a stopped run has left; empty when none is missing but those that failed.
         """
+        began_s, has_said = time.monotonic(), False
         with Claims(self.store.root, self.store.split) as claims:
             while missing := [index for index in self.store.missing(self.part) if index not in self.failed]:
                 free = [index for index in missing if not claims.is_taken(index)]
                 free = [index for index in free if index in set(self.store.missing(self.part))]
                 if free:
                     return free
+                if not has_said and time.monotonic() - began_s >= SILENT_S:
+                    has_said = True
+                    self.callbacks.on_warning(
+                        f"waiting for {claims.holder(missing[0])}, which is making sample {missing[0]}; "
+                        f"{counted(len(missing), 'sample')} left"
+                    )
                 time.sleep(POLL_S)
         return []
+
+    def note_failures(self) -> None:
+        """Notes the samples that could not be made, except those that another run has made meanwhile.
+
+        Raises:
+            DatasetError: a note cannot be written or deleted.
+        """
+        self._forget_made()
+        for outcome in self.failed.values():
+            note_failure(self.store.root, self.store.split, outcome, self.tries[outcome.index])
+        self._forget_made()  # one that the other run made while the notes were written
+
+    def _forget_made(self) -> None:
+        """Drops failures, and their notes, of samples that are no longer missing."""
+        missing = set(self.store.missing(self.part))
+        if made := [index for index in self.failed if index not in missing]:
+            clear_failures(self.store.root, self.store.split, made)
+            for index in made:
+                del self.failed[index]
 
     def raise_failures(self) -> None:
         """Raises:
         SamplesFailedError: a sample could not be made; the message says which, why, and what to do.
         """
-        if not (self.failed or self.gave_up):
+        left = len(self.store.missing(self.part)) - len(self.failed) if self.gave_up else 0
+        if not (self.failed or left > 0):
             return
         first, total = min(self.failed, default=None), len(self.store.indices(self.part))
-        left = len(self.store.missing(self.part)) - len(self.failed)
         parts = [f"{len(self.failed)} of {counted(total, 'sample')} of split {self.store.split!r} could not be made"]
         if first is not None:
             parts[0] += f" (sample {first}: {self.failed[first].error})"
-        if self.gave_up and left > 0:
+        if left > 0:
             parts.append(f"{left} more were not made after {MOST_FAILURES} failures in a row")
         parts.append(f"the errors are noted in {failures_folder(self.store.split)}")
         parts.append("put the cause right and run the same command again, which makes only what is missing")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gear.collecting.job import Job
@@ -90,7 +90,8 @@ def run_job(
     part = shard or WHOLE
     with store.begun(job.patch.files, force=force):
         store.refuse_damaged(part)
-        made = collect_missing(job, store, part, executor or InThisProcess(), callbacks or Callbacks())
+        absolute = replace(job, root=job.root.absolute())  # workers of other machines have other current folders
+        made = collect_missing(absolute, store, part, executor or InThisProcess(), callbacks or Callbacks())
         if shard is None:
             task = build(plugin, job.config.options)
             with blamed(plugin, "finalise"):

@@ -9,19 +9,22 @@ from typing import Any
 
 from gear.camera.pipeline import CameraPipeline
 from gear.camera.reflection import MirrorView, Reflection
-from gear.collecting.job import Job
+from gear.collecting.job import Job, versions
 from gear.collecting.probes import ProbeShot, compute_probes, shoot_probes
 from gear.collecting.scan_files import scan_files
-from gear.contracts.rendering import RawView, Renderer
+from gear.contracts.rendering import RawView, Renderer, RendererInfo
 from gear.contracts.tasks import Encoded, Sample, Task
 from gear.dataset.output_checks import check_encoded
+from gear.dataset.plan import differences
 from gear.dataset.probe_files import AuxiliaryFiles, probe_files
 from gear.groundtruth.laser_scan import scan_cameras, scan_points
 from gear.plugins.build import blamed, build, find
 from gear.plugins.catalogue import PluginEntry
 from gear.render.registry import open_renderer
+from gear.values.errors import BackendError
 from gear.values.frames import Frame, GeomTable, SceneObject
 from gear.values.scene import SceneRecord
+from gear.values.serial import to_json
 from gear.world.compilation.memory import map_large_buffers, release_memory, release_render_arrays
 from gear.world.compilation.world_cache import load_or_compile
 from gear.world.planner import ScenePlanner
@@ -134,7 +137,11 @@ class Session:
 
 @contextlib.contextmanager
 def open_session(job: Job) -> Iterator[Session]:
-    """A context that opens the world and the renderer of a job, and closes the renderer at the end."""
+    """Opens a worker's world and renderer, and closes the renderer at the end.
+
+    Raises:
+        BackendError: the renderer cannot start here, or it or a package is not the one that the plan names.
+    """
     map_large_buffers()
     plugin = find("task", job.config.task)
     task: Task[Any, Any] = build(plugin, job.config.options)
@@ -143,9 +150,10 @@ def open_session(job: Job) -> Iterator[Session]:
     world = load_or_compile(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
     night = night_of(world, job.weather, job.config.renderer)
     renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
-    release_render_arrays(world.model)
-    release_memory()
     try:
+        _refuse_other_renderer(job, renderer.info)
+        release_render_arrays(world.model)
+        release_memory()
         planner = ScenePlanner(world, rig, job.split, split_name=job.config.split)
         pipeline = camera_pipeline(
             job.weather, job.config.renderer, world.town_name, job.config.camera, night, world.shapes
@@ -161,3 +169,16 @@ def open_session(job: Job) -> Iterator[Session]:
         )
     finally:
         renderer.close()
+
+
+def _refuse_other_renderer(job: Job, info: RendererInfo) -> None:
+    """Refuses a machine that would make other bytes than the plan says: another device, driver or version.
+
+    Raises:
+        BackendError: names the first differences.
+    """
+    planned = {"renderer": to_json(job.renderer), "versions": job.plan.content["versions"]}
+    here = {"renderer": to_json(info), "versions": versions()}
+    if differing := differences(planned, here, places=("in the plan", "on this worker")):
+        problem = f"this worker would make other pictures ({', '.join(differing[:2])})"
+        raise BackendError(info.name, problem, "collect on machines with the same renderer, device and versions")

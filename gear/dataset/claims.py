@@ -15,19 +15,27 @@ from pathlib import Path
 
 from gear.contracts.executors import Outcome, Report
 from gear.dataset.files import explained, inside
-from gear.dataset.guarded_paths import opened_parent, owned, remove_empty_folders, remove_file
+from gear.dataset.guarded_paths import opened_parent, owned, refuse_shared, remove_empty_folders, remove_file
 from gear.dataset.layout import claim_path, sidecar_path, split_folder
 from gear.dataset.scratch import is_alive, lock_of, unique_name
+from gear.values.errors import DatasetError
 
 OLD_S = 900.0
-"""Age in seconds above which a claim counts as abandoned, if neither a lock nor a process number shows whether its run
-is alive. No sample takes so long.
-"""
+"""Age in seconds from which a claim counts as abandoned on a file system without locks; no sample takes as long."""
+
+LONGEST = 1000
+"""Number of bytes of a claim that are read."""
 
 TRIES = 100
 """Number of attempts to take a claim: another run may remove the claim, or its folder, between two steps."""
 
-OPENING = os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC
+GONE = (
+    "is not there on this machine: it was deleted during the run, or an engine of several machines needs an --out that "
+    "all of them share"
+)
+
+OPENING = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+READING = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 
 
 class Claims:
@@ -55,7 +63,7 @@ class Claims:
         """Claims a sample; returns False if another run has claimed it.
 
         Raises:
-            DatasetError: the claim's file cannot be written, or there is a link in its path.
+            DatasetError: the disk refuses, the root is missing, or the claim's path leads through a link.
         """
         relative = claim_path(self._split, index)
         with explained(self._root / relative):
@@ -64,10 +72,15 @@ class Claims:
                     descriptor = self._opened(relative)
                     if descriptor is None:
                         return False
-                    if self._is_current(relative, descriptor):
-                        self._held[index] = descriptor
-                        return True
-                    os.close(descriptor)
+                    try:
+                        if self._is_current(relative, descriptor):
+                            self._held[index] = descriptor
+                            return True
+                    finally:
+                        if index not in self._held:
+                            os.close(descriptor)
+            if not self._root.is_dir():
+                raise DatasetError(self._root, GONE)
         return False
 
     def _opened(self, relative: str) -> int | None:
@@ -79,15 +92,20 @@ class Claims:
             except FileExistsError:
                 descriptor = os.open(name, OPENING, dir_fd=folder)
                 is_new = False
-        is_free = lock_of(descriptor)
-        if is_free is None:
-            is_free = is_new or _is_abandoned(descriptor)
-        if not is_free:
+        try:
+            refuse_shared(descriptor, self._root / relative)
+            is_free = lock_of(descriptor)
+            if is_free is None:
+                is_free = is_new or _is_abandoned(descriptor)
+            if is_free:
+                os.ftruncate(descriptor, 0)
+                os.pwrite(descriptor, unique_name().encode(), 0)
+                return descriptor
+        except BaseException:
             os.close(descriptor)
-            return None
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, unique_name().encode(), 0)
-        return descriptor
+            raise
+        os.close(descriptor)
+        return None
 
     def _is_current(self, relative: str, descriptor: int) -> bool:
         """Whether the locked file is still the claim: the run that had it may have removed it at its end."""
@@ -122,6 +140,24 @@ class Claims:
                 self.release(index)
             report(Outcome(index=index, kind="elsewhere"))
 
+    def holder(self, index: int) -> str:
+        """The run that has claimed a sample, as words for a message.
+
+        Raises:
+            DatasetError: there is a link in the claim's path.
+        """
+        relative = claim_path(self._split, index)
+        with contextlib.suppress(OSError), opened_parent(self._root, relative) as (folder, name):
+            descriptor = os.open(name, READING, dir_fd=folder)
+            try:
+                text = os.pread(descriptor, LONGEST, 0).decode(errors="replace")
+            finally:
+                os.close(descriptor)
+            host, _, process = text.rpartition("-")[0].rpartition("-")
+            if host.isprintable() and host and process.isdecimal():
+                return f"process {process} on {host}"
+        return "another run"
+
     def is_taken(self, index: int) -> bool:
         """Whether a run holds the claim on a sample, which means that it is making the sample."""
         if not self.take(index):
@@ -145,8 +181,9 @@ def clear_claims(root: Path, split: str) -> None:
 
 
 def _is_abandoned(descriptor: int) -> bool:
-    """Whether the run that made a claim is gone, where there are no locks."""
-    alive = is_alive(os.pread(descriptor, 1000, 0).decode(errors="replace"))
-    if alive is None:
-        return time.time() - os.fstat(descriptor).st_mtime > OLD_S
-    return not alive
+    """Whether the run that made a claim is gone, where there are no locks.
+
+    The claim of a process that seems to run is abandoned when it is old, too: the number may be another program's now.
+    """
+    alive = is_alive(os.pread(descriptor, LONGEST, 0).decode(errors="replace"))
+    return alive is False or time.time() - os.fstat(descriptor).st_mtime > OLD_S

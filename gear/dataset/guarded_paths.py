@@ -185,6 +185,21 @@ def remove_empty_folders(root: Path, relative: str) -> None:
             os.rmdir(name, dir_fd=folder)
 
 
+def refuse_shared(descriptor: int, path: Path) -> None:
+    """Refuses to write into an open file that may also be a file outside of the root: one with several hard links.
+
+    A file that another run has removed meanwhile has none, and passes.
+
+    Raises:
+        DatasetError: the file has several hard links, or is no regular file.
+    """
+    status = os.fstat(descriptor)
+    if not stat.S_ISREG(status.st_mode):
+        raise DatasetError(path, "is no regular file; delete it, or use another --out")
+    if status.st_nlink > 1:
+        raise DatasetError(path, "is a hard link to a file with other names; delete it, or use another --out")
+
+
 def _is_link(name: str, folder: int) -> bool:
     try:
         return stat.S_ISLNK(os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode)

@@ -13,6 +13,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Literal
 
+from gear.dataset.failures import failures_folder
 from gear.dataset.files import inside
 from gear.dataset.hashing import file_hash, in_threads
 from gear.dataset.layout import GEAR, manifest_path, patch_path, plan_path, sidecar_path, split_folder
@@ -146,6 +147,12 @@ def unexpected_files(root: Path, checks: Iterable[SplitCheck]) -> list[Finding]:
         for check in checks
         for kind in ("begun/*.json", "claims/*.claim")
         for path in inside(root, split_folder(check.split)).glob(kind)
+    ]
+    leftovers += [
+        path
+        for check in checks
+        for path in inside(root, failures_folder(check.split)).glob("*.json")
+        if path.stem.isdecimal() and inside(root, sidecar_path(check.split, int(path.stem))).exists()
     ]
     leftovers += inside(root, SCRATCH).glob("*")
     found += [

@@ -266,6 +266,12 @@ def label_corners(label: KittiLabel) -> Array:
     return np.stack([c * along + s * across, up, -s * along + c * across], axis=1) + label.location_m
 
 
+WIRES = tuple((i, (i + 1) % 4) for i in range(4)) + tuple((i + 4, (i + 1) % 4 + 4) for i in range(4)) + tuple(
+    (i, i + 4) for i in range(4)
+)  # fmt: skip
+"""Edges of a box as pairs of corner numbers of `label_corners`; its front is the face of corners 0, 1, 4, 5."""
+
+
 def split_lists(split: str, ids: Sequence[str]) -> dict[str, bytes]:
     """The lists of sample ids of a split, as bytes by path: `ImageSets/<split>.txt` and `splits/<split>.txt`.
 

@@ -96,6 +96,10 @@ class BackendError(GearError):
         return f"renderer {self.backend}: {self.problem}; {self.remedy}"
 
 
+class WorkerInterruptedError(BackendError):
+    """A worker process that was interrupted alone, as by `kill -INT`; the run ends, and nothing is tried again."""
+
+
 class PatchError(GearError):
     """A patch file or folder that cannot be read or does not fit the dataset."""
 

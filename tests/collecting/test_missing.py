@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import platform
 import re
+import shutil
 import signal
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -27,7 +29,7 @@ from gear.dataset.shards import WHOLE
 from gear.dataset.store import Store
 from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
-from gear.values.errors import GearError, SamplesFailedError
+from gear.values.errors import BackendError, DatasetError, GearError, SamplesFailedError, WorkerInterruptedError
 from gear.values.progress import Callbacks
 from tests.dataset.splits import fill, plan, tree
 from tests.verbs.collect.test_run import command
@@ -154,13 +156,15 @@ def test_an_error_that_is_not_of_a_sample_ends_the_run_and_notes_what_failed_bef
     assert [path.stem for path in (tmp_path / "out/gear/test/failed").iterdir()] == ["000000"]
 
 
-def test_samples_that_another_run_is_making_are_waited_for(tmp_path: Path) -> None:
+def test_samples_that_another_run_is_making_are_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "SILENT_S", 0.05)
     job = job_of(tmp_path / "out", 3)
     Store(job.root, job.plan).open({})
     with Claims(job.root, "test") as other:
         assert other.take(1)
         made: list[int] = []
-        run = threading.Thread(target=lambda: made.append(collect(job)))
+        warned: list[str] = []
+        run = threading.Thread(target=lambda: made.append(collect(job, warned=warned)))
         run.start()
         while len(Store(job.root, job.plan).missing()) > 1:
             time.sleep(0.01)
@@ -174,6 +178,9 @@ def test_samples_that_another_run_is_making_are_waited_for(tmp_path: Path) -> No
         other.release(1)
         run.join(timeout=30)
         assert made == [2]
+        assert warned == [
+            f"waiting for process {os.getpid()} on {platform.node()}, which is making sample 1; 1 sample left"
+        ]
 
 
 def test_a_sample_whose_run_was_stopped_is_made_here(tmp_path: Path) -> None:
@@ -183,6 +190,98 @@ def test_a_sample_whose_run_was_stopped_is_made_here(tmp_path: Path) -> None:
     assert other.take(1)
     threading.Timer(0.5, other.release, [1]).start()
     assert collect(job) == 3
+
+
+class Retry:
+    """A fresh process that makes sample 0 through another run, and then ends as it is given."""
+
+    def __init__(self, job: Any, error: Exception | None, *, is_made: bool) -> None:
+        self.job, self.error, self.is_made, self.runs = job, error, is_made, 0
+
+    def run(self, work: Any, indices: Sequence[int], report: Report) -> None:
+        self.runs += 1
+        if self.is_made:
+            fill(self.job.root, self.job.plan, [0], is_closed=False)
+            report(Outcome(index=0))
+        if self.error is not None:
+            raise self.error
+        report(Outcome(index=0, kind="failed", error="again"))
+
+
+def fails(job: Any, indices: Iterator[int], report: Report) -> None:
+    for index in indices:
+        report(Outcome(index=index, kind="failed", error="first"))
+
+
+@pytest.mark.parametrize("is_made", [False, True])
+@pytest.mark.parametrize("error", [DatasetError("out", "the disk is full"), WorkerInterruptedError("raster", "a", "b")])
+def test_an_error_that_ends_a_run_ends_the_second_tries(
+    error: GearError, is_made: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = job_of(tmp_path / "out", 1)
+    retry = Retry(job, error, is_made=is_made)
+    monkeypatch.setattr(module, "make_samples", fails)
+    monkeypatch.setattr(module, "Processes", lambda **_: retry)
+    with pytest.raises(type(error), match=str(error)):
+        collect(job)
+    assert retry.runs == 1
+
+
+def test_a_worker_that_dies_after_its_sample_is_made_has_made_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = job_of(tmp_path / "out", 1)
+    retry = Retry(job, BackendError("raster", "a worker died", "again"), is_made=True)
+    monkeypatch.setattr(module, "make_samples", fails)
+    monkeypatch.setattr(module, "Processes", lambda **_: retry)
+    assert collect(job) == 1 and retry.runs == 1
+
+
+def test_a_sample_that_another_run_makes_after_it_failed_here_is_no_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = job_of(tmp_path / "out", 1)
+
+    class Other:
+        def run(self, work: Any, indices: Sequence[int], report: Report) -> None:
+            report(Outcome(index=0, kind="failed", error="again"))
+            fill(job.root, job.plan, [0], is_closed=False)
+
+    monkeypatch.setattr(module, "make_samples", fails)
+    monkeypatch.setattr(module, "Processes", lambda **_: Other())
+    assert collect(job) == 0
+    assert not (tmp_path / "out/gear/test/failed").exists()
+
+
+class Elsewhere:
+    """An engine whose workers see another folder of the same name: all is made there, and nothing here."""
+
+    def __init__(self) -> None:
+        self.rounds = 0
+
+    def run(self, work: Any, indices: Sequence[int], report: Report) -> None:
+        self.rounds += 1
+        for index in indices:
+            report(Outcome(index=index, kind="made" if self.rounds == 1 else "elsewhere"))
+
+
+def test_samples_that_never_appear_here_end_the_run(tmp_path: Path) -> None:
+    engine = Elsewhere()
+    with pytest.raises(DatasetError, match=r"do not appear there; .*--out that all of them share"):
+        collect(job_of(tmp_path / "out", 3), engine)
+    assert engine.rounds == module.MOST_IDLE
+
+
+def test_a_root_that_is_deleted_during_the_run_ends_it(tmp_path: Path) -> None:
+    class Deletes:
+        def run(self, work: Any, indices: Sequence[int], report: Report) -> None:
+            shutil.rmtree(tmp_path / "out")
+            for index in indices:
+                report(Outcome(index=index, kind="elsewhere"))
+
+    with pytest.raises(DatasetError, match="out: is not there on this machine"):
+        collect(job_of(tmp_path / "out", 3), Deletes())
+    assert not (tmp_path / "out").exists()
 
 
 def made_by(said: str) -> int:

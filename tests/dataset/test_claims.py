@@ -83,6 +83,25 @@ def test_without_locks_the_old_claim_of_another_machine_is_taken_over(tmp_path: 
         assert claims.take(3)
 
 
+def test_without_locks_the_old_claim_of_a_reused_process_number_is_taken_over(tmp_path: Path, no_locks: None) -> None:
+    path = tmp_path / claim_path("test", 3)
+    path.parent.mkdir(parents=True)
+    path.write_text(f"{scratch._host()}-{os.getppid()}-0123456789abcdef")
+    with Claims(tmp_path, "test") as claims:
+        assert not claims.take(3) and claims.holder(3) == f"process {os.getppid()} on {scratch._host()}"
+        old = path.stat().st_mtime - OLD_S - 1
+        os.utime(path, (old, old))
+        assert claims.take(3)
+
+
+@pytest.mark.parametrize("text", ["", "a\x1b[2J-7-ab", "host-x-ab", "host"])
+def test_a_claim_that_names_no_process_is_another_runs(text: str, tmp_path: Path) -> None:
+    path = tmp_path / claim_path("test", 3)
+    path.parent.mkdir(parents=True)
+    path.write_text(text)
+    assert Claims(tmp_path, "test").holder(3) == "another run" == Claims(tmp_path, "test").holder(4)
+
+
 def test_samples_that_are_made_or_claimed_are_left_out(tmp_path: Path) -> None:
     fill(tmp_path, plan(samples=5), [1], is_closed=False)
     reported: list[Outcome] = []
@@ -114,6 +133,33 @@ def test_a_claim_is_written_through_no_link(tmp_path: Path) -> None:
     with Claims(tmp_path / "out", "test") as claims, pytest.raises(DatasetError, match="is a link"):
         claims.take(3)
     assert victim.read_text() == "mine"
+
+
+def test_a_claim_is_written_into_no_hard_link_and_no_fifo(tmp_path: Path) -> None:
+    victim, out = tmp_path / "victim", tmp_path / "out"
+    victim.write_text("mine")
+    (out / claim_path("test", 3)).parent.mkdir(parents=True)
+    (out / claim_path("test", 3)).hardlink_to(victim)
+    os.mkfifo(out / claim_path("test", 4))
+    before = len(list(Path("/proc/self/fd").iterdir())) if Path("/proc/self/fd").is_dir() else 0
+    with Claims(out, "test") as claims:
+        with pytest.raises(DatasetError, match=r"000003\.claim: is a hard link"):
+            claims.take(3)
+        with pytest.raises(DatasetError, match=r"000004\.claim: is no regular file"):
+            claims.take(4)
+        if before:
+            assert len(list(Path("/proc/self/fd").iterdir())) == before, "no descriptor is left open"
+    with pytest.raises(DatasetError, match="is a hard link"):
+        clear_claims(out, "test")
+    assert victim.read_text() == "mine"
+
+
+def test_a_root_that_is_missing_on_this_machine_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(
+        DatasetError, match=r"none: is not there on this machine.*--out that all of them share"
+    ) as caught:
+        Claims(tmp_path / "none", "test").take(3)
+    assert "\n" not in str(caught.value) and not (tmp_path / "none").exists()
 
 
 def test_closing_a_split_clears_its_claims_and_notes(tmp_path: Path) -> None:

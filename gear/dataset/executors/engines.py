@@ -9,8 +9,8 @@ from gear.contracts.executors import Executor
 from gear.dataset import executors
 from gear.values.errors import UnknownNameError
 
-NO_ENGINES = ("engines", "in_process", "parts")
-"""Modules of this folder that are not engines."""
+NO_ENGINES = ("engines", "in_process", "parts", "threads")
+"""Modules of the room that are no engine."""
 
 DEFAULT = "processes"
 

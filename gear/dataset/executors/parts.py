@@ -63,7 +63,7 @@ def report_part(result: list[Outcome] | str, report: Report) -> bool:
     return any(outcome.kind != "failed" for outcome in result)
 
 
-def report_lost(indices: Sequence[int], problem: str, report: Report) -> None:
-    """Reports all items (samples of a split) of a part as failed, because the worker that made them was lost."""
+def report_lost(indices: Sequence[int], problem: str, report: Report, *, trace: str = "") -> None:
+    """Reports the items of a part as failed, whose worker was lost."""
     for index in indices:
-        report(Outcome(index=index, kind="failed", error=problem))
+        report(Outcome(index=index, kind="failed", error=problem, trace=trace))

@@ -15,16 +15,19 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from typing import Any
+from typing import Any, TypeVar
 
 from gear.contracts.executors import MOST_FAILURES, Executor, Outcome, Report, Work
-from gear.values.errors import BackendError, GearError
-from gear.values.machine import cores
+from gear.dataset.executors.threads import share_of, threads_set
+from gear.values.errors import BackendError, GearError, WorkerInterruptedError
+
+T = TypeVar("T")
 
 SILENCE_S = 600.0
 """Seconds without a message after which a worker counts as hung. Graphics drivers can hang, and even slow machines need
@@ -32,10 +35,6 @@ less than a minute per item."""
 
 INTERRUPTED = 130
 """Exit code of a worker process that was interrupted by Ctrl-C."""
-
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "LP_NUM_THREADS")
-"""Environment variables that set the number of threads of torch, NumPy and Mesa's software rasteriser. Without them,
-every worker would start one thread per core, and the workers would slow each other down."""
 
 AGAIN = "run the same command again: finished samples are kept"
 
@@ -81,8 +80,8 @@ class Processes:
             report: called in this process with the outcome of each item.
 
         Raises:
-            GearError: the first error of a worker that does not concern a single item.
-            BackendError: a worker died or hung before it took an item, or was interrupted.
+            Exception: the first one that ends a worker's work, such as a `GearError` or a full table of open files.
+            BackendError: a worker died or hung before its first item, or was interrupted.
         """
         count = min(self.workers, len(indices))
         pool = _Pool(backend=self.backend, work=work, pending=deque(indices), report=report, count=count)
@@ -134,7 +133,7 @@ class _Pool:
         name = f"gear-{len(self.workers)}"
         process = context.Process(target=_work, args=(self.work, theirs), daemon=True, name=name)
         # The worker inherits the mask, so that Ctrl-C does not stop it amid its imports.
-        with _no_interrupts(), _threads_shared(self.count):
+        with _no_interrupts(), threads_set(share_of(self.count)):
             process.start()
             theirs.close()  # so that the pipe ends with the worker
             self.workers.append(_Worker(process=process, pipe=ours))
@@ -143,7 +142,7 @@ class _Pool:
         """Serves the workers until all have ended.
 
         Raises:
-            GearError: as `Processes.run`.
+            Exception: as `Processes.run`.
         """
         while self.workers:
             by_pipe: dict[Any, _Worker] = {worker.pipe: worker for worker in self.workers}
@@ -160,7 +159,7 @@ class _Pool:
                 self._lost(worker, f"no sample for {SILENCE_S:g} s, the driver seems to hang")
 
     def _answer(self, worker: _Worker, message: Any) -> None:
-        if isinstance(message, GearError):
+        if isinstance(message, Exception):
             raise message
         if message is None:  # it asks for an item
             worker.has_taken = True
@@ -180,7 +179,7 @@ class _Pool:
         worker.process.join(timeout=10)
         code = worker.process.exitcode
         if code == INTERRUPTED:
-            raise BackendError(self.backend, f"a worker died (exit code {code})", AGAIN)
+            raise WorkerInterruptedError(self.backend, f"a worker died (exit code {code})", AGAIN)
         if code == 0 and not worker.held and worker.has_taken:
             self.workers.remove(worker)
             return
@@ -213,19 +212,6 @@ class _Pool:
 
 
 @contextlib.contextmanager
-def _threads_shared(workers: int) -> Iterator[None]:
-    """Gives each worker that is started its share of the cores, unless the user has set a number of threads."""
-    share = str(max(1, cores() // workers))
-    pinned = {name: share for name in THREADS if workers > 1 and name not in os.environ}
-    os.environ.update(pinned)
-    try:
-        yield
-    finally:
-        for name in pinned:
-            os.environ.pop(name, None)
-
-
-@contextlib.contextmanager
 def _no_interrupts() -> Iterator[None]:
     """Keeps Ctrl-C waiting, where the system can."""
     if sys.platform != "win32":
@@ -246,22 +232,32 @@ def _work(work: Work, pipe: Connection) -> None:
 
     def remaining() -> Iterator[int]:
         while True:
-            pipe.send(None)
-            index = pipe.recv()
+            _or_exit(lambda: pipe.send(None))
+            index = _or_exit(pipe.recv)
             if index is None:
                 return
             yield index
 
+    def report(outcome: Outcome) -> None:
+        _or_exit(lambda: pipe.send(outcome))
+
     threading.Thread(target=_follow_parent, daemon=True).start()
     try:
         _interrupts_again()
-        work(remaining(), pipe.send)
+        work(remaining(), report)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)  # the parent may be interrupted too, and read no report
-    except (EOFError, BrokenPipeError, ConnectionResetError):  # the parent has ended, or gave this worker up
+    except Exception as error:
+        portable = _portable(error)
+        _or_exit(lambda: pipe.send(portable))
+
+
+def _or_exit(talk: Callable[[], T]) -> T:
+    """Talks to the parent; ends this process if the parent has ended, or has given this worker up."""
+    try:
+        return talk()
+    except (EOFError, BrokenPipeError, ConnectionResetError):
         sys.exit(1)
-    except GearError as error:
-        pipe.send(_portable(error))
 
 
 def _follow_parent() -> None:
@@ -272,10 +268,17 @@ def _follow_parent() -> None:
     os._exit(1)
 
 
-def _portable(error: GearError) -> GearError:
-    """The error itself if it can be pickled for the parent, else a `GearError` with its text."""
+def _portable(error: Exception) -> Exception:
+    """The error itself if it can be pickled for the parent, else a `GearError` with its text.
+
+    One that is a bug carries its traceback as a note, since pickling loses it.
+    """
+    if not isinstance(error, GearError):
+        error.add_note("In a worker:\n" + "".join(traceback.format_exception(error)).rstrip())
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:  # unpickling runs the error's own code, which may be a third party's
-        return GearError(str(error))
+        lines = str(error).strip().splitlines()
+        text = lines[0] if lines else ""
+        return GearError(text if isinstance(error, GearError) else f"{type(error).__name__}: {text}")
     return error

@@ -13,7 +13,9 @@ from typing import Any
 
 from gear.contracts.executors import MOST_FAILURES, Executor, Report, Work
 from gear.dataset.executors.parts import report_lost, report_part, run_part, split_in_parts
+from gear.dataset.executors.threads import share_of, thread_variables
 from gear.values.errors import GearError
+from gear.values.machine import cores
 
 RETRIES = 5
 """Number of times that Ray restarts a part after its worker or machine was lost."""
@@ -91,7 +93,10 @@ class OnRay:
 
     def _run_parts(self, ray: Any, work: Work, parts: list[list[int]], report: Report) -> None:
         """Keeps as many parts at work as there are workers, until all are made or too many fail in a row."""
-        remote = ray.remote(num_cpus=1, max_retries=RETRIES, scheduling_strategy="SPREAD")(run_part)
+        # On a cluster a part has one core; a cluster that is started here shares this machine's cores.
+        threads = (share_of(self.workers) or cores()) if self.address is None else 1
+        settings = {"num_cpus": 1, "max_retries": RETRIES, "scheduling_strategy": "SPREAD"}
+        remote = ray.remote(**settings, runtime_env={"env_vars": thread_variables(threads)})(run_part)
         shared = ray.put(work)
         running: dict[Any, list[int]] = {}
         pending, failed = list(reversed(parts)), 0

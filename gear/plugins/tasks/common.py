@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from gear.contracts.legends import Rgb
 from gear.contracts.tasks import Sample
 from gear.dataset.files import inside
 from gear.dataset.sidecar_validation import check_numbers
@@ -177,6 +178,13 @@ def _read(root: Path, relative: str, decode: Callable[[bytes], npt.NDArray[Any]]
 
 IGNORED_COLOUR = (170, 170, 170)
 """Colour of objects and regions that evaluations ignore, RGB."""
+
+
+def category_colour(category_id: int) -> Rgb:
+    """Colour of a COCO category in previews, RGB; neighbouring categories differ in hue."""
+    hue = np.array([[[category_id * 47 % 180, 200, 255]]], dtype=np.uint8)
+    red, green, blue = (int(v) for v in cv2.cvtColor(hue, cv2.COLOR_HSV2RGB)[0, 0])
+    return (red, green, blue)
 
 
 def draw_surfaces(picture: UInt8Image, sample: Sample, camera: str) -> None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-import cv2
 import numpy as np
 
 from gear.augment.geometry import (
@@ -42,6 +41,7 @@ from gear.metrics.coco_reference import TallObjects
 from gear.plugins.tasks.common import (
     IGNORED_COLOUR,
     CameraOptions,
+    category_colour,
     check_objects,
     draw_box,
     draw_surfaces,
@@ -310,7 +310,7 @@ class Detect2dTask:
     def legends(self) -> Mapping[str, Legend]:
         """The colours of the preview: one for each category in gear's towns, and grey for ignored objects."""
         occurring = sorted({label.coco_id for label in LABELS if label.coco_id is not None})
-        named = tuple((coco.CATEGORY_NAMES[one], _category_colour(one)) for one in occurring)
+        named = tuple((coco.CATEGORY_NAMES[one], category_colour(one)) for one in occurring)
         return {"boxes": ColourNames(entries=(*named, ("ignored", IGNORED_COLOUR)))}
 
     def _picture(self, sidecar: Sidecar) -> coco.Picture:
@@ -392,13 +392,7 @@ def _annotation(thing: Object2d, camera: CameraRecord) -> coco.Annotation:
 
 
 def _colour(thing: Object2d) -> Rgb:
-    return IGNORED_COLOUR if thing.is_ignored else _category_colour(thing.category_id)
-
-
-def _category_colour(category_id: int) -> Rgb:
-    hue = np.array([[[category_id * 47 % 180, 200, 255]]], dtype=np.uint8)
-    red, green, blue = (int(v) for v in cv2.cvtColor(hue, cv2.COLOR_HSV2RGB)[0, 0])
-    return (red, green, blue)
+    return IGNORED_COLOUR if thing.is_ignored else category_colour(thing.category_id)
 
 
 LEAST_KEPT = 0.3

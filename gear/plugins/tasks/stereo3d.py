@@ -22,6 +22,7 @@ from gear.formats import results
 from gear.formats.billboard_info import billboard_info
 from gear.formats.jsontext import dump
 from gear.formats.kitti_object import (
+    WIRES,
     Calibration,
     KittiLabel,
     dont_care,
@@ -324,12 +325,6 @@ class Stereo3dTask:
         """The colours of the preview's boxes by KITTI type, and grey for `DontCare` regions."""
         entries = (*COLOURS.items(), ("other types", OTHER_COLOUR), ("DontCare", IGNORED_COLOUR))
         return {LEFT: ColourNames(entries=entries)}
-
-
-WIRES = tuple((i, (i + 1) % 4) for i in range(4)) + tuple((i + 4, (i + 1) % 4 + 4) for i in range(4)) + tuple(
-    (i, i + 4) for i in range(4)
-)  # fmt: skip
-"""Edges of a box as pairs of corner numbers of `label_corners`; its front is the face of corners 0, 1, 4, 5."""
 
 
 def _measured(

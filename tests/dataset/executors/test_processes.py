@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import time
@@ -13,9 +14,10 @@ import pytest
 
 from gear.contracts.executors import MOST_FAILURES, Executor, Outcome, Report
 from gear.dataset.executors import processes as workers
+from gear.dataset.executors import threads
 from gear.dataset.executors.processes import Processes
 from gear.testing.executor_contract import ExecutorContract, write_items
-from gear.values.errors import BackendError
+from gear.values.errors import BackendError, GearError
 
 
 class TestProcesses(ExecutorContract):
@@ -36,7 +38,7 @@ def die_at(deadly: tuple[int, ...], number: int, indices: Iterator[int], report:
 
 def tell_threads(folder: str, indices: Iterator[int], report: Report) -> None:
     for index in indices:
-        (Path(folder) / str(index)).write_text(",".join(os.environ.get(name, "") for name in workers.THREADS))
+        (Path(folder) / str(index)).write_text(",".join(os.environ.get(name, "") for name in threads.THREADS))
         report(Outcome(index=index))
 
 
@@ -44,10 +46,10 @@ def tell_threads(folder: str, indices: Iterator[int], report: Report) -> None:
 def test_workers_share_the_cores_unless_the_user_has_set_threads(
     count: int, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in workers.THREADS:
+    for name in threads.THREADS:
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv(workers.THREADS[1], "9")
-    monkeypatch.setattr(workers, "cores", lambda: 8)
+    monkeypatch.setenv(threads.THREADS[1], "9")
+    monkeypatch.setattr(threads, "cores", lambda: 8)
     before = dict(os.environ)
     ran(partial(tell_threads, str(tmp_path)), 2, count)
     assert {path.read_text() for path in tmp_path.iterdir()} == {said}
@@ -97,6 +99,39 @@ def test_a_worker_that_hangs_is_ended_and_replaced(monkeypatch: pytest.MonkeyPat
     reported = ran(partial(hang_at, 1), 3)
     assert {index: outcome.kind for index, outcome in reported.items()} == {0: "made", 1: "failed", 2: "made"}
     assert "no sample for 15 s, the driver seems to hang" in reported[1].error
+
+
+class OddError(Exception):
+    """An error that pickle cannot make again."""
+
+    def __init__(self, first: str, second: str) -> None:
+        super().__init__(f"{first}\n{second}")
+
+
+def reach_a_limit(kind: str, indices: Iterator[int], report: Report) -> None:
+    for _ in indices:
+        if kind == "files":
+            raise OSError(errno.EMFILE, "Too many open files")
+        if kind == "pipe":
+            raise BrokenPipeError(errno.EPIPE, "Broken pipe")
+        raise MemoryError if kind == "memory" else OddError("it broke", "here")
+
+
+@pytest.mark.parametrize(
+    ("kind", "error", "said"),
+    [
+        ("files", OSError, "Too many open files"),
+        ("memory", MemoryError, "In a worker"),
+        ("pipe", BrokenPipeError, "Broken pipe"),
+        ("odd", GearError, "^OddError: it broke$"),
+    ],
+)
+def test_an_error_that_is_not_of_an_item_ends_the_run_as_itself(kind: str, error: type[Exception], said: str) -> None:
+    with pytest.raises(error, match=said) as caught:
+        ran(partial(reach_a_limit, kind), 2)
+    if kind == "files":
+        assert isinstance(caught.value, OSError) and caught.value.errno == errno.EMFILE
+        assert "reach_a_limit" in caught.value.__notes__[0], "the worker's traceback"
 
 
 @pytest.mark.parametrize("code", [0, 1])

@@ -12,9 +12,11 @@ from typing import Any
 import pytest
 
 from gear.contracts.executors import Executor, Outcome, Report
+from gear.dataset.executors import threads
 from gear.dataset.executors.ray import OnRay
 from gear.testing.executor_contract import ExecutorContract
 from gear.values.errors import GearError
+from tests.dataset.executors.test_processes import tell_threads
 
 ray = pytest.importorskip("ray")
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
@@ -61,6 +63,15 @@ def test_nodes_that_are_killed_cost_no_item(cluster: Any, tmp_path: Path) -> Non
     killer.join()
     assert {outcome.index for outcome in reported if outcome.kind == "made"} == set(range(24))
     assert len(list(tmp_path.iterdir())) == 24
+
+
+@pytest.mark.usefixtures("cluster")
+def test_parts_share_the_cores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in threads.THREADS:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(threads, "cores", lambda: 8)
+    OnRay(workers=2).run(partial(tell_threads, str(tmp_path)), [0], lambda outcome: None)
+    assert (tmp_path / "0").read_text() == "4,4,4,4"
 
 
 def test_an_address_without_a_cluster_is_one_line() -> None:

@@ -141,6 +141,18 @@ def test_what_does_not_belong_there_is_reported_and_stays(tmp_path: Path, copy_s
     assert (folder / "stray.png").exists() and not (root / "gear/scratch").exists()
 
 
+def test_a_note_on_the_failure_of_a_sample_that_exists_is_left_over(tmp_path: Path, copy_small: Copy) -> None:
+    root = copy_small("depth", tmp_path / "data")
+    notes = root / "gear/debug/failed"
+    notes.mkdir()
+    for index in (0, 1):
+        (notes / f"{index:06d}.json").write_text("{}")
+    (root / "gear/debug/samples/000001.json").unlink()
+    found = {one.path: one.problem for one in gear.verify(root).findings}
+    assert found == {"gear/debug/failed/000000.json": "unexpected", "gear/debug/samples/000001.json": "missing"}
+    assert repaired(root).is_whole and not notes.exists()
+
+
 def test_an_unfinished_split_is_finished(tmp_path: Path, copy_small: Copy) -> None:
     root = copy_small("depth", tmp_path / "data")
     before = tree(root)
