@@ -133,8 +133,8 @@ def copy_patches(parts: Parts, out: Path, check: Callable[[Mapping[str, Path]], 
     Args:
         parts: the source folders; if several hold the pictures, they must be equal.
         out: the target folder.
-        check: called with the paths of the pictures by name, before they are read whole; raises an error if they are not
-            those of the plan.
+        check: called with the paths of the pictures by name, before they are read whole; raises an error if they are
+            not those of the plan.
 
     Raises:
         DatasetError: two folders have different pictures.

@@ -66,8 +66,7 @@ from gear.values.rig import Rig
 from gear.values.scene import SceneRecord
 from gear.values.serial import Json, from_json, to_json
 
-LEFT, RIGHT = "left", "right"
-LEAST_BASELINE_M, MOST_BASELINE_M = 0.01, 10.0
+LEFT, RIGHT, LEAST_BASELINE_M, MOST_BASELINE_M = "left", "right", 0.01, 10.0
 COLOURS = {"Car": (60, 220, 60), "Van": (60, 200, 200), "Truck": (80, 140, 255), "Pedestrian": (255, 80, 80)}
 OTHER_COLOUR = (255, 200, 60)
 
@@ -323,8 +322,8 @@ class Stereo3dTask:
 
     def legends(self) -> Mapping[str, Legend]:
         """The colours of the preview's boxes by KITTI type, and grey for `DontCare` regions."""
-        entries = (*COLOURS.items(), ("other types", OTHER_COLOUR), ("DontCare", IGNORED_COLOUR))
-        return {LEFT: ColourNames(entries=entries)}
+        named = (*COLOURS.items(), ("other types", OTHER_COLOUR), ("DontCare", IGNORED_COLOUR))
+        return {LEFT: ColourNames(entries=named)}
 
 
 def _measured(
