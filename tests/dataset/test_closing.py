@@ -20,10 +20,10 @@ def test_sidecars_are_read_in_order_and_not_kept(tmp_path: Path) -> None:
     fill(tmp_path, plan(samples=5))
     stream = SidecarStream(tmp_path, "test", 5, set())
     gc.collect()
-    before = sum(isinstance(thing, Sidecar) for thing in gc.get_objects())
+    before = sum(type(thing) is Sidecar for thing in gc.get_objects())
     for index, sidecar in enumerate(stream):
         assert sidecar.record.index == index == stream[index].record.index
-        assert sum(isinstance(thing, Sidecar) for thing in gc.get_objects()) - before <= 2
+        assert sum(type(thing) is Sidecar for thing in gc.get_objects()) - before <= 2
     assert [one.record.index for one in stream[1:4:2]] == [1, 3] and stream[-1].record.index == 4
     with pytest.raises(IndexError):
         stream[5]

@@ -19,8 +19,9 @@ def kitti_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -
 
     Splits whose first word is `test` are written to the folder `testing`, all other splits to `training`. In each of
     the two folders, ids count from 0 through all splits; `ImageSets/<split>.txt` lists the ids of a split.
-    `ImageSets/trainval.txt` joins `train`, `val` and a split `trainval`. `velodyne` exists if
-    the dataset has laser scans (`scans: true` in the configuration). The benchmark keeps the labels of `testing` secret; the export has them in `testing/label_2`.
+    `ImageSets/trainval.txt` joins `train`, `val` and a split `trainval`. `velodyne` exists if the dataset has laser
+    scans (`scans: true` in the configuration). The benchmark keeps the labels of `testing` secret; the export has them
+    in `testing/label_2`.
 
     Args:
         splits: the finished splits of the dataset.
