@@ -196,7 +196,3 @@ def _write(path: Path | None, known: dict[str, Verdict | None]) -> None:
         ) as file:
             json.dump(dict(list(known.items())[-MOST_KEPT:]), file)
         Path(file.name).replace(path)
-
-
-MOST_KEPT = 1000
-"""Largest number of results in the cache; the newest are stored."""

@@ -56,7 +56,7 @@ def identity(distribution: importlib.metadata.Distribution) -> tuple[str, str]:
     """
     try:
         name, version = str(distribution.name or ""), str(distribution.version or "")
-    except Exception:
+    except Exception:  # the metadata of a stranger's package may raise anything
         name = version = ""
     # There is no public way to a distribution's folder.
     folder = str(getattr(getattr(distribution, "_path", None), "stem", "?"))
