@@ -134,11 +134,6 @@ def test_only_the_first_samples_and_progress(write_dataset: Any, tmp_path: Path)
     assert [sample["index"] for sample in index["samples"]] == [0, 1, 2] and index["about"]["total"] == 5
 
 
-def test_an_empty_split_is_a_page_too(write_dataset: Any, tmp_path: Path) -> None:
-    assert write_view(write_dataset("depth", 0), tmp_path / "page.html").samples == 0
-    assert Blocks(tmp_path / "page.html").index["samples"] == []
-
-
 def test_damaged_samples_and_bad_previews_are_said_and_not_fatal(
     opened: Callable[..., Dataset[Any]], tmp_path: Path
 ) -> None:

@@ -50,9 +50,10 @@ def main(folder: str) -> None:
     lighting = _lighting_in_process(weather)
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     known = {os.path.realpath(path) for path in asset_files(library).values()}
+    readers = min(_READERS, cores())  # reads files of the system, which do not determine the world
     files_read = _record_files_read()
     plan = plan_world(library, scene, weather)
-    compiled = compile_world(plan, lighting, readers=min(_READERS, cores()))
+    compiled = compile_world(plan, lighting, readers=readers)
     is_covered = files_read <= known
     with ThreadPoolExecutor(1) as thread:
         key_afterwards = thread.submit(world_key, plan)
