@@ -155,8 +155,18 @@ class LampShadows:
         return User(points_m=points_m, spacing_m=spacing_m, middle_m=middle_m, radius_m=radius_m)
 
     def standing(self, kind: str, index: int, lamp_frame: LampFrame, reach_m: float) -> Floats:
-        """The distances in metres at which static objects stop the light of a static lamp: (cells, cells) float32,
-        computed once per lamp.
+        """Returns the shadow map of a static lamp, with the shadows of static objects only; computed once per
+        lamp.
+
+        Args:
+            kind: kind of the lamp.
+            index: index of the lamp among the lamps of that kind.
+            lamp_frame: position and axes of the lamp, and size of its shadow map.
+            reach_m: range of the lamp in metres.
+
+        Returns:
+            (cells, cells) float32 distance in metres from the lamp at which the light is blocked, infinite where it is
+            not.
         """
         if (kind, index) not in self._fixed:
             self._fixed[kind, index] = first_hits(self.casters.near(lamp_frame.place_m, reach_m), lamp_frame)

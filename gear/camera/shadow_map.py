@@ -76,7 +76,13 @@ class LampFrame:
 
     @staticmethod
     def of(place_m: Array, axis: Array, layout: Layout) -> LampFrame:
-        """The position and axes of a lamp at the world position `place_m` (3,) that shines along `axis` (3,)."""
+        """Computes the axes of a lamp.
+
+        Args:
+            place_m: (3,) world position of the lamp in metres.
+            axis: (3,) world direction in which the lamp shines, of any length above 0.
+            layout: size and field of view of the lamp's shadow map.
+        """
         along = axis / np.linalg.norm(axis)
         across = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < _LEVEL else (0.0, 1.0, 0.0))
         across /= np.linalg.norm(across)

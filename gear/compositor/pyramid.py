@@ -124,7 +124,9 @@ class Pyramid:
         return len(self.starts)
 
     def shape(self, level: int) -> tuple[int, int]:
-        """The number of texel rows and texel columns of a mip level."""
+        """Returns (rows, columns) of mip level `level` in texels. Level 0 is the full texture of the surface; the
+        last level is the coarsest.
+        """
         return self.rows[level].shape[0], self.columns[level].shape[0]
 
     def reads(self, level: int) -> tuple[Reads, Reads, int]:
@@ -135,7 +137,14 @@ class Pyramid:
         return _identity(height), _identity(width), width
 
     def spread(self, patch: Tensor) -> Tensor:
-        """Computes the texels of all mip levels: (..., 3, h, w) patch to (..., size, 3) columns; differentiable."""
+        """Computes the texels of all mip levels in one array; differentiable.
+
+        Args:
+            patch: (..., 3, h, w) pixels of the patch in 0..1.
+
+        Returns:
+            (..., size, 3) texels, level by level and row by row, in the order of `starts`.
+        """
         import torch
 
         levels = [patch]

@@ -179,5 +179,5 @@ class Task(Protocol[SampleT, PredictionT]):
         ...
 
     def preview(self, sample: SampleT) -> Mapping[str, UInt8Image]:
-        """Pictures of a sample for people, by name: (H, W, 3) uint8, with labels, boxes or depth drawn in."""
+        """Returns pictures of a sample to look at, by name: (H, W, 3) uint8, with labels, boxes or depth drawn in."""
         ...

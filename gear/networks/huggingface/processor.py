@@ -72,8 +72,15 @@ class Processor:
         return functional.pad(seen, (left, right, top, bottom))
 
     def restore(self, maps: Tensor, picture_px: Size, mode: str) -> Tensor:
-        """Converts (B, C, h, w) maps over the network's input to (B, C, H, W) maps over the picture; margins are
-        cut off.
+        """Resamples maps from the size of the network's input to the size of the picture, and cuts margins off.
+
+        Args:
+            maps: (B, C, h, w) maps over the network's input, of any height and width.
+            picture_px: height and width (H, W) of the picture in pixels.
+            mode: interpolation mode of torch, for example `bilinear`.
+
+        Returns:
+            (B, C, H, W) maps over the picture.
         """
         rows, columns = self._margin(picture_px)
         wide = (picture_px[0] + 2 * rows, picture_px[1] + 2 * columns)

@@ -131,13 +131,15 @@ pixels of frequent classes.
 
 
 class SegmentationLosses:
-    """Computes the cross-entropy over hard pixels (`hard_cross_entropy`) for the main head and for each training
+    """Computes the cross-entropy over hard pixels (`hard_cross_entropy`) for the main head and for each auxiliary
     head.
+
+    Auxiliary heads are additional outputs of a network that exist only in training.
 
     Attributes:
         easy: probability of the correct class, 0..1; pixels below it count as hard.
         least: smallest share of the pixels that count, 0..1.
-        auxiliary_weight: weight of each training head in the sum that training minimises.
+        auxiliary_weight: weight of each auxiliary head in the sum that training minimises.
         weights: weight of each class; () for equal weights.
     """
 
@@ -148,7 +150,7 @@ class SegmentationLosses:
 
     def __call__(self, outputs: Mapping[str, Tensor], targets: Sequence[SegmentedSample]) -> dict[str, Tensor]:
         """Computes the losses by name: `cross_entropy` for the output `logits`, and one weighted loss for each
-        training head.
+        auxiliary head.
 
         Args:
             outputs: (B, 19, H, W) logits by name, at the size of the labels or as `sampled_logits` returns them.

@@ -35,7 +35,9 @@ class StereoCentreLite0(CentreGraph, OnLite0):
         super().__init__(shape, CHANNELS, pyramid=2 * shape.width)
 
     def shared_layers(self) -> Mapping[str, nn.Module]:
-        """The trunk as a whole, under the key `trunk`, because timm's layers lie in one module."""
+        """The layers that process both pictures: the whole trunk under the key `trunk`, because timm's
+        EfficientNet-Lite0 is one module.
+        """
         return {"trunk": features_of_lite0(range(len(LEVELS)))}
 
     def left_layers(self) -> Mapping[str, nn.Module]:

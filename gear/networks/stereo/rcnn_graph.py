@@ -183,8 +183,14 @@ class StereoRcnn(nn.Module):
         return self
 
     def pyramid(self, pictures: Tensor) -> list[Tensor]:
-        """The feature maps P2 .. P6 (strides 4 .. 64) of (B, 3, H, W) pictures; pictures are BGR in 0..255 minus
-        the mean.
+        """Computes the feature pyramid of pictures.
+
+        Args:
+            pictures: (B, 3, H, W) pictures, channels in the order BGR, values in 0..255 minus
+                `gear.networks.stereo.rcnn_network.MEAN_BGR`.
+
+        Returns:
+            The feature maps P2 to P6, the finest first: (B, C, H / s, W / s) for the strides s = 4, 8, 16, 32 and 64.
         """
         stages = [self.RCNN_layer0(pictures)]
         for layer in (self.RCNN_layer1, self.RCNN_layer2, self.RCNN_layer3, self.RCNN_layer4):

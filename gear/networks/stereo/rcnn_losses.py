@@ -267,9 +267,15 @@ def region_losses(said: Mapping[str, Tensor], pairs: SampledPairs, cars: CarTarg
     """Computes the four losses of the second stage for one picture.
 
     Args:
-        said: outputs of `gear.networks.stereo.rcnn_graph.StereoRcnn.regions` for the pairs.
-        pairs: the sampled pairs.
+        said: outputs of `gear.networks.stereo.rcnn_graph.StereoRcnn.regions` for the R pairs.
+        pairs: the R sampled pairs of boxes; the pairs that lie on a car are first.
         cars: training targets of the picture.
+
+    Returns:
+        Four scalar losses by name. `class`: cross-entropy, mean over the pairs. `boxes` and `size_and_direction`:
+        smooth L1, summed over the pairs that lie on a car and divided by R. `keypoints`: mean of the three
+        cross-entropies of the visible ground corner, the left border and the right border. The last three are 0 if no
+        pair lies on a car.
     """
     count, held = max(len(pairs.left), 1), len(pairs.owner)
     labels = torch.zeros(len(pairs.left), dtype=torch.long, device=pairs.left.device)

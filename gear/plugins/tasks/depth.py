@@ -180,7 +180,9 @@ class DepthTask:
         return {}
 
     def preview(self, sample: DepthSample) -> Mapping[str, UInt8Image]:
-        """Pictures for people: `image` with outlined surfaces, and `depth` in colours (near red, far blue)."""
+        """Returns the pictures to look at: `image` with outlined surfaces, and `depth` in colours (near red, far
+        blue).
+        """
         picture = sample.images[VIEW].copy()
         draw_surfaces(picture, sample, VIEW)
         colours = depth_colours(sample.depth_m)
@@ -201,7 +203,7 @@ class DepthTask:
 
 
 def depth_colours(depth_m: npt.NDArray[np.floating[Any]]) -> UInt8Image:
-    """Colours of depths for people, from red (2 m and nearer) to dark blue (80 m and farther, or unknown).
+    """Colours of depths, from red (2 m and nearer) to dark blue (80 m and farther, or unknown).
 
     Args:
         depth_m: (H, W) metres; NaN or infinity where the depth is unknown.

@@ -293,7 +293,9 @@ class Detect2dTask:
         return {results.coco_path(info.split): dump(lines)}
 
     def preview(self, sample: Detect2dSample) -> Mapping[str, UInt8Image]:
-        """A picture for people, with masks and boxes; ignored objects are grey with dashed boxes and no text."""
+        """Returns the picture to look at, as `boxes`: with masks, boxes and class names drawn in; ignored objects
+        are grey, with a dashed box and without text.
+        """
         picture = sample.images[VIEW].copy()
         height, width = picture.shape[:2]
         for thing in sample.objects:

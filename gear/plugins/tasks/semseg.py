@@ -189,7 +189,9 @@ class SemsegTask:
         return {}
 
     def preview(self, sample: SemsegSample) -> Mapping[str, UInt8Image]:
-        """A picture for people: the labels' colours over the picture, with borders between instances in white."""
+        """Returns the picture to look at, as `labels`: the labels' colours are blended over it, and borders
+        between instances are white.
+        """
         colours = cityscapes.colour_map(sample.label_ids)[..., :3]
         picture = cv2.addWeighted(sample.images[VIEW], 0.45, np.ascontiguousarray(colours), 0.55, 0.0)
         instances = sample.instance_ids

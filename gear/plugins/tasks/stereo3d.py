@@ -301,7 +301,9 @@ class Stereo3dTask:
         return {}
 
     def preview(self, sample: Stereo3dSample) -> Mapping[str, UInt8Image]:
-        """Pictures for people: `left` with 3D boxes and (dashed) ignored regions, and `right`; both with surfaces."""
+        """Returns the pictures to look at: `left` with 3D boxes and (dashed) ignored regions, and `right`;
+        surfaces are outlined in both.
+        """
         left = sample.images[LEFT].copy()
         for thing in sample.objects:
             if thing.is_ignored:

@@ -193,8 +193,12 @@ def compared(rows: Sequence[Measured], seed: int) -> Iterable[Difference]:
 
 
 def difference(row: Measured, other: Measured, seed: int) -> Difference:
-    """Returns the difference between a dataset and its twin (the same samples with another patch), over the
-    samples that both have.
+    """Computes the metrics of a dataset minus those of its twin, over the samples that both have.
+
+    Args:
+        row: the dataset.
+        other: its twin: the same samples with another patch.
+        seed: seed of the permutation tests.
     """
     count = min(len(row.notes), len(other.notes))
     here, there, streets = row.notes[:count], other.notes[:count], row.streets[:count]

@@ -175,8 +175,13 @@ def card(root: Path, origin: Origin, progress: TrainingState) -> str:
     """Returns the model card of the trained weights as Markdown: weights, settings, training data, validation
     metrics and limits.
 
+    Args:
+        root: folder of the training, which holds the weights file.
+        origin: network, task, config and data of the training.
+        progress: final state of the training: steps, time, validations and the step with the best validation.
+
     Raises:
-        DatasetError: the weights file is missing, or has other content than the training wrote.
+        DatasetError: the weights file is missing, or its content is not what the training wrote.
     """
     best = next(entry for entry in progress.validations if entry["step"] == progress.best_step)
     check_kept(root, progress)

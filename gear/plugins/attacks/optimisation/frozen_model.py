@@ -10,10 +10,10 @@ from torch import nn
 
 
 def networks_of(model: Any) -> Iterator[tuple[str, nn.Module]]:
-    """Yields the torch modules of a model with their names.
+    """Yields (name, module) for every torch module of a model.
 
-    A model that is a module itself yields only itself. Otherwise its attributes that are modules and its taps (layers
-    with feature maps) follow, sorted by name.
+    A `model` that is a module itself yields only ("model", model). Otherwise first its attributes that are modules
+    follow, then its taps (layers with feature maps) as "tap NAME", each sorted by name.
     """
     if isinstance(model, nn.Module):
         yield "model", model

@@ -35,7 +35,11 @@ Kind = Literal["semseg", "depth", "losses"]
 
 
 def default_objective(sample: Any) -> Objective:
-    """The objective of an untargeted attack, chosen by the ground truth of a sample."""
+    """Returns the objective of an untargeted attack, chosen by the ground truth of `sample`.
+
+    `SemsegObjective` for samples with `label_ids`, `DepthObjective` for samples with `depth_m`, and otherwise
+    `LossObjective`, which maximises all losses of the model.
+    """
     kind = kind_of(sample)
     if kind == "semseg":
         return SemsegObjective()

@@ -1,4 +1,6 @@
-"""The objective of attacks without gradients: harm from forward passes, whose number is limited."""
+"""The objective of black-box attacks: computes the attack objective by forward passes alone, and counts them
+against the query budget.
+"""
 
 from __future__ import annotations
 

@@ -78,11 +78,15 @@ class Look(Generic[Shown]):
 
 
 def looks(views: Mapping[str, Shown]) -> tuple[Look[Shown], ...]:
-    """The network inputs whose feature maps describe the cameras' pictures; the reference camera is first.
+    """Builds the network inputs in which Z-Mask searches each camera's picture for patches.
 
-    The feature maps of a stereo network describe the left picture. In the mirrored pair the right picture becomes the
-    left one, so the same network and statistics also describe the right picture. For other rigs only the first camera
-    is used.
+    Args:
+        views: pictures of one sample ((H, W, 3) uint8) or of a batch ((B, 3, H, W) float in 0..1), by camera name.
+
+    Returns:
+        The pictures as they are, as one input. For a stereo rig a second input follows: the mirrored pair with left and
+        right exchanged, because the feature maps of a stereo network describe only the left picture. For other rigs
+        only the first camera is described.
     """
     first = LEFT if LEFT in views else next(iter(views))
     plain = Look(camera=first, views=views, is_mirrored=False)
