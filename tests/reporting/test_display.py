@@ -29,7 +29,7 @@ def test_a_log_has_lines_also_before_the_first_report(capsys: pytest.CaptureFixt
     with Display("attack", unit="step") as shown:
         assert "gear attack: preparing since 1 second\n" in wait_for(capsys, "preparing")
         shown.callbacks.on_fit_progress(3, 8)
-        assert "gear attack: the defense learns, 3 of 8 pictures" in wait_for(capsys, "3 of 8")
+        assert "gear attack: calibrating the defense, 3 of 8 pictures" in wait_for(capsys, "3 of 8")
         shown.callbacks.on_progress(0, 300)
         shown.callbacks.on_progress(12, 300)
         shown.detail("loss 0.5")

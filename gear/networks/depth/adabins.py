@@ -23,17 +23,6 @@ BINS = "bin_centres_m"
 CHAMFER_WEIGHT = 0.1
 """Weight beta of the Chamfer loss on the bin centres (equation 6 of the AdaBins paper)."""
 
-OLD_NAMES = (
-    ("adaptive_bins_layer.embedding_conv.", "adaptive_bins_layer.conv3x3."),
-    (
-        "adaptive_bins_layer.patch_transformer.embedding_encoder.",
-        "adaptive_bins_layer.patch_transformer.embedding_convPxP.",
-    ),
-)
-"""Pairs of key prefixes: the names of two layers in the published files, and their names in the authors' current
-code.
-"""
-
 
 class AdaBins(DepthNetwork):
     """AdaBins (Bhat et al., CVPR 2021) as a gear network: monocular depth with bins that are chosen for each
@@ -77,13 +66,3 @@ class AdaBins(DepthNetwork):
             "trunk": self.graph.get_submodule("encoder.original_model.conv_head"),
             "decoder": self.graph.get_submodule("decoder.conv3"),
         }
-
-
-def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Renames the keys of AdaBins' published weights to the parameter names of `AdaBinsGraph`."""
-    renamed = {}
-    for key, tensor in state.items():
-        for old, new in OLD_NAMES:
-            key = new + key.removeprefix(old) if key.startswith(old) else key
-        renamed[key] = tensor
-    return renamed

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -165,8 +163,3 @@ class BiSeNetX39(nn.Module):
             "ct1": self.context_path.layer2,
             "ct0": self.context_path.layer3,
         }
-
-
-def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The tensors of BiSeNet from a published checkpoint of TorchSeg; tensors of its loss modules are dropped."""
-    return {key: value for key, value in state.items() if not key.startswith(("criterion.", "ohem_criterion."))}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -12,11 +10,6 @@ from gear.networks.segmentation.ddrnet_parts import Bottleneck, Dappm, Head, con
 PLANES = 32
 BRANCH_PLANES = 128
 HEAD_PLANES = 64
-
-WRAPPER = "model."
-"""Prefix of the keys in the authors' checkpoints, which hold a training wrapper: the network and a loss module
-with weights of its own.
-"""
 
 
 class DDRNet23Slim(nn.Module):
@@ -98,11 +91,3 @@ class DDRNet23Slim(nn.Module):
         at 1/64 lie at the ends of the branches. All are taken before the activation ReLU.
         """
         return {"rb1": self.layer1, "rb2": self.layer2, "rbb1": self.layer5_, "rbb2": self.layer5}
-
-
-def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The tensors of DDRNet from a published checkpoint, without the wrapper's prefix `model.` and without the
-    loss module.
-    """
-    kept = {key: value for key, value in state.items() if not key.startswith("loss.")}
-    return {key.removeprefix(WRAPPER): value for key, value in kept.items()}

@@ -8,7 +8,7 @@ is not occluded.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -238,13 +238,6 @@ def _complete(module: nn.Module, state: dict[str, Any], prefix: str, *_: Any) ->
     """Adds the variances of the losses to a published state, because the authors store them outside the network."""
     assert isinstance(module, StereoRcnn)
     state.setdefault(f"{prefix}{VARIANCES}", module.loss_log_variances.detach())
-
-
-def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The tensors of a published checkpoint; learned variances of the losses that are missing get their initial
-    values.
-    """
-    return {VARIANCES: torch.full((len(LOSSES),), FIRST_LOG_VARIANCE), **state}
 
 
 def is_norm(module: nn.Module) -> bool:

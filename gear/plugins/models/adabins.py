@@ -33,7 +33,7 @@ def build(options: AdaBinsOptions) -> Model:
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
     """Renames the tensors of the AdaBins authors' checkpoint to the names in gear's network."""
-    from gear.networks.depth.adabins import from_official
+    from gear.networks.depth.adabins_official import from_official
 
     return from_official(state)
 

@@ -38,7 +38,7 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
     """Renames the tensors of a published BiSeNet checkpoint to the names in gear's network."""
-    from gear.networks.segmentation.bisenet import from_official
+    from gear.networks.segmentation.bisenet_official import from_official
 
     return from_official(state)
 

@@ -38,7 +38,7 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
     """Renames the tensors of a published DDRNet checkpoint to the names in gear's network."""
-    from gear.networks.segmentation.ddrnet import from_official
+    from gear.networks.segmentation.ddrnet_official import from_official
 
     return from_official(state)
 

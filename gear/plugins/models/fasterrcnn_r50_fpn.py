@@ -33,7 +33,7 @@ def build(options: OfficialDetectorOptions) -> FasterRcnnDetector:
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
     """Converts a published checkpoint to the tensors of gear's Faster R-CNN."""
-    from gear.networks.detection.official import from_official
+    from gear.networks.detection.torchvision_official import from_official
 
     return from_official(state)
 

@@ -20,7 +20,7 @@ def build(options: StereoRcnnOptions) -> Model:
 
 def from_official(state: Mapping[str, Any]) -> Mapping[str, Any]:
     """Converts a published Stereo R-CNN checkpoint to gear's tensors; missing loss variances are initialised."""
-    from gear.networks.stereo.rcnn_graph import from_official
+    from gear.networks.stereo.rcnn_official import from_official
 
     return from_official(state)
 

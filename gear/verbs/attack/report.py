@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gear.contracts.attacks import Patch
-from gear.reporting.pace import plural, rate_text
+from gear.reporting.progress_text import plural, rate_text
 from gear.values.resources import data_dir
 from gear.values.serial import Json
 

@@ -10,8 +10,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from gear.networks.depth.adabins import AdaBins, from_official
+from gear.networks.depth.adabins import AdaBins
 from gear.networks.depth.adabins_graph import AdaBinsGraph, Decoder, Encoder, fitting, patches
+from gear.networks.depth.adabins_official import from_official
 from gear.networks.depth.options import AdaBinsOptions
 from gear.networks.runtime import seeded
 from gear.networks.weights import build_graph, mismatches

@@ -18,8 +18,8 @@ from gear.networks import torchvision_import
 from gear.networks.detection.fasterrcnn import _without_ignored
 from gear.networks.detection.graphs import fasterrcnn_r50_fpn, retinanet_r50_fpn
 from gear.networks.detection.network import Targets, share_inside
-from gear.networks.detection.official import from_official
 from gear.networks.detection.options import OfficialDetectorOptions, ReferenceDetectorOptions
+from gear.networks.detection.torchvision_official import from_official
 from gear.networks.network import as_batch
 from gear.plugins.models import fasterrcnn_r50_fpn as fasterrcnn_plugin
 from gear.plugins.models import retinanet_r50_fpn as retinanet_plugin

@@ -13,8 +13,9 @@ import torch
 from torch import nn
 
 from gear.networks.segmentation.bisenet import BiSeNetX39
-from gear.networks.segmentation.bisenet import from_official as bisenet_from_official
-from gear.networks.segmentation.ddrnet import DDRNet23Slim, from_official
+from gear.networks.segmentation.bisenet_official import from_official as bisenet_from_official
+from gear.networks.segmentation.ddrnet import DDRNet23Slim
+from gear.networks.segmentation.ddrnet_official import from_official
 from gear.networks.weights import mismatches
 from gear.values.rng import derive_rng
 from tests.networks import segmentation_reference as reference

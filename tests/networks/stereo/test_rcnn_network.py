@@ -22,12 +22,12 @@ from gear.networks.stereo.rcnn_graph import (
     StereoRcnn,
     StereoRcnnShape,
     anchors,
-    from_official,
     is_norm,
     pooled,
 )
 from gear.networks.stereo.rcnn_losses import car_targets, sample_pairs
 from gear.networks.stereo.rcnn_network import StereoRcnnNetwork
+from gear.networks.stereo.rcnn_official import from_official
 from gear.networks.stereo.rcnn_proposals import legacy_nms, propose
 from gear.networks.weights import mismatches
 from gear.plugins.models.stereo_rcnn import stereo_rcnn

@@ -11,7 +11,7 @@ from gear.dataset.free_space import check_free_space, free_bytes, size_text
 from gear.dataset.layout import sidecar_path
 from gear.dataset.sidecar import read_sidecar
 from gear.dataset.store import Store
-from gear.reporting.pace import duration_text
+from gear.reporting.progress_text import duration_text
 from gear.values.progress import Warn
 
 FIRST = 3

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from gear.collecting import forecast
-from gear.collecting.forecast import Forecast
+from gear.collecting import disk_and_time_forecast as forecast
+from gear.collecting.disk_and_time_forecast import Forecast
 from gear.values.errors import GearError
 
 
