@@ -63,7 +63,7 @@ def alone_at_work(root: Path) -> Iterator[None]:
         try:
             work.enter_context(_locked(root, alone=True, wait=False))
         except BlockingIOError as error:
-            problem = "another run is at work there just now; wait for its end, or use another --out"
+            problem = "another gear run is using this folder; wait for its end, or use another --out"
             raise DatasetError(root, problem) from error
         yield
 

@@ -212,7 +212,7 @@ class Scorer:
 
     @contextmanager
     def _blamed(self, index: int) -> Iterator[None]:
-        """Names the model's plugin, or the weights of one of gear's models, when a prediction cannot be measured.
+        """Names the model's plugin, or the weights of one of gear's models, when a prediction cannot be scored.
 
         `gear.plugins.build.blamed` redirects stdout, which threads must not share.
         """
@@ -224,8 +224,8 @@ class Scorer:
             if self._model.owner.package != DISTRIBUTION:
                 raise plugin_error(self._model, f"prediction of sample {index}", one_line(error)) from error
             if isinstance(error, ValueError):
-                said = f"what {self._model.spec.name} says of sample {index}"
-                raise GearError(f"{said} cannot be measured ({one_line(error)}); see to its weights") from error
+                what = f"the prediction of {self._model.spec.name} for sample {index}"
+                raise GearError(f"cannot score {what} ({one_line(error)}); check its weights") from error
             raise
 
 

@@ -172,7 +172,7 @@ def test_what_learnt_from_more_samples_is_another_defense(small: Small, learner:
         evaluate(small(), calibration=whole, out=tmp_path / "metrics", **facts)
     facts |= {"attack": "square", "queries": 4, "settings": ["height_px=12", "width_px=24"]}
     attack(small(), calibration=fewer, out=tmp_path / "patches", **facts)
-    with pytest.raises(GearError, match=r"made otherwise \(calibration_samples"):
+    with pytest.raises(GearError, match=r"made with other settings \(calibration_samples"):
         attack(small(), calibration=whole, out=tmp_path / "patches", **facts)
 
 

@@ -78,7 +78,7 @@ def test_reference_weights_are_shown_and_marked_when_the_look_changed(
     assert stale["look_is_current"] is False and stale["look_changes"] == ["assets of town10"]
     assert main(["models"]) == 0
     lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
-    assert "shipped, old look" in lines["bisenet_x39"] and "old look" not in lines["ddrnet23_slim"]
+    assert "shipped, old appearance" in lines["bisenet_x39"] and "old appearance" not in lines["ddrnet23_slim"]
     assert main(["models", "show", "ddrnet23_slim"]) == 0
     assert "miou 0.625; look is current" in capsys.readouterr().out
     assert main(["models", "show", "bisenet_x39"]) == 0

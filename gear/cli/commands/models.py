@@ -83,7 +83,7 @@ def row(model: ModelFacts) -> list[str]:
     size = f"{spec.parameters / 1e6:.1f} M" if spec.parameters else "-"
     weights = "shipped" if model.shipped else "published" if spec.published else "-"
     if model.shipped is not None and model.shipped.stale:
-        weights = "shipped, old look"
+        weights = "shipped, old appearance"
     usable = "yes" if not model.missing else f"needs {', '.join(model.missing)}"
     return [spec.name, ", ".join(spec.tasks), size, weights, usable, spec.summary]
 
@@ -114,7 +114,8 @@ def shipped_line(weights: ShippedWeights | None) -> str:
     facts = weights.to_json()
     metrics = facts["metrics"] if isinstance(facts["metrics"], dict) else {}
     named = ", ".join(f"{key} {value:.3g}" for key, value in metrics.items() if isinstance(value, (int, float)))
-    look = "look not stated"
+    appearance = "appearance not recorded"
     if weights.stale is not None:
-        look = f"trained on another look ({', '.join(weights.stale)} changed)" if weights.stale else "look is current"
-    return f"{facts['size_mb']:.1f} MB; {named or 'no metrics'}; {look}"
+        changed = f"trained on another appearance ({', '.join(weights.stale)} changed)"
+        appearance = changed if weights.stale else "appearance is current"
+    return f"{facts['size_mb']:.1f} MB; {named or 'no metrics'}; {appearance}"

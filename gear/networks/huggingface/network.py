@@ -190,10 +190,10 @@ class FolderDepth(FolderNetwork):
             raise GearError(f"{options.folder}/config.json: max_depth must be a number of metres above 0, got {most_m}")
         if metric == bool(options.inverse_scale):
             raise GearError(
-                f"{options.folder}: says metres, so leave inverse_scale at 0"
+                f"{options.folder}: predicts metres; leave inverse_scale at 0"
                 if metric
-                else f"{options.folder}: says relative depth; set inverse_scale (and inverse_shift) so that "
-                "1 / (inverse_scale * what it says + inverse_shift) are metres"
+                else f"{options.folder}: predicts relative depth; set inverse_scale (and inverse_shift) so that "
+                "1 / (inverse_scale * prediction + inverse_shift) is in metres"
             )
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:

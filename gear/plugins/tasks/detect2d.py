@@ -293,8 +293,8 @@ class Detect2dTask:
         return {results.coco_path(info.split): dump(lines)}
 
     def preview(self, sample: Detect2dSample) -> Mapping[str, UInt8Image]:
-        """Returns the picture to look at, as `boxes`: with masks, boxes and class names drawn in; ignored objects
-        are grey, with a dashed box and without text.
+        """Returns the picture to look at, as `boxes`: with masks, boxes, class names; ignored objects dashed, no
+        text.
         """
         picture = sample.images[VIEW].copy()
         height, width = picture.shape[:2]

@@ -301,9 +301,7 @@ class Stereo3dTask:
         return {}
 
     def preview(self, sample: Stereo3dSample) -> Mapping[str, UInt8Image]:
-        """Returns the pictures to look at: `left` with 3D boxes and (dashed) ignored regions, and `right`;
-        surfaces are outlined in both.
-        """
+        """Returns the pictures to look at: `left` with 3D boxes and (dashed) ignored regions, and `right`."""
         left = sample.images[LEFT].copy()
         for thing in sample.objects:
             if thing.is_ignored:

@@ -70,7 +70,7 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
         if what:
             is_same_way = {key for key in wanted if there.get(key) != wanted[key]} <= FED
             raise (OutdatedError if is_same_way else ReplaceableError)(
-                root, f"holds patches that were made otherwise ({what})"
+                root, f"holds patches that were made with other settings ({what})"
             )
         _check_whole(root, there)
         return there

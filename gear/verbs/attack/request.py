@@ -49,7 +49,7 @@ class AttackRequest:
         if not (0 <= self.score_weight < math.inf and 0 <= self.mask_weight < math.inf):
             raise GearError("score_weight and mask_weight must be at least 0, and finite")
         if self.patience and not self.val:
-            raise GearError("patience counts looks at validation samples, and there are none: name some with --val")
+            raise GearError("--patience needs validation data; give --val")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -177,5 +177,5 @@ def begin(root: Path, split: str, plan: Json) -> None:
         keys = there.keys() | plan.keys() if isinstance(there, dict) else {"plan"}
         differs = sorted(key for key in keys if not isinstance(there, dict) or there.get(key) != plan.get(key))
         raise DatasetError(
-            root, f"split {split!r} was cleaned in another way ({', '.join(differs)} differ); use another --out"
+            root, f"split {split!r} was cleaned with other settings ({', '.join(differs)} differ); use another --out"
         )

@@ -31,10 +31,10 @@ def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
         "",
         "samples",
         *(metric_title(*column) for column in columns),
-        "model s",
-        "defense s",
+        "model s/sample",
+        "defense s/sample",
         "mask IoU",
-        ALARMS,
+        "alarm rate",
         "AUROC",
     ]
     lines = []
@@ -64,15 +64,15 @@ def _times(report: EvaluateReport) -> list[str]:
     """Returns a line that explains the times in the table; no line if they need no explanation."""
     if report.facts["defense"] is not None:
         return [
-            "model s: the network alone on defended pictures, one batch at a time; defense s: all that the defense "
-            "does, its own passes through the network included"
+            "model s/sample: seconds of the network alone on defended pictures, one batch at a time; defense s/sample: "
+            "seconds of the defense, including its own passes through the network"
         ]
     together = report.facts.get("timing", {}).get("parallel_batches", 1)
     if together == 1:
         return []
     return [
-        f"model s: a picture's share of the time while {together} batches run at once; behind a defense one runs at a "
-        "time, so such times do not compare"
+        f"model s/sample: the time divided by the number of samples, while {together} batches run in parallel; with a "
+        "defense, batches run one at a time, so the two times cannot be compared"
     ]
 
 
@@ -139,7 +139,7 @@ def _paired(report: EvaluateReport, labels: Mapping[str, str]) -> list[str]:
             if test.pairs
         ]
         lines += [f"  {labels[one.row]} minus {against.patch}: {', '.join(tests)}"] if tests else []
-    return ["mean change of a sample (p: how often chance alone changes as much)", *lines] if lines else []
+    return ["mean change of a sample (p: two-sided p of a paired permutation test)", *lines] if lines else []
 
 
 SHOWN_CHANGES = ("hidden", "misclassified", "moved", "invented_on_patch", "invented_elsewhere")
@@ -159,9 +159,9 @@ def _objects(report: EvaluateReport, labels: Mapping[str, str], width: int) -> l
                 cells.append([f"    {name.replace('_', ' ')}", *counts])
             lines += [f"  {labels[one.row]} minus {against.patch}", *number_table(cells, width=width)]
     head = (
-        "objects found in the twin that are not found here, and detections that the twin has not (reverse:",
-        "the same from here to the twin; rate: a share of the objects found, invented: per picture; p: how",
-        "often chance alone makes counts as unequal)",
+        "objects found in the twin but not in this dataset, and detections that are not in the twin (reverse: the",
+        "same counted from this dataset to the twin; rate: share of the objects found, for invented: number per",
+        "picture; p: two-sided p of a paired permutation test of count and reverse)",
     )
     return [*head, *lines] if lines else []
 
@@ -192,7 +192,7 @@ def _limited(report: EvaluateReport, columns: Iterable[tuple[str, str]], labels:
     for name, metrics in rows:
         known = [(column, metrics.get(column[0], {}).get(column[1])) for column in columns]
         low = [f"{metric_title(*column)} {number(one.ceiling)}" for column, one in known if one and one.ceiling < 1]
-        lines += [f"perfect predictions would come to {', '.join(low)} in {name}"] if low else []
+        lines += [f"perfect predictions would score {', '.join(low)} in {name}"] if low else []
     return lines
 
 

@@ -37,7 +37,7 @@ def validate(
         `loss`, the mean over samples of the sum of all losses.
 
     Raises:
-        GearError: a prediction cannot be measured, or a metric of the task is not a number.
+        GearError: a prediction cannot be scored, or a metric of the task is not a number.
         PluginError: a network of another package failed, or returned neither losses nor predictions of the task.
     """
     evaluators = {"": task.evaluator()}
@@ -59,8 +59,8 @@ def validate(
                     evaluator.update(sample, prediction)
                 except ValueError as error:
                     raise GearError(
-                        f"what the network says of a validation picture cannot be measured ({error}); if it came "
-                        "apart, train again with a lower --lr in another --out"
+                        f"cannot score the prediction for a validation picture ({error}); if the training "
+                        "diverged, train again with a lower --lr in another --out"
                     ) from error
     metrics = {
         f"{prefix}{name}": value

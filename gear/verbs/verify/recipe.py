@@ -83,8 +83,8 @@ def job_of(root: Path, check: SplitCheck, sources: Sources) -> Job:
     if plan.content_key != known["content_key"]:
         what = ", ".join(differences(check.plan.as_json(), plan.as_json())[:2]) if check.plan is not None else ""
         why = what or "other versions, renderer or files"
-        problem = f"split {check.split!r} would be made otherwise here ({why})"
-        raise DatasetError(root, f"{problem}; repair it on the machine and with the versions that made it")
+        problem = f"split {check.split!r} would differ if it were made on this machine ({why})"
+        raise DatasetError(root, f"{problem}; repair it on the machine and with the versions with which it was made")
     return dataclasses.replace(job, plan=plan)
 
 

@@ -134,7 +134,7 @@ def test_what_is_there_is_not_made_again(small: Small, install: Install, tmp_pat
     again = attack(data, model="tiny_segmenter", out=out, steps=2, settings=SMALL)
     assert not again.made and (out / "patch_0.png").stat().st_mtime_ns == stamp
     assert not difference(first.patches, again.patches, "patches")
-    with pytest.raises(DatasetError, match=r"made otherwise \(steps: 2 there, 3 now\)"):
+    with pytest.raises(DatasetError, match=r"made with other settings \(steps: 2 there, 3 now\)"):
         attack(data, model="tiny_segmenter", out=out, steps=3, settings=SMALL)
     assert attack(data, model="tiny_segmenter", out=out, steps=3, settings=SMALL, force=True).made
 
@@ -365,7 +365,7 @@ def test_patches_against_other_weights_are_others(small: Small, install: Install
         return network
 
     install(dataclasses.replace(tiny_segmenter, build=retrained))
-    with pytest.raises(DatasetError, match="made otherwise"):
+    with pytest.raises(DatasetError, match="made with other settings"):
         attack(small(), model="tiny_segmenter", out=out, steps=2, settings=SMALL)
     (out / "patch_1.png").write_bytes(b"of another attack")
     (out / "verify").mkdir()
@@ -426,7 +426,7 @@ def test_a_control_is_like_what_is_there_now(small: Small, install: Install, tmp
     made("control", *matched)
     assert not made("control", *matched).made
     made("like", "kind=solid", "rgb=[0.9,0.9,0.9]", *SMALL[:2], force=True)
-    with pytest.raises(DatasetError, match="made otherwise"):
+    with pytest.raises(DatasetError, match="made with other settings"):
         made("control", *matched)
 
 

@@ -20,7 +20,7 @@ def test_the_second_is_refused_and_the_first_goes_on(
 
     def begin_another(done: int, steps: int) -> None:
         tried.append(done)
-        with pytest.raises(DatasetError, match="another run is at work there just now; wait for its end"):
+        with pytest.raises(DatasetError, match="another gear run is using this folder; wait for its end"):
             attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=3, settings=SMALL, force=force)
 
     first = attack(

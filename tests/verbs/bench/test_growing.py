@@ -125,5 +125,5 @@ def test_more_pictures_to_learn_from(written: Written, made: Made) -> None:
 
 def test_patches_that_are_wanted_otherwise_are_not_made_again(written: Written, made: Made) -> None:
     out = made(FEW)
-    with pytest.raises(GearError, match=r"made otherwise \(steps: 2 there, 3 now\); use another --out, or remove it$"):
+    with pytest.raises(GearError, match=r"other settings \(steps: 2 there, 3 now\); use another --out, or remove it$"):
         gear.bench(written(*FEW, ("steps: 2", "steps: 3")), out=out)

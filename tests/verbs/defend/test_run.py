@@ -98,7 +98,7 @@ def test_it_is_taken_up_again_and_gives_the_same(stereo: Path, tmp_path: Path) -
     defend(stereo, defense="lgs", out=tmp_path / "whole")
     assert tree(tmp_path / "clean") == tree(tmp_path / "whole")
     assert defend(stereo, defense="lgs", out=tmp_path / "clean").made == 0
-    with pytest.raises(DatasetError, match=r"cleaned in another way \(options differ\)"):
+    with pytest.raises(DatasetError, match=r"cleaned with other settings \(options differ\)"):
         defend(stereo, defense="lgs", out=tmp_path / "clean", settings=["strength=1.5"])
     folder = tmp_path / "clean/defense/debug"
     (folder / "plan.json").write_text("{")

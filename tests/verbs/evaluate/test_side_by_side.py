@@ -19,7 +19,7 @@ def test_the_second_is_refused_and_the_first_goes_on(small: Small, install: Inst
 
     def begin_another(done: int, samples: int) -> None:
         tried.append(done)
-        with pytest.raises(DatasetError, match="another run is at work there just now; wait for its end"):
+        with pytest.raises(DatasetError, match="another gear run is using this folder; wait for its end"):
             evaluate(data, model="odd", out=tmp_path)
 
     assert evaluate(data, model="odd", out=tmp_path, on_progress=begin_another).rows[0].made == len(tried) - 1 == 2

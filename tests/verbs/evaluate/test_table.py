@@ -20,7 +20,7 @@ def report(metrics: dict[str, Estimate]) -> EvaluateReport:
 def test_it_says_how_far_perfect_predictions_come_where_that_is_not_all_the_way() -> None:
     metrics = {"car_r11": Estimate(value=0.5), "car_r40": Estimate(value=0.05, ceiling=0.075)}
     lines = table(report(metrics)).splitlines()
-    assert lines[-1] == "perfect predictions would come to car_r40 0.075 in data"
+    assert lines[-1] == "perfect predictions would score car_r40 0.075 in data"
     assert not any("perfect" in line for line in table(report({"car_r11": Estimate(value=0.5)})).splitlines())
 
 

@@ -118,5 +118,5 @@ def test_a_rate_that_optimisers_have_no_number_for_is_refused(street: Street, tm
 
 def test_answers_that_cannot_be_measured_end_it(street: Street, tmp_path: Path, install: Any) -> None:
     install(replace(tiny_segmenter, build=Cropping, recipe=Recipe(batch=1, epochs=9)))
-    with pytest.raises(GearError, match=r"cannot be measured \(prediction must have shape .* lower --lr"):
+    with pytest.raises(GearError, match=r"validation picture \(prediction must have shape .* lower --lr"):
         quick(street, tmp_path / "out")

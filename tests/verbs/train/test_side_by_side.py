@@ -17,7 +17,7 @@ def test_the_second_is_refused_and_the_first_goes_on(street: Callable[..., Path]
 
     def begin_another(progress: Any, share: float, metrics: Any) -> None:
         tried.append(progress.step)
-        with pytest.raises(DatasetError, match="another run is at work there just now; wait for its end"):
+        with pytest.raises(DatasetError, match="another gear run is using this folder; wait for its end"):
             train("semseg", "tiny_segmenter", street("semseg"), out=tmp_path / "out", epochs=1)
 
     arguments: dict[str, Any] = {"epochs": 2, "batch": 2, "workers": 1}

@@ -170,7 +170,7 @@ def test_what_would_be_made_otherwise_is_left_alone(
     damaged = tree(root)
     monkeypatch.setattr("gear.collecting.job.versions", lambda: {"gear": "0.0.1"})
     report = repaired(root)
-    assert "would be made otherwise here (content.versions" in report.unrepaired[0]
+    assert "would differ if it were made on this machine (content.versions" in report.unrepaired[0]
     assert len(report.findings) == 1 and tree(root) == damaged
 
 

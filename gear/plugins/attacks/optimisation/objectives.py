@@ -298,7 +298,7 @@ def not_finite(what: str, indexes: Sequence[int]) -> GearError:
     """Makes the error for a NaN or infinite value; the message names the samples for which the value was computed."""
     which = f"sample{'s' * (len(indexes) > 1)} {', '.join(map(str, indexes))}"
     return GearError(
-        f"{what} is NaN or infinite, as is what the model says of {which} with the patch; see to its weights"
+        f"{what} is NaN or infinite, because the model's output for {which} with the patch is; check its weights"
     )
 
 

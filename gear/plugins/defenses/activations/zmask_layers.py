@@ -56,7 +56,7 @@ def layers_of(model: Model, shallow: Sequence[str], deep: Sequence[str]) -> Laye
     """
     names = tuple(model.taps())
     if not names:
-        raise GearError("Z-Mask looks at feature maps, and the model has none")
+        raise GearError("Z-Mask reads feature maps, but the model has no taps")
     usual = next((known for known in KNOWN if set(known.all()) <= set(names)), None)
     usual = usual or Layers(shallow=names[:1], deep=tuple(dict.fromkeys((names[0], names[-1]))))
     return Layers(shallow=tuple(shallow) or usual.shallow, deep=tuple(deep) or usual.deep)
