@@ -293,9 +293,7 @@ class Detect2dTask:
         return {results.coco_path(info.split): dump(lines)}
 
     def preview(self, sample: Detect2dSample) -> Mapping[str, UInt8Image]:
-        """Returns the picture to look at, as `boxes`: with masks, boxes, class names; ignored objects dashed, no
-        text.
-        """
+        """Returns the picture to look at, as `boxes`: with masks and boxes, ignored objects dashed."""
         picture = sample.images[VIEW].copy()
         height, width = picture.shape[:2]
         for thing in sample.objects:
