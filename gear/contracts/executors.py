@@ -17,6 +17,25 @@ single item.
 """
 
 
+SILENCE_S = 600.0
+"""Seconds without a message after which a worker that makes samples counts as hung. Graphics drivers can hang, and even
+slow machines need less than a minute per sample.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Needs:
+    """What the work of one worker needs from the engine.
+
+    Attributes:
+        silence_s: longest time of an item in seconds; a worker without a message for this time counts as hung.
+        gpus: number of graphics cards that the engine reserves for each worker, if the engine can reserve them.
+    """
+
+    silence_s: float = SILENCE_S
+    gpus: int = 0
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
     """The outcome of one item, such as a sample: made, failed, or made by another run.
@@ -28,6 +47,8 @@ class Outcome:
         error: the error of a failure, in one line.
         trace: the traceback of a failure; empty if there is none.
         is_final: whether another attempt would fail in the same way.
+        value: a small result of the item that can be pickled, for the process that runs the executor; None for samples,
+            whose results are files.
     """
 
     index: int
@@ -35,6 +56,7 @@ class Outcome:
     error: str = ""
     trace: str = ""
     is_final: bool = False
+    value: object = None
 
 
 Report = Callable[[Outcome], None]

@@ -53,6 +53,11 @@ def device_of(wish: Literal["auto", "cpu", "cuda"]) -> torch.device:
     return torch.device(wish)
 
 
+def has_cuda(wish: str | None) -> bool:
+    """Whether networks run on a GPU of this machine, if the option `device` has the value `wish` (None is `auto`)."""
+    return wish != "cpu" and torch.cuda.is_available()
+
+
 def is_quick_in_half(device: torch.device) -> bool:
     """Whether a device has instructions for bfloat16. On a device without them, bfloat16 is slower than float32."""
     if device.type == "cuda":

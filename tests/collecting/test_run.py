@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from gear.collecting.run import CollectReport
-from gear.dataset.executors import processes as workers
+from gear.contracts.executors import Needs
+from gear.dataset.executors import engines
 from gear.values.errors import BackendError
 
 
@@ -21,7 +22,7 @@ def test_workers_that_are_interrupted_alone_are_told_at_once(
     tmp_path: Path, collect_small: Callable[..., CollectReport], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Somebody's `kill -INT`: it took ten minutes of silence, and then the driver was blamed."""
-    monkeypatch.setattr(workers, "SILENCE_S", 120.0)
+    monkeypatch.setattr(engines, "Needs", lambda: Needs(silence_s=120.0))
 
     def interrupt(finished: int, total: int) -> None:
         for process in multiprocessing.active_children() if finished == 1 else ():

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 EXAMPLE = """examples:
   gear bench quick --out bench/quick                      one scene, one network, a few minutes on two cores
   gear bench paper --out bench/paper --list               only prints the commands of the benchmark
-  gear bench my.yml --out bench/mine --device cuda --workers 8
+  gear bench my.yml --out bench/mine --device cuda
+  gear bench my.yml --out bench/mine --engine slurm --address gpu --workers 32
   gear bench quick --out bench/long --set samples.measure=96 --set 'places={town10: []}'
 
 The folder --out gets report.html, table.txt, bench.csv and bench.json. Run the same command again to continue after an
@@ -38,7 +39,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--device", choices=("auto", "cpu", "cuda"), help="device of the networks (the one in the config)"
     )
     parser.add_argument(
-        "--workers", type=workers, default=1, metavar="N", help="processes of each collection, a number or auto (1)"
+        "--engine", metavar="NAME", help="engine that carries out the steps: processes, ray or slurm (processes)"
+    )
+    parser.add_argument("--address", help="of the engine's cluster: a Ray cluster, or a SLURM partition")
+    parser.add_argument(
+        "--workers", type=workers, default=1, metavar="N", help="number of steps at the same time, or auto (1)"
     )
     parser.add_argument("--list", action="store_true", help="only print the commands of the benchmark")
     parser.add_argument("--json", action="store_true", help="print bench.json, or the steps, in place of the tables")
@@ -66,6 +71,11 @@ def run(args: argparse.Namespace) -> int:
         def begin(step: Step, number: int, steps: int) -> None:
             display.begin(f"[{number}/{steps}] {step.title}", unit="step" if step.verb == "attack" else "sample")
 
-        report = run_bench(request, display.callbacks, begin)
+        def ended(step: Step, number: int, steps: int) -> None:
+            display.write(f"[{number}/{steps}] {step.title}: finished")
+
+        if request.is_scheduled:
+            display.begin("steps of the bench", unit="step")
+        report = run_bench(request, display.callbacks, ended if request.is_scheduled else begin)
     print(json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n" if args.json else text(report), end="")
     return 0

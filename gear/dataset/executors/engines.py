@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 
-from gear.contracts.executors import Executor
+from gear.contracts.executors import Executor, Needs
 from gear.dataset import executors
 from gear.values.errors import UnknownNameError
 
@@ -20,7 +20,9 @@ def engine_names() -> list[str]:
     return sorted(one.name for one in pkgutil.iter_modules(executors.__path__) if one.name not in NO_ENGINES)
 
 
-def open_engine(name: str, *, workers: int, backend: str, address: str | None = None) -> Executor:
+def open_engine(
+    name: str, *, workers: int, backend: str, address: str | None = None, needs: Needs | None = None
+) -> Executor:
     """Opens an engine, which makes the samples of a job, by its name.
 
     Args:
@@ -28,6 +30,7 @@ def open_engine(name: str, *, workers: int, backend: str, address: str | None = 
         workers: number of workers that make samples in parallel.
         backend: name of the renderer, for messages about workers that died or hang.
         address: address of a cluster, for engines that use a cluster; None otherwise.
+        needs: what each worker needs; by default what workers need that make samples.
 
     Raises:
         UnknownNameError: there is no such engine.
@@ -37,5 +40,5 @@ def open_engine(name: str, *, workers: int, backend: str, address: str | None = 
     if name not in known:
         raise UnknownNameError("engine", name, known)
     module = importlib.import_module(f"{executors.__name__}.{name}")
-    opened: Executor = module.executor(workers=workers, backend=backend, address=address)
+    opened: Executor = module.executor(workers=workers, backend=backend, address=address, needs=needs or Needs())
     return opened

@@ -23,15 +23,11 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any, TypeVar
 
-from gear.contracts.executors import MOST_FAILURES, Executor, Outcome, Report, Work
+from gear.contracts.executors import MOST_FAILURES, SILENCE_S, Executor, Needs, Outcome, Report, Work
 from gear.dataset.executors.threads import share_of, threads_set
 from gear.values.errors import BackendError, GearError, WorkerInterruptedError
 
 T = TypeVar("T")
-
-SILENCE_S = 600.0
-"""Seconds without a message after which a worker counts as hung. Graphics drivers can hang, and even slow machines need
-less than a minute per item."""
 
 INTERRUPTED = 130
 """Exit code of a worker process that was interrupted by Ctrl-C."""
@@ -65,10 +61,12 @@ class Processes:
     Attributes:
         workers: number of worker processes.
         backend: name of the renderer, for messages about workers that died or hang.
+        silence_s: seconds without a message after which a worker counts as hung.
     """
 
     workers: int
     backend: str
+    silence_s: float = SILENCE_S
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
         """Makes all items (samples of a split). A worker that dies or hangs is replaced, and its items are
@@ -84,7 +82,7 @@ class Processes:
             BackendError: a worker died or hung before its first item, or was interrupted.
         """
         count = min(self.workers, len(indices))
-        pool = _Pool(backend=self.backend, work=work, pending=deque(indices), report=report, count=count)
+        pool = _Pool(asked=self, work=work, pending=deque(indices), report=report, count=count)
         try:
             for _ in range(count):
                 pool.start()
@@ -93,15 +91,16 @@ class Processes:
             pool.stop()
 
 
-def executor(*, workers: int, backend: str, address: str | None = None) -> Executor:
-    """Opens the engine `processes`; `address` must be None, because this engine uses no cluster.
+def executor(*, workers: int, backend: str, address: str | None, needs: Needs) -> Executor:
+    """Opens the engine `processes`; `address` must be None, because this engine uses no cluster. It reserves no
+    graphics cards.
 
     Raises:
         GearError: an address is given.
     """
     if address is not None:
         raise GearError("--address is for engines of several machines; name one with --engine ray or --engine slurm")
-    return Processes(workers=workers, backend=backend)
+    return Processes(workers=workers, backend=backend, silence_s=needs.silence_s)
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -109,7 +108,7 @@ class _Pool:
     """The worker processes of one run.
 
     Attributes:
-        backend: name of the renderer, for error messages.
+        asked: the executor, with the renderer's name for error messages.
         work: function that makes items in a worker process.
         pending: indices that no worker has taken.
         report: called in this process with the outcome of each item.
@@ -118,7 +117,7 @@ class _Pool:
         deaths: number of workers that died since the last item was made.
     """
 
-    backend: str
+    asked: Processes
     work: Work
     pending: deque[int]
     report: Report
@@ -131,7 +130,7 @@ class _Pool:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         name = f"gear-{len(self.workers)}"
-        process = context.Process(target=_work, args=(self.work, theirs), daemon=True, name=name)
+        process = context.Process(target=_work, args=(self.work, theirs), name=name)  # no daemon: it may have workers
         # The worker inherits the mask, so that Ctrl-C does not stop it amid its imports.
         with _no_interrupts(), threads_set(share_of(self.count)):
             process.start()
@@ -155,8 +154,8 @@ class _Pool:
                 else:
                     worker.heard_s = time.monotonic()
                     self._answer(worker, message)
-            for worker in [one for one in self.workers if time.monotonic() - one.heard_s > SILENCE_S]:
-                self._lost(worker, f"no sample for {SILENCE_S:g} s, the driver seems to hang")
+            for worker in [one for one in self.workers if time.monotonic() - one.heard_s > self.asked.silence_s]:
+                self._lost(worker, f"no sample for {self.asked.silence_s:g} s, the driver seems to hang")
 
     def _answer(self, worker: _Worker, message: Any) -> None:
         if isinstance(message, Exception):
@@ -179,7 +178,7 @@ class _Pool:
         worker.process.join(timeout=10)
         code = worker.process.exitcode
         if code == INTERRUPTED:
-            raise WorkerInterruptedError(self.backend, f"a worker died (exit code {code})", AGAIN)
+            raise WorkerInterruptedError(self.asked.backend, f"a worker died (exit code {code})", AGAIN)
         if code == 0 and not worker.held and worker.has_taken:
             self.workers.remove(worker)
             return
@@ -193,7 +192,7 @@ class _Pool:
             BackendError: the worker had taken no item.
         """
         if not worker.has_taken:
-            raise BackendError(self.backend, problem, f"{AGAIN}; fewer --workers need less memory")
+            raise BackendError(self.asked.backend, problem, f"{AGAIN}; fewer --workers need less memory")
         worker.process.kill()
         self.workers.remove(worker)
         self.deaths += 1

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gear.contracts.executors import MOST_FAILURES, Executor, Report, Work
+from gear.contracts.executors import MOST_FAILURES, Executor, Needs, Report, Work
 from gear.dataset.executors.parts import report_lost, report_part, run_part, split_in_parts
 from gear.dataset.executors.threads import share_of, thread_variables
 from gear.values.errors import GearError
@@ -32,10 +32,12 @@ class OnRay:
     Attributes:
         workers: number of parts that are made in parallel; each takes one core of the cluster.
         address: address of the cluster; None starts a local cluster on this machine.
+        gpus: number of graphics cards that each part takes of the cluster.
     """
 
     workers: int
     address: str | None = None
+    gpus: int = 0
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
         """Makes all items (samples of a split) in parts; parts of lost machines start again on other machines.
@@ -95,7 +97,12 @@ class OnRay:
         """Keeps as many parts at work as there are workers, until all are made or too many fail in a row."""
         # On a cluster a part has one core; a cluster that is started here shares this machine's cores.
         threads = (share_of(self.workers) or cores()) if self.address is None else 1
-        settings = {"num_cpus": 1, "max_retries": RETRIES, "scheduling_strategy": "SPREAD"}
+        settings = {
+            "num_cpus": 1,
+            "num_gpus": self.gpus,
+            "max_retries": RETRIES,
+            "scheduling_strategy": "SPREAD",
+        }
         remote = ray.remote(**settings, runtime_env={"env_vars": thread_variables(threads)})(run_part)
         shared = ray.put(work)
         running: dict[Any, list[int]] = {}
@@ -117,14 +124,14 @@ class OnRay:
                 failed = 0 if report_part(result, report) else failed + len(part)
 
 
-def executor(*, workers: int, backend: str, address: str | None = None) -> Executor:
+def executor(*, workers: int, backend: str, address: str | None, needs: Needs) -> Executor:
     """Opens the engine `ray`; `backend` is not used.
 
     Raises:
         GearError: Ray is not installed.
     """
     _imported()
-    return OnRay(workers=workers, address=address)
+    return OnRay(workers=workers, address=address, gpus=needs.gpus)
 
 
 def _imported() -> Any:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gear.contracts.executors import MOST_FAILURES, Executor, Report, Work
+from gear.contracts.executors import MOST_FAILURES, Executor, Needs, Report, Work
 from gear.dataset.disk_errors import explained
 from gear.dataset.executors.parts import report_lost, report_part, run_part, split_in_parts
 from gear.dataset.executors.threads import share_of, threads_set
@@ -39,10 +39,12 @@ class OnSlurm:
     Attributes:
         workers: number of jobs that run in parallel.
         address: name of the partition; `local` and `debug` run the jobs on this machine; None for SLURM's default.
+        gpus: number of graphics cards that each job reserves.
     """
 
     workers: int
     address: str | None = None
+    gpus: int = 0
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
         """As `Executor.run`. After `MOST_FAILURES` jobs in a row that made nothing, the others are cancelled.
@@ -83,6 +85,8 @@ class OnSlurm:
         jobs.update_parameters(name="gear", timeout_min=TIMEOUT_MIN, slurm_array_parallelism=self.workers)
         if self.address is not None and self.address not in LOCAL:
             jobs.update_parameters(slurm_partition=self.address)
+        if self.gpus and cluster == "slurm":
+            jobs.update_parameters(gpus_per_node=self.gpus)
         # A job of a cluster has one core, as is SLURM's default, and takes over the variables of this process.
         with threads_set(share_of(self.workers) if cluster in LOCAL else 1):
             submitted: list[Any] = jobs.map_array(run_part, [work] * len(parts), parts)
@@ -128,14 +132,14 @@ def _cause(text: str) -> str:
     return lines[-1] if lines else "without a trace"
 
 
-def executor(*, workers: int, backend: str, address: str | None = None) -> Executor:
+def executor(*, workers: int, backend: str, address: str | None, needs: Needs) -> Executor:
     """Opens the engine `slurm`; `backend` is not used.
 
     Raises:
         GearError: submitit is not installed.
     """
     _imported()
-    return OnSlurm(workers=workers, address=address)
+    return OnSlurm(workers=workers, address=address, gpus=needs.gpus)
 
 
 def _imported() -> Any:

@@ -4,7 +4,7 @@ tables need.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -90,7 +90,8 @@ class Plan:
         contests: networks and defenses of each task.
         attack: spec of the attack that makes the patches.
         root: folder of the benchmark.
-        workers: number of processes of each collection.
+        workers: number of workers of each collection.
+        engine: arguments of each collection that name its engine, `engine` and `address`; empty for the default.
     """
 
     def __init__(
@@ -103,10 +104,12 @@ class Plan:
         attack: AttackSpec[Any],
         root: Path,
         workers: int = 1,
+        engine: Mapping[str, str] | None = None,
     ) -> None:
         self.config, self.contests, self.scenes = config, contests, scenes
         self.weathers = tuple(weathers(config.weathers))
-        self._calibration, self._attack, self._root, self._workers = calibration, attack, root, workers
+        self._calibration, self._attack, self._root = calibration, attack, root
+        self._workers = {"workers": workers, **(engine or {})}
 
     def steps(self) -> Iterator[Step]:
         """Yields all steps in an order in which each step comes after the steps that it depends on."""
@@ -252,7 +255,7 @@ class Plan:
                 *weather.settings,
                 f"patch_seed={self.seed(RANDOM)}",
             ),
-            "workers": self._workers,
+            **self._workers,
         }
         return Step(
             verb="collect",

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from gear.collecting.workers import Workers
+from gear.collecting.workers import Workers, fitting_workers
+from gear.dataset.executors.engines import DEFAULT
 from gear.values.errors import GearError
 
 
@@ -23,7 +24,16 @@ class BenchRequest:
     device: str | None = None
     workers: Workers = 1
     in_subprocess: bool = False
+    engine: str = DEFAULT
+    address: str | None = None
 
     def __post_init__(self) -> None:
         if self.workers != "auto" and self.workers < 1:
             raise GearError(f"workers must be at least 1, got {self.workers}")
+
+    @property
+    def is_scheduled(self) -> bool:
+        """Whether the workers of an engine carry out the steps, several at a time; otherwise this process carries
+        them out, one after the other.
+        """
+        return self.engine != DEFAULT or self.address is not None or fitting_workers(self.workers) > 1

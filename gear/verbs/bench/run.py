@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 from gear.collecting.job import versions
 from gear.collecting.lookup import find_weather
@@ -16,34 +16,30 @@ from gear.config.load import find_config, load_collection
 from gear.config.nodes import Node, parse_file
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
+from gear.contracts.executors import Executor, Needs
 from gear.contracts.specs import AttackSpec
-from gear.dataset.files import clear_scratch, explained, write_whole
-from gear.dataset.guarded_paths import remove_tree
+from gear.dataset.executors.engines import DEFAULT, open_engine
+from gear.dataset.files import clear_scratch, write_whole
 from gear.dataset.json_text import dump_json
+from gear.dataset.locks import alone_at_work
 from gear.dataset.store import check_output
 from gear.measuring.plugin_selection import check_optics
+from gear.networks.runtime import has_cuda
 from gear.reporting.display import displayed
-from gear.values.errors import GearError, OutdatedError, ReplaceableError
+from gear.values.errors import GearError
 from gear.values.progress import Callbacks, Progress, Warn
-from gear.verbs.attack.run import attack
+from gear.verbs.bench.carry_out import carry_out
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig
 from gear.verbs.bench.page import page
-from gear.verbs.bench.plan import Match, Plan, Step, Verb
+from gear.verbs.bench.plan import Match, Plan, Step
 from gear.verbs.bench.report import COLUMNS, BenchReport, Metric, Result, SceneMetric, TaskResult
 from gear.verbs.bench.request import BenchRequest
 from gear.verbs.bench.scenes import calibration_scene, located, measured_scenes
+from gear.verbs.bench.schedule import OnStep, run_steps
 from gear.verbs.bench.table import text
 from gear.verbs.bench.validation import contests, find_attack
-from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.report import EvaluateReport
-from gear.verbs.evaluate.run import OtherLessonsError, evaluate
-
-VERBS: dict[Verb, Callable[..., Any]] = {"collect": collect, "attack": attack, "evaluate": evaluate}
-
-
-OnStep = Callable[[Step, int, int], None]
-"""A callback that gets the step, its number (from 1) and the number of all steps."""
 
 CONFIG = "bench.yml"
 """Name of the file with the bench config, with all defaults filled in."""
@@ -55,6 +51,8 @@ def bench(
     out: str | Path,
     settings: Iterable[str] = (),
     device: str | None = None,
+    engine: str = DEFAULT,
+    address: str | None = None,
     workers: Workers = 1,
     in_subprocess: bool = False,
     progress: bool = False,
@@ -75,12 +73,18 @@ def bench(
         out: folder of all results.
         settings: `KEY=VALUE` texts for any key of the config.
         device: device of the networks; overrides the config.
-        workers: number of processes of each collection, or `auto`; the results do not depend on it.
+        engine: name of the engine whose workers carry out the steps; `processes` uses processes on this machine.
+        address: address of the engine's cluster: a Ray cluster, or a partition of SLURM.
+        workers: number of workers of the engine, or `auto`. With more than one worker, or another engine, several
+            steps are carried out at the same time; a script then needs `if __name__ == "__main__":`. On a machine with
+            a GPU, `processes` carries out one attack or evaluation at a time.
         in_subprocess: whether a single worker runs in a process of its own. Each collection in the calling process
             keeps about 20 MB, so True is better for large benches; a script then needs `if __name__ == "__main__":`.
         progress: shows a progress bar.
-        on_step: called before each step with the step, its number (from 1) and the number of steps.
-        on_progress: called after every sample of a step, or after every step of an attack.
+        on_step: called with a step, its number (from 1) and the number of steps: before each step, or after each step
+            if several are carried out at the same time.
+        on_progress: called after every sample of a step, or after every step of an attack; if several steps are carried
+            out at the same time, after each of them.
         on_fit_progress: called after every calibration sample that a defense reads for the first time.
         on_warning: called with lines on settings that may be unintended, and on results that are made again.
 
@@ -88,7 +92,14 @@ def bench(
         GearError: an error that the user can correct; the message is one line.
     """
     request = BenchRequest(
-        config=config, out=out, settings=tuple(settings), device=device, workers=workers, in_subprocess=in_subprocess
+        config=config,
+        out=out,
+        settings=tuple(settings),
+        device=device,
+        workers=workers,
+        in_subprocess=in_subprocess,
+        engine=engine,
+        address=address,
     )
     callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
     with displayed(callbacks, "bench", progress=progress) as shown:
@@ -102,23 +113,53 @@ def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | Non
         GearError: an error that the user can correct; the message is one line.
     """
     plan, root = prepared(request), Path(request.out)
-    with explained(root):
-        root.mkdir(parents=True, exist_ok=True)
     config = to_yaml(plan.config).encode()
-    if not (root / CONFIG).exists():  # an existing config belongs to the existing reports
+    with alone_at_work(root):
+        if not (root / CONFIG).exists():  # an existing config belongs to the existing reports
+            write_whole(root, CONFIG, config)
+        steps = list(plan.steps())
+        carried_out = _scheduled if request.is_scheduled else _in_turn
+        report = _report(plan, root, carried_out(steps, root, request, callbacks, on_step))
         write_whole(root, CONFIG, config)
+        _write(report, plan, root)
+    return report
+
+
+def _in_turn(
+    steps: Sequence[Step], root: Path, request: BenchRequest, callbacks: Callbacks, on_step: OnStep | None
+) -> dict[str, EvaluateReport]:
+    """Carries out all steps in this process, one after the other; returns the evaluations by their folder."""
     evaluations: dict[str, EvaluateReport] = {}
-    steps = list(plan.steps())
     for number, step in enumerate(steps, 1):
         if on_step is not None:
             on_step(step, number, len(steps))
-        done = _carried_out(step, root, callbacks, in_subprocess=request.in_subprocess)
+        changed = {"in_subprocess": request.in_subprocess} if step.verb == "collect" else {}
+        done = carry_out(step, root, callbacks, changed=changed)
         if isinstance(done, EvaluateReport):
             evaluations[step.arguments["out"]] = done
-    report = _report(plan, root, evaluations)
-    write_whole(root, CONFIG, config)
-    _write(report, plan, root)
-    return report
+    return evaluations
+
+
+def _scheduled(
+    steps: Sequence[Step], root: Path, request: BenchRequest, callbacks: Callbacks, on_step: OnStep | None
+) -> dict[str, EvaluateReport]:
+    """Carries out all steps with the workers of an engine; returns the evaluations by their folder."""
+    workers, has_gpu = fitting_workers(request.workers), has_cuda(request.device)
+    return run_steps(
+        steps,
+        root,
+        rendering=_engine(request, workers),
+        networks=_engine(request, 1 if has_gpu and request.engine == DEFAULT else workers, gpus=int(has_gpu)),
+        workers=workers,
+        callbacks=callbacks,
+        on_step=on_step,
+    )
+
+
+def _engine(request: BenchRequest, workers: int, *, gpus: int = 0) -> Executor:
+    """Opens the engine that carries out steps; a step may take any time."""
+    needs = Needs(silence_s=math.inf, gpus=gpus)
+    return open_engine(request.engine, workers=workers, backend="bench", address=request.address, needs=needs)
 
 
 def _write(report: BenchReport, plan: Plan, root: Path) -> None:
@@ -135,39 +176,6 @@ def _write(report: BenchReport, plan: Plan, root: Path) -> None:
             write_whole(root, f"figures/{contest.folder}.pdf", chart(task, "pdf"))
     write_whole(root, "report.html", page(report, plan).encode())
     clear_scratch(root)
-
-
-def _carried_out(step: Step, root: Path, callbacks: Callbacks, *, in_subprocess: bool) -> Any:
-    """Runs one step.
-
-    Raises:
-        GearError: the step fails; the message names the step.
-    """
-    keywords: dict[str, Any] = {"on_progress": callbacks.on_progress, "on_warning": callbacks.on_warning}
-    if step.verb == "collect":
-        keywords["in_subprocess"] = in_subprocess
-    else:
-        keywords["on_fit_progress"] = callbacks.on_fit_progress
-    try:
-        return _done(step, root, keywords, callbacks.on_warning)
-    except ReplaceableError as error:
-        raise GearError(f"{step.title}: {error.path}: {error.problem}; use another --out, or remove it") from error
-    except GearError as error:
-        raise GearError(f"{step.title}: {error}") from error
-
-
-def _done(step: Step, root: Path, keywords: dict[str, Any], warn: Warn) -> Any:
-    """Runs one step; results that were made from pictures or patches that have changed since are replaced."""
-    verb, again = VERBS[step.verb], f"{step.title}: is made again, for what is there"
-    try:
-        return verb(**step.arguments, **keywords)
-    except OutdatedError as error:
-        warn(f"{again} {error.problem}")
-        return verb(**step.arguments, **keywords, force=True)
-    except OtherLessonsError as error:
-        warn(f"{again} {error.problem.partition(';')[0]}")
-        remove_tree(root, Path(error.path).relative_to(root).as_posix())
-        return verb(**step.arguments, **keywords)
 
 
 def prepared(request: BenchRequest) -> Plan:
@@ -192,9 +200,22 @@ def prepared(request: BenchRequest) -> Plan:
         attack=attacker.spec,
         root=root,
         workers=fitting_workers(request.workers),
+        engine=_engine_arguments(request),
     )
     _check_pictures(plan, node)
     return plan
+
+
+def _engine_arguments(request: BenchRequest) -> dict[str, str]:
+    """Returns the arguments of collections that name their engine; none for processes on this machine.
+
+    Raises:
+        UnknownNameError: there is no such engine.
+        GearError: the engine cannot use the address, or a package that it needs is not installed.
+    """
+    _engine(request, fitting_workers(request.workers))
+    engine = {} if request.engine == DEFAULT else {"engine": request.engine}
+    return engine if request.address is None else {**engine, "address": request.address}
 
 
 def _check_pictures(plan: Plan, node: Node) -> None:

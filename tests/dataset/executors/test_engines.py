@@ -15,9 +15,9 @@ from gear.values.errors import GearError, UnknownNameError
 ENGINE = """
 from gear.dataset.executors.in_process import InThisProcess
 
-def executor(*, workers, backend, address):
+def executor(*, workers, backend, address, needs):
     made = InThisProcess()
-    made.asked = (workers, backend)
+    made.asked = (workers, backend, needs.silence_s)
     return made
 """
 
@@ -33,7 +33,7 @@ def test_a_new_engine_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(executors, "__path__", [*executors.__path__, str(tmp_path)])
     assert engine_names() == ["cluster_of_mine", "processes", "ray", "slurm"]
     opened = open_engine("cluster_of_mine", workers=8, backend="film")
-    assert isinstance(opened, InThisProcess) and vars(opened)["asked"] == (8, "film")
+    assert isinstance(opened, InThisProcess) and vars(opened)["asked"] == (8, "film", 600.0)
 
 
 def test_the_processes_of_one_machine_take_no_address() -> None:

@@ -14,9 +14,9 @@ import pytest
 import gear
 from gear.cli.main import main
 from gear.values.errors import GearError, ReplaceableError
+from gear.verbs.bench.carry_out import VERBS
 from gear.verbs.bench.plan import Step
 from gear.verbs.bench.report import BenchReport
-from gear.verbs.bench.run import VERBS
 from tests.verbs.bench.conftest import FEW, callbacks
 
 pytestmark = pytest.mark.usefixtures("plugins")

@@ -10,8 +10,8 @@ import pytest
 
 import gear
 from gear.values.errors import GearError
+from gear.verbs.bench.carry_out import VERBS
 from gear.verbs.bench.plan import Step
-from gear.verbs.bench.run import VERBS
 from tests.verbs.bench.conftest import FEW, LEARNING, callbacks
 
 pytestmark = pytest.mark.usefixtures("plugins")
