@@ -190,17 +190,9 @@ def _copy_sample(parts: Parts, out: Path, hashes: dict[str, str], index: int) ->
     Raises:
         DatasetError: as `copy_samples`.
     """
-    relative = sidecar_path(parts.split, index)
-    first, *others = (parts.roots[position] for position in parts.homes[index])
-    data = read_bytes(inside(first, relative))
-    for other in others:
-        if read_bytes(inside(other, relative)) != data:
-            problem = f"is another sample than that of {first}; check both folders with `gear verify`"
-            raise DatasetError(inside(other, relative), problem)
-    files = read_sidecar(inside(first, relative)).files
-    for name in files:
-        if is_reserved(name, parts.split):
-            raise DatasetError(inside(first, relative), f"names {name}, which is no file of a sample")
+    relative, data = sidecar_path(parts.split, index), sidecar_of(parts, index)
+    first = parts.roots[parts.homes[index][0]]
+    files = files_of(parts, first, index)
     if _holds(owned(out, relative), data) and all(  # of a merge that was stopped
         owned(out, name).is_file() and file_hash(owned(out, name)) == digest for name, digest in files.items()
     ):
@@ -210,6 +202,36 @@ def _copy_sample(parts: Parts, out: Path, hashes: dict[str, str], index: int) ->
             raise DatasetError(owned(out, name), TWICE)
         _put(out, name, check_hash(first, name, digest))
     _put(out, relative, data)
+
+
+def sidecar_of(parts: Parts, index: int) -> bytes:
+    """The bytes of a sample's sidecar (JSON file of the sample), which must be equal in all folders that have it.
+
+    Raises:
+        DatasetError: two folders have different ones, or one cannot be read.
+    """
+    relative = sidecar_path(parts.split, index)
+    first, *others = (parts.roots[position] for position in parts.homes[index])
+    data = read_bytes(inside(first, relative))
+    for other in others:
+        if read_bytes(inside(other, relative)) != data:
+            problem = f"is another sample than that of {first}; check both folders with `gear verify`"
+            raise DatasetError(inside(other, relative), problem)
+    return data
+
+
+def files_of(parts: Parts, root: Path, index: int) -> Mapping[str, str]:
+    """The hashes of a sample's files by path, as its sidecar (JSON file of the sample) in a folder names them.
+
+    Raises:
+        DatasetError: the sidecar is damaged, or names a file that is no file of a sample.
+    """
+    path = inside(root, sidecar_path(parts.split, index))
+    files = read_sidecar(path).files
+    for name in files:
+        if is_reserved(name, parts.split):
+            raise DatasetError(path, f"names {name}, which is no file of a sample")
+    return files
 
 
 def _put(out: Path, relative: str, data: bytes) -> None:

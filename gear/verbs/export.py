@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
 
+from gear.config.dump import to_plain
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.tasks import Sidecar
@@ -15,6 +16,8 @@ from gear.dataset.free_space import check_free_space
 from gear.dataset.guarded_paths import owned, remove_empty_folders, remove_files
 from gear.dataset.layout import GEAR, sidecar_path
 from gear.dataset.reading import Dataset, check_hash
+from gear.dataset.remote.folder import RemoteFolder, is_address, local_path
+from gear.dataset.remote.tree import write_remote_tree
 from gear.dataset.store import check_output, plan_of, splits_of
 from gear.dataset.whole_tree import check_target, unfinished_place, whole_tree
 from gear.formats.exports.layout import ExportSplit
@@ -44,7 +47,8 @@ def export(
     Args:
         dataset: root of a dataset whose splits are finished.
         layout: name of a layout, such as `coco`.
-        out: folder of the exported files; must be empty or new.
+        out: folder of the exported files; must be empty or new. An address of fsspec, such as `s3://bucket/folder`, is
+            filled directly; the file `gear-export.json`, which lists all other files, is written last.
         settings: `KEY=VALUE` texts for the layout's options.
         progress: shows a progress bar.
         on_progress: called after every file with (number of written files, 0); 0 means that the number of all files
@@ -62,9 +66,10 @@ def export(
     """
     chosen = find_layout(layout)
     options = read_node(chosen.options, with_overrides(NO_OPTIONS, settings, flag="--set"), "options")
-    source, target = Path(dataset), Path(out).resolve()
+    source = Path(dataset)
     splits: list[ExportSplit] = []
     hashes: dict[str, str] = {}
+    keys: dict[str, Json] = {}
     for name in splits_of(source):
         task = plan_of(source, name).task["name"]
         if chosen.tasks and task not in chosen.tasks:
@@ -73,7 +78,16 @@ def export(
         opened = open_dataset(source, name)
         splits.append(_split_of(opened, task))
         hashes |= _hashes(opened.manifest)
+        keys[name] = {"content_key": opened.plan.content_key, "samples": len(opened)}
     tree = chosen.tree(splits, lambda path: check_hash(source, path, hashes.get(path, "")), options)
+    samples = sum(len(split.sidecars) for split in splits)
+    callbacks = Callbacks.of(on_progress=on_progress)
+    if isinstance(out, str) and is_address(out):
+        facts: dict[str, Json] = {"layout": layout, "options": to_plain(options), "splits": keys}
+        with displayed(callbacks, "export", progress=progress, unit="file") as shown:
+            write_remote_tree(RemoteFolder(out), tree, facts, shown.on_progress)
+        return samples
+    target = local_path(out).resolve()
     check_target(target, "export")
     unfinished = unfinished_place(target, "export")
     check_output(unfinished, "delete it, or use another --out")
@@ -85,10 +99,10 @@ def export(
     )
     with (
         whole_tree(target, "export"),
-        displayed(Callbacks.of(on_progress=on_progress), "export", progress=progress, unit="file") as shown,
+        displayed(callbacks, "export", progress=progress, unit="file") as shown,
     ):
         _write_tree(unfinished, tree, shown.on_progress)
-    return sum(len(split.sidecars) for split in splits)
+    return samples
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -12,6 +13,8 @@ from gear.collecting.patch_sources import digest_of, read_patch
 from gear.contracts.tasks import NO_PATCH
 from gear.dataset.merging import Parts, copy_patches, copy_samples, find_parts, prepare_merge
 from gear.dataset.plan import manifest_facts, refuse_other_tasks
+from gear.dataset.remote.folder import RemoteFolder, is_address, local_path
+from gear.dataset.remote.merge import begin_remote_merge, copy_samples_to, finish_remote_merge
 from gear.dataset.sealed_json import REPAIR, DamagedError
 from gear.dataset.store import Store, splits_of
 from gear.dataset.whole_tree import check_target, whole_tree
@@ -28,12 +31,12 @@ class MergeReport:
     """The result of `gear.merge`.
 
     Attributes:
-        root: folder of the new dataset.
+        root: folder of the new dataset, or its address.
         samples: number of samples of each split, by name of the split.
         sources: number of folders that were joined.
     """
 
-    root: Path
+    root: Path | str
     samples: Mapping[str, int]
     sources: int
 
@@ -58,7 +61,8 @@ def merge(
 
     Args:
         datasets: roots of the source folders, each with some samples of one or several splits.
-        out: folder of the new dataset; must be empty or new.
+        out: folder of the new dataset; must be empty or new. An address of fsspec, such as `s3://bucket/folder`, is
+            filled directly: the manifests are written last, and a split without a manifest is not finished.
         progress: shows a progress bar.
         on_progress: called after every sample with (finished samples, samples of the split).
 
@@ -68,7 +72,7 @@ def merge(
             damaged or a path leads outside its folder, `out` is not empty, or a file cannot be written.
         UnknownNameError: the plugin of the task is not installed.
     """
-    roots, target = [Path(root) for root in datasets], Path(out).resolve()
+    roots = [Path(root) for root in datasets]
     if not roots:
         raise GearError("merge: no folder was given; name the folders with the shards")
     parts = [find_parts(roots, split) for split in sorted({split for root in roots for split in splits_of(root)})]
@@ -76,22 +80,53 @@ def merge(
         _check_versions(one)
         for root in roots:
             refuse_other_tasks(root, one.plan)
+    callbacks = Callbacks.of(on_progress=on_progress)
+    report = MergeReport(
+        root=out if isinstance(out, str) and is_address(out) else local_path(out),
+        samples={one.split: one.plan.samples for one in parts},
+        sources=len(roots),
+    )
+    if isinstance(report.root, str):
+        with displayed(callbacks, "merge", progress=progress) as shown:
+            _merge_to(RemoteFolder(report.root), parts, shown.on_progress)
+        return report
+    target = report.root.resolve()
     check_target(target, "merge")
     for root in roots:
         if target.is_relative_to(root.resolve()):
             raise DatasetError(target, f"lies in {root}, which is merged; use another --out")
     with (
         whole_tree(target, "merge", is_kept=True) as unfinished,
-        displayed(Callbacks.of(on_progress=on_progress), "merge", progress=progress) as shown,
+        displayed(callbacks, "merge", progress=progress) as shown,
     ):
         prepare_merge(unfinished, [one.plan for one in parts])
         for one in parts:
             if one.plan.patch["label"] != NO_PATCH:
                 copy_patches(one, unfinished, partial(_check_patch, one))
             copy_samples(one, unfinished, shown.on_progress)
-            with blamed(find("task", name_of_task(one.plan.task)), "finalise"):
-                Store(unfinished, one.plan).close(task_of(one.roots[0], one.plan), manifest_facts(one.plan))
-    return MergeReport(root=Path(out), samples={one.split: one.plan.samples for one in parts}, sources=len(roots))
+            _close(one, unfinished)
+    return report
+
+
+def _merge_to(folder: RemoteFolder, parts: Sequence[Parts], on_progress: Progress) -> None:
+    """Merges into a folder at an address."""
+    with tempfile.TemporaryDirectory(prefix="gear-merge-") as name:
+        staging = Path(name)
+        plans = [one.plan for one in parts]
+        prepare_merge(staging, plans)
+        begin_remote_merge(folder, staging, plans)
+        for one in parts:
+            if one.plan.patch["label"] != NO_PATCH:
+                copy_patches(one, staging, partial(_check_patch, one))
+            copy_samples_to(one, folder, staging, on_progress)
+            _close(one, staging)
+        finish_remote_merge(folder, staging, [one.split for one in parts])
+
+
+def _close(parts: Parts, root: Path) -> None:
+    """Writes the index files and the manifest of a split whose sidecars are all in `root`."""
+    with blamed(find("task", name_of_task(parts.plan.task)), "finalise"):
+        Store(root, parts.plan).close(task_of(parts.roots[0], parts.plan), manifest_facts(parts.plan))
 
 
 def _check_versions(parts: Parts) -> None:

@@ -17,7 +17,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset")
     parser.add_argument("--layout", required=True, help=f"{', '.join(layout_names())}")
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder of the new tree; must be empty or new")
+    parser.add_argument(
+        "--out",
+        required=True,
+        metavar="DIR",
+        help="folder of the new tree, or an address such as s3://bucket/folder; must be empty or new",
+    )
     parser.add_argument(
         "--set", action="append", default=[], dest="settings", metavar="KEY=VALUE", help="option of the layout"
     )

@@ -6,6 +6,7 @@ import argparse
 
 EXAMPLE = """examples:
   gear merge part1 part2 part3 --out data/train
+  gear merge part1 part2 --out s3://bucket/train
 """
 
 
@@ -13,7 +14,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of `gear merge` to its argument parser."""
     parser.epilog = EXAMPLE
     parser.add_argument("datasets", nargs="+", metavar="DIR", help="folder that `gear collect --shard I/N` has filled")
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder of the dataset; must be empty or new")
+    parser.add_argument(
+        "--out",
+        required=True,
+        metavar="DIR",
+        help="folder of the dataset, or an address such as s3://bucket/folder; must be empty or new",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -90,8 +90,8 @@ class Plan:
         contests: networks and defenses of each task.
         attack: spec of the attack that makes the patches.
         root: folder of the benchmark.
-        workers: number of workers of each collection.
-        engine: arguments of each collection that name its engine, `engine` and `address`; empty for the default.
+        workers: arguments of each collection that name its workers: `workers`, and `engine` and `address` if they are
+            not the default ones.
     """
 
     def __init__(
@@ -103,13 +103,12 @@ class Plan:
         contests: tuple[Contest, ...],
         attack: AttackSpec[Any],
         root: Path,
-        workers: int = 1,
-        engine: Mapping[str, str] | None = None,
+        workers: Mapping[str, str | int],
     ) -> None:
         self.config, self.contests, self.scenes = config, contests, scenes
         self.weathers = tuple(weathers(config.weathers))
         self._calibration, self._attack, self._root = calibration, attack, root
-        self._workers = {"workers": workers, **(engine or {})}
+        self._workers = workers
 
     def steps(self) -> Iterator[Step]:
         """Yields all steps in an order in which each step comes after the steps that it depends on."""

@@ -199,23 +199,24 @@ def prepared(request: BenchRequest) -> Plan:
         contests=tuple(contests(read, node, attack=attacker, surfaces=surfaces, device=request.device)),
         attack=attacker.spec,
         root=root,
-        workers=fitting_workers(request.workers),
-        engine=_engine_arguments(request),
+        workers=_workers(request),
     )
     _check_pictures(plan, node)
     return plan
 
 
-def _engine_arguments(request: BenchRequest) -> dict[str, str]:
-    """Returns the arguments of collections that name their engine; none for processes on this machine.
+def _workers(request: BenchRequest) -> dict[str, str | int]:
+    """Returns the arguments of collections that name their workers; default values are left out, except the number.
 
     Raises:
         UnknownNameError: there is no such engine.
         GearError: the engine cannot use the address, or a package that it needs is not installed.
     """
-    _engine(request, fitting_workers(request.workers))
+    count = fitting_workers(request.workers)
+    _engine(request, count)
     engine = {} if request.engine == DEFAULT else {"engine": request.engine}
-    return engine if request.address is None else {**engine, "address": request.address}
+    address = {} if request.address is None else {"address": request.address}
+    return {"workers": count, **engine, **address}
 
 
 def _check_pictures(plan: Plan, node: Node) -> None:
