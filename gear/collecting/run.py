@@ -10,6 +10,7 @@ from gear.collecting.missing import collect_missing
 from gear.contracts.executors import Executor
 from gear.dataset.executors.engines import DEFAULT, open_engine
 from gear.dataset.executors.in_process import InThisProcess
+from gear.dataset.locks import SHARED, lock_note
 from gear.dataset.plan import manifest_facts
 from gear.dataset.shards import WHOLE, Shard
 from gear.dataset.store import Store
@@ -88,10 +89,13 @@ def run_job(
     store = Store(job.root, job.plan)
     plugin = find("task", job.config.task)
     part = shard or WHOLE
+    callbacks = callbacks or Callbacks()
     with store.begun(job.patch.files, force=force):
+        if (note := lock_note(job.root, SHARED)) is not None:
+            callbacks.on_warning(note)
         store.refuse_damaged(part)
         absolute = replace(job, root=job.root.absolute())  # workers of other machines have other current folders
-        made = collect_missing(absolute, store, part, executor or InThisProcess(), callbacks or Callbacks())
+        made = collect_missing(absolute, store, part, executor or InThisProcess(), callbacks)
         if shard is None:
             task = build(plugin, job.config.options)
             with blamed(plugin, "finalise"):

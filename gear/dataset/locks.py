@@ -1,6 +1,6 @@
 """Locks on folders, by which parallel runs detect each other; the system releases the locks of a killed run.
 
-On a file system without locks, every run proceeds as if there were no other runs.
+On a file system without locks, every run proceeds as if there were no other runs, and says so in one line.
 """
 
 from __future__ import annotations
@@ -13,11 +13,27 @@ from pathlib import Path
 
 from gear.dataset.files import explained
 from gear.values.errors import DatasetError
+from gear.values.progress import Warn
 
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["alone_at_work", "at_work", "is_at_work", "turn"]
+__all__ = ["alone_at_work", "at_work", "is_at_work", "lock_note", "turn"]
+
+ALONE = "other runs in this folder are not detected, so run one command at a time there"
+"""What the lack of locks means for a folder of results."""
+
+SHARED = (
+    "runs that share this split may make a sample twice, a sample of a killed run is free again after 15 minutes, and "
+    "--force does not detect other runs; the files are the same in any case"
+)
+"""What the lack of locks means for a split that several runs collect."""
+
+MOUNTS = Path("/proc/self/mounts")
+"""List of the mounted file systems on Linux."""
+
+LOCAL_OPTIONS = {"nolock", "local_lock=all", "local_lock=flock", "localflock", "nobrl"}
+"""Mount options of network file systems (NFS, Lustre, CIFS) with which locks do not reach other machines."""
 
 
 @contextlib.contextmanager
@@ -51,8 +67,12 @@ def at_work(folder: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def alone_at_work(root: Path) -> Iterator[None]:
+def alone_at_work(root: Path, on_warning: Warn | None = None) -> Iterator[None]:
     """A context that locks a folder of results for this run only; a missing folder is created.
+
+    Args:
+        root: the folder.
+        on_warning: called with one line if locks do not work there.
 
     Raises:
         DatasetError: another run writes into the folder, or the folder cannot be created.
@@ -65,7 +85,53 @@ def alone_at_work(root: Path) -> Iterator[None]:
         except BlockingIOError as error:
             problem = "another gear run is using this folder; wait for its end, or use another --out"
             raise DatasetError(root, problem) from error
+        if on_warning is not None and (note := lock_note(root, ALONE)) is not None:
+            on_warning(note)
         yield
+
+
+def lock_note(folder: Path, meaning: str) -> str | None:
+    """One line that says that locks do not work on a folder's file system; None if they work.
+
+    Args:
+        folder: an existing folder.
+        meaning: what the lack of locks means for the run (`ALONE`, `SHARED`).
+    """
+    problem = _lock_problem(folder)
+    return None if problem is None else f"{folder}: {problem}: {meaning}"
+
+
+def _lock_problem(folder: Path) -> str | None:
+    """Why locks on a folder do not work, or work on this machine only; None if they work."""
+    if sys.platform == "win32":
+        return "this system has no locks on folders"
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        finally:
+            os.close(descriptor)
+    except BlockingIOError:  # another run, or this one, holds the lock
+        pass
+    except OSError as error:
+        return f"the file system has no locks ({error.strerror})"
+    option = _local_option(folder)
+    return None if option is None else f"locks do not reach other machines (mount option {option})"
+
+
+def _local_option(folder: Path) -> str | None:
+    """The mount option of a folder's file system with which locks hold on this machine only; None if there is none."""
+    try:
+        lines = MOUNTS.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:  # not Linux
+        return None
+    path, found = folder.resolve(), ("", "")
+    for line in lines:
+        _, place, _, options, *_ = [*line.split(" "), "", "", "", ""]
+        place = place.replace("\\040", " ")
+        if place and path.is_relative_to(place) and len(place) >= len(found[0]):
+            found = place, options
+    return min(LOCAL_OPTIONS & set(found[1].split(",")), default=None)
 
 
 def is_at_work(folder: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
 import signal
@@ -13,8 +14,22 @@ import pytest
 
 from gear.collecting.run import CollectReport
 from gear.contracts.executors import Needs
+from gear.dataset import locks
 from gear.dataset.executors import engines
 from gear.values.errors import BackendError
+
+
+def test_a_disk_without_locks_is_named_once(
+    tmp_path: Path, collect_small: Callable[..., CollectReport], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(descriptor: int, operation: int) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(locks.fcntl, "flock", refuse)
+    notes: list[str] = []
+    assert collect_small("depth", tmp_path / "a", samples=1, on_warning=notes.append).made == 1
+    said = f"{tmp_path / 'a'}: the file system has no locks (No locks available): {locks.SHARED}"
+    assert [note for note in notes if "locks" in note] == [said]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there processes are interrupted otherwise")

@@ -177,7 +177,7 @@ def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
     product, root = build(job.found, job.options), Path(request.out)
     network = build_model(job.models, job.guard, job.seed, job.weights)
     plan = job.plan(weights_digest(network), product)
-    with alone_at_work(root):
+    with alone_at_work(root, callbacks.on_warning):
         there = begin(root, plan, force=request.force)
         if there is not None:
             return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)

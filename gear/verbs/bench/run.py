@@ -114,7 +114,7 @@ def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | Non
     """
     plan, root = prepared(request), Path(request.out)
     config = to_yaml(plan.config).encode()
-    with alone_at_work(root):
+    with alone_at_work(root, callbacks.on_warning):
         if not (root / CONFIG).exists():  # an existing config belongs to the existing reports
             write_whole(root, CONFIG, config)
         steps = list(plan.steps())

@@ -148,7 +148,7 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
         **learnt.counted(),
         "seed": request.seed,
     }
-    with alone_at_work(root):
+    with alone_at_work(root, callbacks.on_warning):
         _begin(root, facts)
         rows = _measured(request, datasets, names, guarded, callbacks)
         learnt_facts = _fit_facts(root, guarded, request, callbacks.on_warning)

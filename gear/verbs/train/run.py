@@ -168,7 +168,7 @@ def run_train(request: TrainRequest, callbacks: Callbacks, on_step: OnStep | Non
     origin = _origin(request, callbacks)
     found, spec, root = origin.model, origin.spec, Path(request.out)
     parts = _parts(origin, root, callbacks)
-    with alone_at_work(root):
+    with alone_at_work(root, callbacks.on_warning):
         clear_scratch(root)
         training = Training(
             parts, origin.config, on_step=with_progress(on_step, callbacks), pack=partial(packed, origin)

@@ -1,0 +1,72 @@
+"""Locks on folders: runs that detect each other, and file systems whose locks fail."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from gear.dataset import locks
+from gear.dataset.locks import ALONE, SHARED, alone_at_work, at_work, is_at_work, lock_note, turn
+from gear.values.errors import DatasetError
+
+
+def test_a_folder_of_results_is_locked_for_one_run(tmp_path: Path) -> None:
+    notes: list[str] = []
+    with alone_at_work(tmp_path / "a", notes.append):
+        assert lock_note(tmp_path / "a", ALONE) is None, "a lock that is held is one that works"
+        with pytest.raises(DatasetError, match="another gear run is using this folder"), alone_at_work(tmp_path / "a"):
+            pass
+    with alone_at_work(tmp_path / "a", notes.append):
+        pass
+    assert notes == []
+
+
+def test_several_runs_may_collect_a_split(tmp_path: Path) -> None:
+    with at_work(tmp_path), at_work(tmp_path):
+        assert is_at_work(tmp_path)
+    assert not is_at_work(tmp_path)
+
+
+@pytest.fixture(params=[errno.ENOLCK, errno.EOPNOTSUPP, errno.EBADF])
+def refused(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A file system that refuses locks; the words of its error."""
+
+    def refuse(descriptor: int, operation: int) -> None:
+        raise OSError(request.param, os.strerror(request.param))
+
+    monkeypatch.setattr(locks.fcntl, "flock", refuse)
+    return os.strerror(request.param)
+
+
+def test_a_file_system_without_locks_is_named_once_and_nothing_waits(tmp_path: Path, refused: str) -> None:
+    notes: list[str] = []
+    with turn(tmp_path), turn(tmp_path), alone_at_work(tmp_path, notes.append), at_work(tmp_path):
+        assert not is_at_work(tmp_path)
+    assert notes == [f"{tmp_path}: the file system has no locks ({refused}): {ALONE}"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ("rw,relatime,vers=4.2,local_lock=none", None),
+        ("rw,vers=3,nolock,local_lock=all", "mount option local_lock=all"),
+        ("rw,localflock", "mount option localflock"),
+    ],
+)
+def test_locks_that_stay_on_this_machine_are_known_by_the_mount(
+    options: str, said: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "a disk" / "data"
+    folder.mkdir(parents=True)
+    place = str(folder.parent.resolve()).replace(" ", "\\040")
+    mounts = tmp_path / "mounts"
+    mounts.write_text(
+        f"/dev/root / ext4 rw 0 0\nserver:/x {place} nfs4 {options} 0 0\ntmpfs /elsewhere tmpfs nolock 0 0\n"
+    )
+    monkeypatch.setattr(locks, "MOUNTS", mounts)
+    note = lock_note(folder, SHARED)
+    assert note == (None if said is None else f"{folder}: locks do not reach other machines ({said}): {SHARED}")
+    assert lock_note(tmp_path, SHARED) is None
