@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.contracts.tasks import Encoded, Evaluator, SplitInfo
+from gear.values.frames import UInt8Image
 from gear.values.picture_objects import PictureObjects
 from gear.values.serial import Json
 
@@ -52,6 +53,22 @@ class KeepsPredictions(Protocol):
         Args:
             facts: scene record and encoded JSON data of each sample, in order of index.
             info: names and seed of the split.
+        """
+        ...
+
+
+@runtime_checkable
+class DrawsPredictions(Protocol):
+    """A task that draws predictions as pictures for people.
+
+    For a task without this protocol that implements `WithObjects`, gear draws the boxes of objects and detections.
+    """
+
+    def prediction_preview(self, sample: Any, prediction: Any) -> Mapping[str, UInt8Image]:
+        """Pictures of a prediction by name, (H, W, 3) uint8 RGB.
+
+        A picture has the name and the colours of the picture in `Task.preview` that shows the same for the ground
+        truth, so the two can be compared and have the same legend.
         """
         ...
 

@@ -47,6 +47,7 @@ class Answer:
             and by the number of parallel batches.
         mask: the defense's patch mask by camera name, (H, W) float32 in 0..1; None without a mask.
         score: the defense's confidence in 0..1 that the sample is attacked; None without a score.
+        defended: the pictures that the defense returned, (H, W, 3) uint8 RGB by camera; None without a defense.
     """
 
     prediction: Any
@@ -54,6 +55,7 @@ class Answer:
     defense_s: float
     mask: Mapping[str, npt.NDArray[np.float32]] | None
     score: float | None
+    defended: Views | None = None
 
 
 class GuardedModel:
@@ -162,6 +164,7 @@ class GuardedModel:
                 defense_s=defense_s,
                 mask=result.mask if result else None,
                 score=None if result is None or result.score is None else float(result.score),
+                defended=result.views if result else None,
             )
             for prediction, defense_s, result in zip(predictions, spent, results, strict=True)
         ]

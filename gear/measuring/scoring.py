@@ -7,14 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
+
+import cv2
+import numpy as np
 
 from gear.contracts.evaluation import KeepsPredictions, Maskable
 from gear.contracts.tasks import Sample
-from gear.dataset.files import explained, inside, read_bytes, sha256, write_whole
-from gear.dataset.json_text import dump_json, load_json
+from gear.dataset.files import explained, inside, sha256, write_whole
+from gear.dataset.json_text import dump_json
 from gear.dataset.output_checks import check_encoded
 from gear.dataset.reading import Dataset
 from gear.measuring.guarded_model import Answer, plugin_error
@@ -25,18 +29,15 @@ from gear.measuring.reports import OUTSIDE_PATCH, Report, reports_of
 from gear.measuring.statistics import AnyEvaluator
 from gear.plugins.catalogue import PluginEntry
 from gear.plugins.manager import DISTRIBUTION
+from gear.plugins.stored_evaluations import DEFENDED, PREDICTIONS, check_files, read_note
 from gear.plugins.text import one_line
-from gear.values.errors import DatasetError, FieldError, GearError
+from gear.values.errors import DatasetError, GearError
+from gear.values.frames import UInt8Image
 from gear.values.picture_objects import PictureOutcomes
-from gear.values.serial import Json, from_json, to_json
+from gear.values.serial import Json, to_json
 
-PREDICTIONS = "predictions"
-
-KEPT: Any = {
-    "facts": Any, "sha256": dict[str, str], "model_s": float, "defense_s": float, "score": float | None,
-    "mask": dict[str, float | None] | None,
-}  # fmt: skip
-"""Keys and types of a sample's note, a JSON file, that a later run reads."""
+DEFENDED_WIDTH_PX, DEFENDED_QUALITY = 640, 85
+"""Largest width in pixels and WebP quality of the stored pictures that a defense returns."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -52,6 +53,7 @@ class Note:
         mask: agreement of the defense's mask with the patch, by metric; None without a mask.
         facts: JSON that the task needs to read the prediction from its files.
         sha256: hashes of the prediction's files, by name.
+        defended: hashes of the stored pictures that the defense returned, by path; empty without a defense.
     """
 
     index: int
@@ -62,6 +64,7 @@ class Note:
     mask: Mapping[str, float] | None
     facts: Json
     sha256: Mapping[str, str]
+    defended: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> Json:
         """The content of the note's file, which is written next to the predictions."""
@@ -73,6 +76,7 @@ class Note:
             "mask": None if self.mask is None else known_json(self.mask),
             "facts": self.facts,
             "sha256": dict(self.sha256),
+            **({DEFENDED: dict(self.defended)} if self.defended else {}),
             **({} if self.outcomes is None else {"objects": to_json(self.outcomes)}),
         }
 
@@ -89,7 +93,7 @@ class Unwritten:
 
     Attributes:
         note: the sample's note, a JSON file that marks it as finished.
-        files: bytes of the prediction's files, by name.
+        files: bytes of the files, by path relative to the dataset's folder in the evaluation.
     """
 
     note: Note
@@ -129,6 +133,7 @@ class Scorer:
                 self._keeper.encode_prediction(sample, answer.prediction, self._dataset.plan.info), "encode_prediction"
             )
         files = encoded.files if encoded else {}
+        defended = {} if answer.defended is None else defended_files(index, answer.defended)
         note = Note(
             index=index,
             metrics=metrics,
@@ -138,14 +143,16 @@ class Scorer:
             mask=None if answer.mask is None else mask_metrics(sample, answer.mask),
             facts=encoded.facts if encoded else None,
             sha256={name: sha256(data) for name, data in files.items()},
+            defended={name: sha256(data) for name, data in defended.items()},
         )
-        return Unwritten(note=note, files=files)
+        predicted = {f"{PREDICTIONS}/{name}": data for name, data in files.items()}
+        return Unwritten(note=note, files=predicted | defended)
 
     def write(self, unwritten: Unwritten) -> Note:
         """Writes the files of a prediction and, last, the note that marks the sample as finished."""
         note = unwritten.note
         for relative, data in unwritten.files.items():
-            write_whole(self._root, f"{self._folder}/{PREDICTIONS}/{relative}", data)
+            write_whole(self._root, f"{self._folder}/{relative}", data)
         write_whole(self._root, f"{self._folder}/samples/{note.index:06d}.json", dump_json(note.as_json()))
         return note
 
@@ -167,10 +174,9 @@ class Scorer:
         sample = self._dataset[index]
         folder = inside(self._root, f"{self._folder}/{PREDICTIONS}")
         try:
-            there = _read_note(path)
-            for name, digest in there["sha256"].items():
-                if sha256(read_bytes(inside(folder, name))) != digest:
-                    raise DatasetError(inside(folder, name), "is not what was written")
+            there = _checked_note(path)
+            check_files(folder, there["sha256"])
+            check_files(inside(self._root, self._folder), there[DEFENDED])
             with explained(path):
                 prediction = self._keeper.decode_prediction(folder, sample, there["facts"], self._dataset.plan.info)
             metrics, parts = self._measure(sample, prediction)  # which it could when it was written
@@ -187,6 +193,7 @@ class Scorer:
             mask=None if there["mask"] is None else _with_nan(there["mask"]),
             facts=there["facts"],
             sha256=there["sha256"],
+            defended=there[DEFENDED],
         )
 
     def finish(self, notes: list[Note]) -> None:
@@ -229,22 +236,39 @@ class Scorer:
             raise
 
 
-def _read_note(path: Path) -> dict[str, Any]:
-    """The note of a sample, as JSON with checked types.
+def _checked_note(path: Path) -> dict[str, Any]:
+    """The note of a sample, as JSON with checked types and the metrics of masks that gear computes.
 
     Raises:
         DatasetError: the file is not a note that gear wrote.
     """
-    there = load_json(path)
-    if not isinstance(there, dict) or not there.keys() >= KEPT.keys():
-        raise DatasetError(path, "is no note of a sample")
-    try:
-        note: dict[str, Any] = {name: from_json(kind, there[name], name) for name, kind in KEPT.items()}
-    except FieldError as error:
-        raise DatasetError(path, f"is no note of a sample ({error})") from error
+    note = read_note(path)
     if note["mask"] is not None and note["mask"].keys() != set(MASK_METRICS):
         raise DatasetError(path, "is no note of a sample (mask: has other metrics)")
     return note
+
+
+def defended_files(index: int, views: Mapping[str, UInt8Image]) -> dict[str, bytes]:
+    """Encodes the pictures that a defense returned, as small WebP files.
+
+    Args:
+        index: index of the sample.
+        views: (H, W, 3) uint8 RGB by camera.
+
+    Returns:
+        Bytes by path relative to the dataset's folder in the evaluation.
+    """
+    files = {}
+    for camera, pixels in views.items():
+        height, width = pixels.shape[:2]
+        small = np.ascontiguousarray(pixels)
+        if width > DEFENDED_WIDTH_PX:
+            size = (DEFENDED_WIDTH_PX, max(1, round(height * DEFENDED_WIDTH_PX / width)))
+            small = np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_AREA), np.uint8)
+        done, data = cv2.imencode(".webp", small[..., ::-1], [cv2.IMWRITE_WEBP_QUALITY, DEFENDED_QUALITY])
+        if done:
+            files[f"{DEFENDED}/{index:06d}_{quote(camera, safe='')}.webp"] = data.tobytes()
+    return files
 
 
 def _with_nan(metrics: Mapping[str, float | None]) -> dict[str, float]:

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import PurePosixPath
 from typing import Any
 from urllib.parse import quote
@@ -24,9 +25,11 @@ from gear.values.frames import UInt8Image
 from gear.values.machine import cores
 from gear.values.progress import Progress
 from gear.values.serial import Json
-from gear.view.channels import Channel, PreviewError, Shown, images, previews
+from gear.view.changes import metrics_of, object_changes, picture_change
+from gear.view.channels import Channel, PreviewError, Shown, images, predictions, previews
 from gear.view.encoding import Picture, encode, largest_scale
 from gear.view.rows import detail, finite, row
+from gear.view.sources import Source
 
 PROBES = 6
 """Number of samples, evenly spaced over the split, from which the scale of the pictures is estimated."""
@@ -41,7 +44,7 @@ class Entry:
     Attributes:
         row: the overview data of the sample, for the index of the page.
         detail: all other metadata of the sample, as zlib-compressed JSON.
-        pictures: encoded pictures by channel, which is a camera or a preview.
+        pictures: encoded pictures by channel, such as a camera, a preview or a prediction.
         cameras: by channel, the camera whose pixels coincide with the channel's; None if no camera's do.
         originals: by channel, link to the dataset's file at full size, where the page contains a smaller picture.
         problem: why pictures or labels are missing; empty if the entry is complete.
@@ -60,13 +63,11 @@ class Builder:
     """Makes the entries of the page, one per sample.
 
     Attributes:
-        dataset: the dataset split that the page shows.
-        base_url: URL of the dataset's root relative to the page; ends in `/`.
+        sources: the dataset split whose samples the page lists, followed by its twins, each with its evaluations.
         scale: factor by which the embedded pictures are resized, at most 1.
     """
 
-    dataset: Dataset[Any]
-    base_url: str
+    sources: tuple[Source, ...]
     scale: float = 1.0
 
     def entries(self, count: int, on_progress: Progress | None = None) -> Iterator[Entry]:
@@ -88,56 +89,121 @@ class Builder:
         Raises:
             DatasetError: the sidecar, the JSON file with the sample's metadata, cannot be read.
         """
-        sidecar = self.dataset.sidecar(index)
-        links = {path: self.base_url + quote(path) for path in sidecar.files if is_inside(path)}
-        facts = {"row": finite(row(sidecar)), "detail": deflated(finite(detail(sidecar, links)))}
-        sample, problem = self._read(index)
-        if sample is None:
-            return Entry(problem=problem, **facts)
-        shown, problem = self._shown(sample)
-        pictures = {channel: encode(what.pixels, self.scale) for channel, what in shown.items()}
-        smaller = [channel for channel in shown if channel.kind == "image" and not pictures[channel].is_whole and links]
+        sidecar = self.sources[0].dataset.sidecar(index)
+        links = _links(self.sources[0], sidecar)
+        seen, problems = self._seen(index)
+        compared = {
+            "pictures": {one.label: one.change for one in seen if one.change is not None},
+            "metrics": metrics_of(self.sources, index),
+            "objects": object_changes(self.sources, index),
+        }
+        pictures: dict[Channel, Picture] = {}
+        cameras: dict[Channel, str | None] = {}
+        originals: dict[Channel, str] = {}
+        for one in seen:
+            for channel, what in one.shown.items():
+                pictures[channel] = encode(what.pixels, self.scale)
+                cameras[channel] = what.camera
+                if channel.kind == "image" and not pictures[channel].is_whole:
+                    link = _original(one.source, one.source.dataset.sidecar(index), what.pixels)
+                    originals |= {} if link is None else {channel: link}
         return Entry(
+            row=finite(row(sidecar) | {"compared": compared}),
+            detail=deflated(finite(detail(sidecar, links))),
             pictures=pictures,
-            cameras={channel: what.camera for channel, what in shown.items()},
-            originals={c: links[f] for c in smaller if (f := self._original(sidecar, shown[c].pixels)) in links},
-            problem=problem,
-            **facts,
+            cameras=cameras,
+            originals=originals,
+            problem="; ".join(problems),
         )
 
     def probe(self, index: int) -> list[UInt8Image]:
         """Returns all pictures of one sample, unscaled, to estimate the size of the page; empty if the sample
         cannot be read.
         """
-        sample, _ = self._read(index)
-        return [] if sample is None else [what.pixels for what in self._shown(sample)[0].values()]
+        return [what.pixels for one in self._seen(index)[0] for what in one.shown.values()]
 
-    def _read(self, index: int) -> tuple[Sample | None, str]:
-        try:
-            return self.dataset[index], ""
-        except GearError as error:
-            return None, str(error)
-        except Exception as error:  # the task may be a third party's
-            return None, f"reading failed: {type(error).__name__}: {error}"
+    def _seen(self, index: int) -> tuple[list[_Seen], list[str]]:
+        """Returns the pictures of one sample in every dataset that can be read, and one text per problem."""
+        seen: list[_Seen] = []
+        problems: list[str] = []
+        first: Sample | None = None
+        for place, source in enumerate(self.sources):
+            if index >= len(source.dataset):
+                continue
+            sample, problem = _read(source.dataset, index)
+            if sample is None:
+                problems.append(problem)
+                continue
+            shown, failures = _shown(source, sample, with_previews=place == 0)
+            problems += failures
+            change = picture_change(first, sample) if place and first is not None else None
+            first = sample if place == 0 else first
+            seen.append(_Seen(source=source, shown=shown, label=source.label, change=change))
+        return seen, problems
 
-    def _shown(self, sample: Sample) -> tuple[dict[Channel, Shown], str]:
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Seen:
+    """The pictures of one sample in one dataset.
+
+    Attributes:
+        source: the dataset.
+        shown: its pictures by channel.
+        label: label of the dataset.
+        change: difference of its pictures from those of the page's first dataset, 0..1; None for that dataset.
+    """
+
+    source: Source
+    shown: dict[Channel, Shown]
+    label: str
+    change: float | None
+
+
+def _read(dataset: Dataset[Any], index: int) -> tuple[Sample | None, str]:
+    try:
+        return dataset[index], ""
+    except GearError as error:
+        return None, str(error)
+    except Exception as error:  # the task may be a third party's
+        return None, f"reading failed: {type(error).__name__}: {error}"
+
+
+def _shown(source: Source, sample: Sample, *, with_previews: bool) -> tuple[dict[Channel, Shown], list[str]]:
+    """Returns the pictures of a sample by channel, and one text per problem.
+
+    Twins get no previews, because they have the same ground truth as the page's first dataset.
+    """
+    dataset, label = source.dataset, source.label
+    shown, problems = images(sample, label), []
+    drawers: list[Callable[[], dict[Channel, Shown]]] = []
+    if with_previews:
+        drawers.append(partial(previews, dataset.task, sample, label))
+    drawers += [partial(predictions, dataset, part, sample, label) for part in source.evaluated]
+    for draw in drawers:
         try:
-            return images(sample) | previews(self.dataset.task, sample), ""
+            shown |= draw()
         except PreviewError as error:
-            return images(sample), str(error)
+            problems.append(str(error))
+    return shown, problems
 
-    def _original(self, sidecar: Sidecar, pixels: UInt8Image) -> str | None:
-        """Returns the path of the sample's picture file with exactly these pixels; None if there is none."""
-        for relative in sidecar.files:
-            if PurePosixPath(relative).suffix.lower() in PICTURE_FILES and is_inside(relative):
-                try:
-                    data = read_bytes(inside(self.dataset.root, relative))
-                except DatasetError:
-                    continue
-                stored = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) if data else None
-                if stored is not None and np.array_equal(stored[..., ::-1], pixels):
-                    return relative
-        return None
+
+def _links(source: Source, sidecar: Sidecar) -> dict[str, str]:
+    """Returns links to the files of a sample, by path relative to the dataset's root."""
+    return {path: source.base_url + quote(path) for path in sidecar.files if is_inside(path)}
+
+
+def _original(source: Source, sidecar: Sidecar, pixels: UInt8Image) -> str | None:
+    """Returns the link to the sample's picture file with exactly these pixels; None if there is none."""
+    for relative, link in _links(source, sidecar).items():
+        if PurePosixPath(relative).suffix.lower() in PICTURE_FILES:
+            try:
+                data = read_bytes(inside(source.dataset.root, relative))
+            except DatasetError:
+                continue
+            stored = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) if data else None
+            if stored is not None and np.array_equal(stored[..., ::-1], pixels):
+                return link
+    return None
 
 
 def fitting_scale(builder: Builder, count: int, budget_bytes: float) -> float:
@@ -145,7 +211,7 @@ def fitting_scale(builder: Builder, count: int, budget_bytes: float) -> float:
     from a few samples.
     """
     chosen = sorted({round(i * (count - 1) / (PROBES - 1)) for i in range(PROBES)})
-    facts = [len(deflated(finite(detail(builder.dataset.sidecar(i), {})))) for i in chosen]
+    facts = [len(deflated(finite(detail(builder.sources[0].dataset.sidecar(i), {})))) for i in chosen]
     room = budget_bytes - sum(facts) / len(facts) * count
     return largest_scale(_pictures(builder, chosen), count, room)
 

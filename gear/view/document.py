@@ -17,11 +17,14 @@ from importlib.resources import files
 
 from gear.values.serial import Json
 from gear.view.build import Entry
-from gear.view.channels import Channel
+from gear.view.channels import KINDS, Channel
 from gear.view.counts import without_identifiers
 from gear.view.encoding import MEDIA_TYPE
 
-SCRIPTS = ("dom", "store", "histogram", "filters", "picture", "grid", "map", "tables", "sample", "statistics", "app")
+SCRIPTS = (
+    "dom", "store", "histogram", "sorting", "filters", "legend", "picture", "grid", "map", "tables", "compare",
+    "sample", "statistics", "app",
+)  # fmt: skip
 """Names of the JavaScript files in `gear/view/page`, in the order in which they are joined."""
 
 
@@ -47,15 +50,18 @@ def index_of(entries: Sequence[Entry], about: dict[str, Json]) -> dict[str, Json
     return {
         "about": about,
         "mediaType": MEDIA_TYPE,
-        "channels": [{"kind": channel.kind, "name": channel.name} for channel in channels],
+        "channels": [
+            {"kind": one.kind, "name": one.name, "dataset": one.dataset, "evaluation": one.evaluation}
+            for one in channels
+        ],
         "samples": rows,
     }
 
 
 def channels_of(entries: Sequence[Entry]) -> list[Channel]:
-    """Returns all channels of the entries, camera pictures before previews, otherwise in the order of the samples."""
+    """Returns all channels of the entries in the order of `KINDS`, and otherwise in the order of the samples."""
     found = dict.fromkeys(channel for entry in entries for channel in entry.pictures)
-    return sorted(found, key=lambda channel: channel.kind)
+    return sorted(found, key=lambda channel: KINDS.index(channel.kind))
 
 
 def _pictures(entry: Entry, channels: Sequence[Channel]) -> list[Json]:

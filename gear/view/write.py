@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 from gear.dataset.files import explained, refuse_folder, streamed_alone
 from gear.dataset.reading import Dataset
-from gear.plugins.datasets import open_dataset
+from gear.plugins.prediction_pictures import legends_json, picture_legends
 from gear.reporting.display import displayed
 from gear.values.counted import counted
 from gear.values.progress import Callbacks, Progress
@@ -19,6 +17,8 @@ from gear.values.serial import Json
 from gear.view.build import Builder, fitting_scale
 from gear.view.document import document
 from gear.view.rows import finite
+from gear.view.sources import Source, open_compared, sources_of
+from gear.view.streets import streets
 
 MEGABYTE = 1_000_000
 BASE64 = 4 / 3
@@ -58,6 +58,8 @@ def write_view(
     path: str | Path,
     out: str | Path = "view.html",
     *,
+    twins: Sequence[str | Path] = (),
+    evaluations: Sequence[str | Path] = (),
     split: str | None = None,
     samples: int | None = None,
     max_mb: float = 48.0,
@@ -66,13 +68,19 @@ def write_view(
 ) -> ViewReport:
     """Writes one self-contained HTML page of a dataset; it opens from disk, without a server or a network.
 
-    Pictures and previews are embedded at full size if they fit `max_mb`; otherwise all are embedded at the same smaller
-    scale. In the second case, the view of a single sample loads the dataset's picture files, as long as these are not
+    With twins (datasets that differ only in their patch) and evaluations, the page also compares pictures and
+    predictions with a slider, shows which objects a patch hides or invents, and sorts the samples by what changed most.
+
+    All pictures are embedded at full size if they fit `max_mb`; otherwise all are embedded at the same smaller
+    scale. In the second case, the view of a single sample loads the datasets' picture files, as long as these are not
     moved relative to the page.
 
     Args:
-        path: root of a dataset of any task.
+        path: root of a dataset of any task; or a folder of datasets that are twins; or the folder of an evaluation,
+            which shows its first dataset and that dataset's twins.
         out: HTML file to write.
+        twins: roots of datasets that differ from the first one only in their patch; `DIR:SPLIT` selects a split.
+        evaluations: folders of `gear evaluate` with results for any of these datasets.
         split: the split to show; optional if there is only one.
         samples: number of samples, counted from the first; all by default.
         max_mb: approximate limit for the size of the page in megabytes.
@@ -80,12 +88,14 @@ def write_view(
         on_progress: called after every sample with the numbers of finished and of all samples.
 
     Raises:
-        DatasetError: there is no finished split to show, or `out` cannot be written.
+        DatasetError: there is no finished split to show, a dataset is no twin, an evaluation is of other datasets, or
+            `out` cannot be written.
         UnknownNameError: the plugin of the dataset's task is not installed.
     """
     with displayed(Callbacks.of(on_progress=on_progress), "view", progress=progress) as shown:
-        dataset = open_dataset(path, split)
-        return write_page(dataset, out, samples=samples, max_mb=max_mb, on_progress=shown.on_progress)
+        dataset, others, found = open_compared(path, twins, split)
+        sources = sources_of(dataset, others, [*found, *evaluations], Path(out))
+        return write_sources(sources, out, samples=samples, max_mb=max_mb, on_progress=shown.on_progress)
 
 
 def write_page(
@@ -97,27 +107,36 @@ def write_page(
     on_progress: Progress | None = None,
 ) -> ViewReport:
     """Writes the HTML page of a dataset that is already open; `write_view` describes the arguments."""
-    target = Path(out)
+    sources = sources_of(dataset, (), (), Path(out))
+    return write_sources(sources, out, samples=samples, max_mb=max_mb, on_progress=on_progress)
+
+
+def write_sources(
+    sources: tuple[Source, ...], out: str | Path, *, samples: int | None, max_mb: float, on_progress: Progress | None
+) -> ViewReport:
+    """Writes the HTML page of open datasets that are twins; `write_view` describes the arguments."""
+    target, dataset = Path(out), sources[0].dataset
     refuse_folder(target)
     with explained(target):
         target.parent.mkdir(parents=True, exist_ok=True)
     total = len(dataset)
     count = total if samples is None else min(samples, total)
-    builder = Builder(dataset=dataset, base_url=base_url(dataset.root, target))
+    builder = Builder(sources=sources)
     scale = fitting_scale(builder, count, max_mb * MEGABYTE / BASE64) if count else 1.0
-    builder = Builder(dataset=dataset, base_url=builder.base_url, scale=scale)
+    builder = Builder(sources=sources, scale=scale)
     entries = list(builder.entries(count, on_progress))
     info = dataset.plan.info
     title = f"{dataset.plan.task['name']} · {info.scene} · {info.split}"
-    size = _write(target, document(title, entries, about(dataset, scale)))
+    size = _write(target, document(title, entries, about(sources, scale)))
     problems = tuple((entry.row["index"], entry.problem) for entry in entries if entry.problem)
     return ViewReport(path=target, samples=count, size_bytes=size, scale=scale, problems=problems)
 
 
-def about(dataset: Dataset[Any], scale: float) -> dict[str, Json]:
-    """Returns the metadata of the whole split for the page, as JSON: task, town, scene, split, seed, patch and
-    config.
+def about(sources: Sequence[Source], scale: float) -> dict[str, Json]:
+    """Returns the metadata of the whole split for the page, as JSON: task, town with its streets, scene, split, seed,
+    patch and config, legends of the pictures, and labels of the compared datasets and evaluations.
     """
+    dataset = sources[0].dataset
     plan = dataset.plan
     known = {key: value for key, value in dataset.manifest.items() if key not in ("samples", "indexes", "sidecars")}
     named = {"task": plan.task, "options": plan.options, "content": plan.content, "patch": plan.patch}
@@ -132,13 +151,20 @@ def about(dataset: Dataset[Any], scale: float) -> dict[str, Json]:
         "patch": info.patch_label,
         "total": len(dataset),
         "scale": scale,
+        "datasets": [source.label for source in sources],
+        "evaluations": list(dict.fromkeys(part.label for source in sources for part in source.evaluated)),
+        "legends": _legends(dataset),
+        "streets": streets(info.town),
         "facts": finite(known | named),
     }
 
 
-def base_url(root: Path, page: Path) -> str:
-    """Returns the URL of a dataset's root relative to the page, ending in `/`."""
-    return "./" + quote(Path(os.path.relpath(root.resolve(), page.resolve().parent)).as_posix()) + "/"
+def _legends(dataset: Dataset[Any]) -> Json:
+    """Returns the legends of the task's pictures as JSON; none if the task's function fails."""
+    try:
+        return legends_json(picture_legends(dataset.task))
+    except Exception:  # a third party's code; the page is useful without legends
+        return {}
 
 
 def _write(target: Path, pieces: Iterable[str]) -> int:

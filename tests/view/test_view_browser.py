@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import shutil
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +24,7 @@ from gear.values.rig import CameraMount, Rig
 from gear.values.scene import SceneRecord
 from gear.view.write import write_page, write_view
 
-from .browser import Browser, find_chromium
+from .browser import Browser
 from .view_datasets import store_samples
 
 pytestmark = pytest.mark.slow
@@ -78,19 +76,6 @@ Object.fromEntries([...document.querySelectorAll('#statistics .card')].map((card
     [dt.textContent, dt.nextSibling.nextSibling.textContent])),
 ]))
 """
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    program = find_chromium()
-    if program is None:
-        reason = "no chromium on the PATH (Debian: apt-get install chromium); the page is not tested in a browser"
-        if os.environ.get("CI"):
-            pytest.fail(reason)
-        pytest.skip(reason)
-    opened = Browser(program, tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
 
 
 @pytest.fixture

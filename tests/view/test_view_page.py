@@ -18,7 +18,8 @@ from gear.cli.main import COMMANDS, main
 from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError
 from gear.view.document import SCRIPTS, asset, policy, script
-from gear.view.write import base_url, write_page, write_view
+from gear.view.sources import base_url
+from gear.view.write import write_page, write_view
 
 TASKS = ("semseg", "detect2d", "stereo3d", "depth")
 

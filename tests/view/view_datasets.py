@@ -12,6 +12,7 @@ from gear.dataset.plan import Plan
 from gear.dataset.store import Store
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.things import board, street
+from gear.values.frames import UInt8Image
 from gear.values.geometry import RigidTransform
 from gear.values.scene import SceneRecord
 
@@ -24,6 +25,14 @@ OPTIONS: dict[str, dict[str, Any]] = {
 Alter = Callable[[SceneRecord], SceneRecord]
 
 
+def patched(picture: UInt8Image, size: int) -> UInt8Image:
+    """A copy of a picture with an inverted square of `size` pixels in its middle."""
+    changed = picture.copy()
+    top, left = (picture.shape[0] - size) // 2, (picture.shape[1] - size) // 2
+    changed[top : top + size, left : left + size] = 255 - changed[top : top + size, left : left + size]
+    return changed
+
+
 def store_samples(
     root: Path,
     name: str,
@@ -33,11 +42,15 @@ def store_samples(
     *,
     split: str = "test",
     alter: Alter = lambda record: record,
+    patch: str = "none",
 ) -> None:
-    """Collects streets that differ in where the board stands: nearer from sample to sample."""
-    info = SplitInfo(town="synthetic", scene="street", split=split, seed=5, patch_label="none")
+    """Collects streets that differ in where the board stands: nearer from sample to sample.
+
+    With a patch, a block in the middle of every picture is inverted; it is the larger, the nearer the board.
+    """
+    info = SplitInfo(town="synthetic", scene="street", split=split, seed=5, patch_label=patch)
     plan = Plan(task={"name": name, "package": "mujoco-gear"}, options=options, content={"weather": "ClearNoon"},
-                patch={"label": "none"}, info=info, samples=count)  # fmt: skip
+                patch={"label": patch}, info=info, samples=count)  # fmt: skip
     store = Store(root, plan)
     store.open({})
     for index in store.missing():
@@ -45,5 +58,8 @@ def store_samples(
         ego = RigidTransform.from_yaw("world", "ego", (12.0 + 3.0 * index, -34.0, 0.0), 0.4)
         frame, record = synthetic_frame(task.rig(), things, index=index, seed=5, world_from_ego=ego)
         sample = task.ground_truth(frame, alter(dataclasses.replace(record, split=split)))
+        if patch != "none":
+            shown = {name: patched(picture, 10 * (index + 1)) for name, picture in sample.images.items()}
+            sample = dataclasses.replace(sample, images=shown)
         store.write(sample, task.encode(sample, info))
     store.close(task, {"renderer": {"name": "synthetic"}})

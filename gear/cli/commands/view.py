@@ -9,6 +9,8 @@ from gear.cli.commands.collect import positive
 EXAMPLE = """examples:
   gear view data/stereo3d/town10-billboard01-ClearNoon/none
   gear view data/twin --split test --samples 200 --out twin.html
+  gear view data/none --twin data/random --twin data/patched --evaluation evaluations/semseg/ddrnet23_slim
+  gear view evaluations/semseg/ddrnet23_slim+zmask        # its datasets, predictions and defended pictures
   gear view data/big --max-mb 400          # larger pictures; the page takes longer to open
 
 The page is one file; it needs no server and no network. On the page, press ? for a list of keys.
@@ -26,7 +28,23 @@ def megabytes(text: str) -> float:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of `gear view` to its argument parser."""
     parser.epilog = EXAMPLE
-    parser.add_argument("dataset", help="root of a dataset of any task")
+    parser.add_argument("dataset", help="root of a dataset of any task, a folder of twins, or an evaluation")
+    parser.add_argument(
+        "--twin",
+        action="append",
+        default=[],
+        dest="twins",
+        metavar="DIR",
+        help="dataset that differs only in its patch, shown beside the first; DIR:SPLIT; repeatable",
+    )
+    parser.add_argument(
+        "--evaluation",
+        action="append",
+        default=[],
+        dest="evaluations",
+        metavar="DIR",
+        help="folder of `gear evaluate` whose predictions are shown; repeatable",
+    )
     parser.add_argument("--split", help="split to show, if the dataset has several")
     parser.add_argument("--samples", type=positive, metavar="N", help="only the first N samples (all)")
     parser.add_argument("--out", default="view.html", metavar="FILE", help="HTML file to write (view.html)")
@@ -52,6 +70,8 @@ def run(args: argparse.Namespace) -> int:
         report = write_view(
             args.dataset,
             args.out,
+            twins=args.twins,
+            evaluations=args.evaluations,
             split=args.split,
             samples=args.samples,
             max_mb=args.max_mb,

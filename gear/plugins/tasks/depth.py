@@ -189,6 +189,10 @@ class DepthTask:
         colours[~np.isfinite(sample.depth_m)] = 0
         return {"image": picture, "depth": colours}
 
+    def prediction_preview(self, sample: DepthSample, prediction: FloatImage) -> Mapping[str, UInt8Image]:
+        """The predicted depth in the colours of the preview `depth`."""
+        return {"depth": depth_colours(prediction)}
+
     def legends(self) -> Mapping[str, Legend]:
         """The colour bar of the preview `depth`, with depths in metres."""
         nearness = np.linspace(1.0, _nearness(np.float64(PREVIEW_DEPTHS_M[-1])), 64)

@@ -202,6 +202,11 @@ class SemsegTask:
         draw_surfaces(picture, sample, VIEW)
         return {"labels": picture}
 
+    def prediction_preview(self, sample: SemsegSample, prediction: npt.NDArray[np.uint8]) -> Mapping[str, UInt8Image]:
+        """The colours of the predicted labels over the picture; predictions have no instances."""
+        shown = prediction.astype(np.uint8)
+        return self.preview(replace(sample, label_ids=shown, instance_ids=shown.astype(np.uint16)))
+
     def legends(self) -> Mapping[str, Legend]:
         """The colours of the classes that Cityscapes evaluates."""
         return {

@@ -107,7 +107,9 @@ def row_report(row: Measured) -> RowReport:
         metrics=metrics_of(row),
         cost=mean_cost(notes),
         defense=mask_means(notes, has_patch=plan.info.patch_label != NO_PATCH),
-        per_sample=[{k: v for k, v in note.as_json().items() if k not in {"facts", "objects"}} for note in notes],
+        per_sample=[
+            {k: v for k, v in note.as_json().items() if k not in {"facts", "objects", "defended"}} for note in notes
+        ],
     )
 
 

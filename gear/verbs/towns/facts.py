@@ -6,15 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import mujoco
-
 from gear.collecting.lookup import find_scenes
-from gear.values.errors import GearError, TownError, UnknownNameError
+from gear.values.errors import GearError, UnknownNameError
 from gear.values.resources import data_dir
 from gear.values.serial import Json, to_json
-from gear.world.assets.library import AssetLibrary, read_numbers
-from gear.world.assets.mjspec import read_spec
+from gear.world.assets.library import AssetLibrary
 from gear.world.roads.lanes import LaneGraph
+from gear.world.roads.read_lanes import read_lanes
 from gear.world.scene_spec import SceneLibrary
 from gear.world.surfaces.surface_carriers import check_scene_assets
 
@@ -93,27 +91,6 @@ def read_town(town: str | Path, scenes: str | Path | None = None) -> Town:
     library = AssetLibrary.for_town(town)
     usable, faulty = _scenes(library, scenes)
     return Town(library=library, lanes=read_lanes(library.town), scenes=usable, faulty=faulty)
-
-
-def read_lanes(path: Path) -> LaneGraph:
-    """Reads the graph of lanes, walks and parking bays from a town's MJCF file.
-
-    Only the custom fields of the file are compiled, because compiling meshes would take seconds.
-
-    Raises:
-        TownError: the file is not XML, MuJoCo cannot read the file, or a lane is malformed.
-    """
-    read_numbers(path)
-    try:
-        whole, custom = read_spec(path), mujoco.MjSpec()
-        for numeric in whole.numerics:
-            custom.add_numeric(name=numeric.name, size=numeric.size, data=numeric.data)
-        for text in whole.texts:
-            custom.add_text(name=text.name, data=text.data)
-        model = custom.compile()
-    except ValueError as error:
-        raise TownError(path, f"MuJoCo cannot read it: {' '.join(str(error).split())}") from error
-    return LaneGraph.from_model(model, path)
 
 
 def _scenes(library: AssetLibrary, given: str | Path | None) -> tuple[SceneLibrary | None, dict[str, GearError]]:

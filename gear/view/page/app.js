@@ -9,6 +9,8 @@ const KEYS = [
   ["[  ]", "overlay weaker, stronger"],
   ["f", "filters"],
   ["s  m  h", "samples, map, histograms"],
+  ...(OTHER_DATASETS.length ? [["t", "on the sheet, the same picture of the next dataset"]] : []),
+  ...(IS_COMPARED ? [["c", "on a sample, compare by slider, side by side, by difference"]] : []),
   ["?", "this list"],
 ];
 let view = "samples";
@@ -102,6 +104,8 @@ function press(event) {
   };
   if (view === "sample" && !isSlider) Object.assign(acts, { ArrowLeft: () => goBy(-1), ArrowRight: () => goBy(1) });
   if (view === "samples" && !isSlider && ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"].includes(event.key)) acts[event.key] = () => focusCell(shown[0]);
+  if (view === "samples" && OTHER_DATASETS.length) acts.t = showNextDataset;
+  if (view === "sample" && IS_COMPARED) acts.c = cycleCompareMode;
   if (view === "samples" && /^[1-9]$/.test(event.key)) acts[event.key] = () => showChannel(Number(event.key) - 1);
   if (!(event.key in acts)) return;
   event.preventDefault();
@@ -120,7 +124,7 @@ function escape(event) {
 
 function start() {
   byId("name").textContent = `${ABOUT.task} · ${ABOUT.scene}`;
-  byId("about").textContent = `${ABOUT.town}, split ${ABOUT.split}, seed ${ABOUT.seed}, patch ${ABOUT.patch}${SAMPLES.length < ABOUT.total ? `, first ${SAMPLES.length} of ${ABOUT.total} samples` : ""}${ABOUT.scale < 1 ? `, pictures at ${percent(ABOUT.scale)} of their width` : ""}`;
+  byId("about").textContent = `${ABOUT.town}, split ${ABOUT.split}, seed ${ABOUT.seed}, patch ${ABOUT.patch}${OTHER_DATASETS.length ? `, compared with ${OTHER_DATASETS.join(", ")}` : ""}${SAMPLES.length < ABOUT.total ? `, first ${SAMPLES.length} of ${ABOUT.total} samples` : ""}${ABOUT.scale < 1 ? `, pictures at ${percent(ABOUT.scale)} of their width` : ""}`;
   byId("help").append(h("h2", { id: "help-title" }, "Keys"), h("dl", {}, KEYS.flatMap(([keys, what]) => [h("dt", {}, h("kbd", {}, keys)), h("dd", {}, what)])),
     h("button", { type: "button", onclick: toggleHelp }, "Close"));
   byId("filters-button").addEventListener("click", () => toggleFilters());

@@ -26,8 +26,10 @@ const ASSETS = unique(SAMPLES.flatMap(others));
 const ASKED = [...(SURFACE_NAMES.length ? ["one surface in one camera"] : []), ...(OBJECT_METRICS.length ? ["one object"] : [])];
 const RULE = ASKED.length ? `A sample is shown when ${ASKED.join(", and ")}, satisfies everything at once that is asked of it.` : "A sample is shown when it satisfies all of this.";
 
-const CHOICES = { surface: "", camera: "", thing: "", asset: "", text: "" };
-const filters = { ranges: new Map(), ...CHOICES };
+const CHANGED = unique(SAMPLES.flatMap((sample) => sample.compared.objects.map((one) => one.change)));
+const CHOICES = { surface: "", camera: "", thing: "", asset: "", text: "", change: "" };
+const ORDER = { sort: "", order: "" }; // part of the address like the filters, but kept when they are reset
+const filters = { ranges: new Map(), ...CHOICES, ...ORDER };
 const whenFiltered = [];
 let shown = SAMPLES;
 
@@ -47,6 +49,7 @@ function isWithin(metric, value) {
 
 function passes(sample) {
   const { ranges, surface: name, camera, thing, asset, text } = filters;
+  if (filters.change && !sample.compared.objects.some((one) => one.change === filters.change)) return false;
   if (asset && !others(sample).includes(asset)) return false;
   if (text && !`${sampleName(sample)} ${sample.sequence} ${sample.weather} ${sample.problem && "problem"}`.toLowerCase().includes(text)) return false;
   const isAsked = (metrics) => metrics.some((metric) => ranges.has(metric.key));
@@ -60,7 +63,7 @@ function passes(sample) {
 }
 
 function refilter() {
-  shown = SAMPLES.filter(passes);
+  shown = sorted(SAMPLES, filters.sort, filters.order === "up").filter(passes);
   const total = grouped(SAMPLES.length);
   byId("count").textContent = shown.length === SAMPLES.length ? `${total} samples` : `${grouped(shown.length)} of ${total} samples`;
   for (const listener of whenFiltered) listener();
@@ -75,7 +78,7 @@ function resetFilters() {
 function filtersToParams() {
   const params = new URLSearchParams();
   for (const [key, [low, high]] of filters.ranges) params.set(key, `${low}~${high}`);
-  for (const key of Object.keys(CHOICES)) if (filters[key]) params.set(key, filters[key]);
+  for (const key of Object.keys({ ...CHOICES, ...ORDER })) if (filters[key]) params.set(key, filters[key]);
   return params.toString();
 }
 
@@ -85,7 +88,7 @@ function filtersFromParams(params) {
     const [low, high] = (params.get(metric.key) ?? "").split("~").map(Number);
     if (isNumber(low) && isNumber(high) && params.has(metric.key)) filters.ranges.set(metric.key, [low, high]);
   }
-  for (const key of Object.keys(CHOICES)) filters[key] = params.get(key) ?? "";
+  for (const key of Object.keys({ ...CHOICES, ...ORDER })) filters[key] = params.get(key) ?? "";
 }
 
 function rangeFilter(metric) {
@@ -139,6 +142,7 @@ function buildFilters() {
     ...(CAMERA_NAMES.length > 1 ? [choice("Camera", "camera", CAMERA_NAMES, "any camera")] : []),
     ...OBJECT_METRICS.map(rangeFilter),
     ...(OBJECT_METRICS.length && OBJECT_LABELS.length > 1 ? [choice("Object", "thing", OBJECT_LABELS, "any object")] : []),
+    ...(CHANGED.length ? [choice("Changed objects", "change", CHANGED, "any or none")] : []),
     choice("Actor", "asset", ASSETS, "anything"),
     h("label", {}, "Search", search),
     h("p", { class: "dim" }, RULE),

@@ -32,18 +32,42 @@ function caption(sample) {
   const surface = best(sample);
   const facts = surface ? `${percent(surface.visible)} · ${metres(surface.distance)} · ${degrees(surface.incidence)}` : sample.weather;
   return h("div", { class: "caption" }, h("b", {}, sampleName(sample)),
-    sample.problem ? h("span", { class: "warn" }, "incomplete") : null, h("span", {}, facts));
+    sample.problem ? h("span", { class: "warn" }, "incomplete") : null, h("span", { class: "sorted" }), h("span", {}, facts));
 }
 
 function gridTools() {
   const channels = h("select", { id: "channel", onchange: (event) => showChannel(Number(event.target.value)) },
-    ...["image", "preview"].map((kind) =>
-      h("optgroup", { label: kind === "image" ? "Pictures" : "Previews" },
-        CHANNELS.map((channel, place) => (channel.kind === kind ? h("option", { value: place }, channelLabel(channel)) : null)))));
+    channelOptions(() => true, look.place));
   const size = h("input", { type: "range", min: 160, max: 900, step: 20, value: 300, id: "size",
     oninput: (event) => document.documentElement.style.setProperty("--cell", `${event.target.value}px`) });
   return h("div", { class: "tools", role: "group", "aria-label": "How samples are shown" },
-    h("label", {}, "Show", channels), ...overlayTools(), h("label", { class: "push" }, "Size", size));
+    h("label", {}, "Show", channels), ...sortTools(), ...overlayTools(), h("label", { class: "push" }, "Size", size), h("div", { id: "channel-legend" }));
+}
+
+function sortTools() {
+  if (!SORTS.length) return [];
+  const groups = [...new Set(SORTS.map((sort) => sort.group))].map((group) =>
+    h("optgroup", { label: group }, SORTS.filter((sort) => sort.group === group).map((sort) => h("option", { value: sort.key }, sort.label))));
+  const keys = h("select", { id: "sort", onchange: (event) => { filters.sort = event.target.value; refilter(); } }, h("option", { value: "" }, "Index"), groups);
+  const order = h("button", { type: "button", id: "order", onclick: () => { filters.order = filters.order ? "" : "up"; refilter(); } });
+  return [h("label", {}, "Sort by", keys), order];
+}
+
+// Puts the cells in the order of the samples; nothing moves as long as the order stays.
+let orderShown = null;
+function showOrder() {
+  const order = `${filters.sort}~${filters.order}`;
+  if (order === orderShown) return;
+  orderShown = order;
+  if (SORTS.length) {
+    byId("sort").value = filters.sort;
+    byId("order").textContent = filters.sort ? (filters.order ? "Smallest first" : "Largest first") : filters.order ? "Last first" : "First first";
+  }
+  byId("cells").append(...sorted(SAMPLES, filters.sort, filters.order === "up").map((sample) => cells[sample.number].parentElement));
+  for (const sample of SAMPLES) {
+    const value = cells[sample.number].querySelector(".sorted");
+    value.textContent = sortOf(filters.sort) ? sortedValue(sample, filters.sort) : "";
+  }
 }
 
 // Strength and outlines are the same for the sheet and for single samples.
@@ -67,6 +91,7 @@ function showChannel(place) {
   if (!CHANNELS[place]) return;
   look.place = place;
   byId("channel").value = String(place);
+  byId("channel-legend").replaceChildren(pictureLegend(CHANNELS[place]) ?? "");
   SAMPLES.forEach((sample, number) => {
     const old = cells[number].querySelector(".stack");
     if (old) seen.unobserve(old);
@@ -75,7 +100,16 @@ function showChannel(place) {
   });
 }
 
+// The same picture of the next dataset, to blink between twins.
+function showNextDataset() {
+  const { kind, name, evaluation, dataset } = CHANNELS[look.place] ?? {};
+  const turn = ABOUT.datasets.indexOf(dataset);
+  const next = [...ABOUT.datasets.slice(turn + 1), ...ABOUT.datasets.slice(0, turn + 1)].map((other) => placeOf({ kind, name, evaluation, dataset: other }));
+  showChannel(next.find((place) => place >= 0) ?? look.place);
+}
+
 function showFiltered() {
+  showOrder();
   const in_ = new Set(shown);
   SAMPLES.forEach((sample, number) => (cells[number].parentElement.hidden = !in_.has(sample)));
   byId("nothing").hidden = shown.length > 0;

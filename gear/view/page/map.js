@@ -1,5 +1,5 @@
 // Seen from above: who stands where, in one sample or in all that are shown. East is right, north is up.
-const layers = { ego: true, npc: true, parked: true, carrier: true, pedestrian: true, board: true };
+const layers = { street: true, ego: true, npc: true, parked: true, carrier: true, pedestrian: true, board: true };
 const ROLE_COLOUR = Object.fromEntries(ROLES.map((role) => [role.key, role.colour]));
 const LENGTH_M = { ego: 4.5, npc: 4.5, parked: 4.5, carrier: 8, pedestrian: 0.7 };
 const WIDTH_M = { ego: 1.9, npc: 1.9, parked: 1.9, carrier: 2.5, pedestrian: 0.7 };
@@ -112,6 +112,7 @@ class Plan {
     const pen = canvas.getContext("2d");
     pen.scale(ratio, ratio);
     drawScale(pen, this.view, width, height);
+    if (layers.street) drawStreets(pen, this.view, width, height);
     this.spots = [];
     for (const role of ["parked", "npc", "pedestrian", "carrier", "ego"]) {
       if (!layers[role]) continue;
@@ -205,6 +206,30 @@ class Plan {
   }
 }
 
+// Streets as strips of their width, sidewalks below lanes below crosswalks.
+const STREET_COLOURS = { sidewalk: "#1d242d", lane: "#2c3540", crosswalk: "#4a5563" };
+const STREETS = ABOUT.streets.map(([kind, width, line]) => {
+  const path = new Path2D();
+  for (let i = 0; i < line.length; i += 2) path.lineTo(line[i], line[i + 1]);
+  return { kind, width, path };
+});
+
+function drawStreets(pen, view, width, height) {
+  pen.save();
+  pen.translate(width / 2, height / 2);
+  pen.scale(view.scale, -view.scale);
+  pen.translate(-view.x, -view.y);
+  for (const [kind, colour] of Object.entries(STREET_COLOURS)) {
+    pen.strokeStyle = colour;
+    for (const street of STREETS) {
+      if (street.kind !== kind) continue;
+      pen.lineWidth = street.width;
+      pen.stroke(street.path);
+    }
+  }
+  pen.restore();
+}
+
 function drawScale(pen, view, width, height) {
   const step = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 5000].find((metres) => metres * view.scale >= 60) ?? 10000;
   const [left, top] = [view.x - width / 2 / view.scale, view.y + height / 2 / view.scale];
@@ -227,6 +252,7 @@ function legend(redraw) {
   const roles = unique(SAMPLES.flatMap((sample) => sample.actors.map((actor) => actor[1])));
   const items = ROLES.filter((role) => roles.includes(role.key)).map((role) => [role.key, role.label]);
   if (SAMPLES.some((sample) => sample.boards.length)) items.push(["board", "Patch surfaces"]);
+  if (STREETS.length) items.unshift(["street", "Streets"]);
   return h("div", { class: "legend", role: "group", "aria-label": "Layers of the map" }, items.map(([key, label]) =>
     h("label", {}, h("input", { type: "checkbox", checked: layers[key], onchange: (event) => { layers[key] = event.target.checked; redraw(); } }),
       h("i", { class: `swatch-${key === "carrier" ? "board" : key}` }), label)));

@@ -6,22 +6,25 @@ const seen = new IntersectionObserver(
   { root: byId("main"), rootMargin: "700px 0px" },
 );
 
-const isPreview = (place) => CHANNELS[place].kind === "preview";
+const isPreview = (place) => CHANNELS[place].kind !== "image";
 const pictureOf = (sample, place) => sample.pictures[place];
 
 function baseOf(sample, place) {
   const camera = pictureOf(sample, place)?.camera;
   if (!isPreview(place) || !camera) return null;
-  const base = CHANNELS.findIndex((channel) => channel.kind === "image" && channel.name === camera);
+  const base = CHANNELS.findIndex((channel) => channel.kind === "image" && channel.name === camera && channel.dataset === CHANNELS[place].dataset);
   return base >= 0 && pictureOf(sample, base) ? base : null;
 }
 
-function outlines(sample, picture, withNames) {
+function outlines(sample, place, withNames) {
+  const picture = pictureOf(sample, place);
+  const changes = changeBoxes(sample, place);
   const faces = sample.surfaces.filter((surface) => surface.camera === picture.camera && surface.corners);
-  if (!faces.length) return null;
+  if (!faces.length && !changes.length) return null;
   const size = picture.width / 48;
   // Corners are index pixels: the picture spans half a pixel more on every side.
   return svg("svg", { viewBox: `-0.5 -0.5 ${picture.width} ${picture.height}`, preserveAspectRatio: "none", "aria-hidden": "true" },
+    changes,
     faces.map((face) => [
       svg("polygon", { points: face.corners.map((corner) => corner.join(",")).join(" ") }, svg("title", {}, face.name)),
       withNames
@@ -42,7 +45,7 @@ function stack(sample, place, { large = false } = {}) {
   const base = baseOf(sample, place);
   const layers = base === null ? [[place, ""]] : [[base, ""], [place, "over"]];
   box.append(...layers.map(([layer, css]) => image(sample, layer, css, layer === place)));
-  const lines = outlines(sample, picture, large);
+  const lines = outlines(sample, place, large);
   if (lines) box.append(lines);
   box.addEventListener("near", () => box.querySelectorAll("img").forEach((img) => img.show(large)));
   box.addEventListener("far", () => box.querySelectorAll("img").forEach((img) => img.removeAttribute("src")));

@@ -18,11 +18,12 @@ function showSample(sample) {
       h("div", { class: "tools push" }, ...overlayTools()),
       h("div", { class: "push" }, step(-1), step(1), h("button", { type: "button", onclick: closeSample }, "Close ", h("kbd", {}, "Esc")))),
     sample.problem ? h("p", { class: "problem", role: "alert" }, sample.problem) : "",
-    channels, first, wide, rest);
+    compareCard(sample) ?? "", channels, first, wide, rest);
   samplePlan ??= new Plan("Map of the sample from above");
   first.append(card("Map", "seen from above; the wedge is what a camera sees, symbols are not to scale", samplePlan.node, legend(() => samplePlan.draw())));
   if (SURFACE_NAMES.length) first.append(surfaceCard(sample));
   samplePlan.show([sample], true);
+  wide.append(...[objectsCard(sample), metricsCard(sample)].filter(Boolean));
   details(sample).then(({ record, facts: own, files }) => {
     if (current !== sample || !rest.isConnected) return;
     first.append(sceneCard(record));
@@ -38,7 +39,7 @@ function figure(sample, place) {
     button.setAttribute("aria-pressed", String(isWide));
   } }, "Enlarge");
   const node = h("figure", { class: "card" }, stack(sample, place, { large: true }),
-    h("figcaption", {}, h("b", {}, channelLabel(CHANNELS[place])), h("span", { class: "dim" }, `${picture.width} × ${picture.height}${picture.whole || picture.original ? "" : ", smaller here"}`), button));
+    h("figcaption", {}, h("b", {}, channelLabel(CHANNELS[place])), h("span", { class: "dim" }, `${picture.width} × ${picture.height}${picture.whole || picture.original ? "" : ", smaller here"}`), button), pictureLegend(CHANNELS[place]));
   return node;
 }
 

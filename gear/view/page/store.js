@@ -12,7 +12,21 @@ const ROLES = [
 ];
 const PATCH_COLOUR = "#ff6ae0";
 
-const channelLabel = (channel) => `${channel.kind === "image" ? "Camera" : "Preview"} ${channel.name}`;
+const KINDS = [
+  { key: "image", label: "Camera", group: "Pictures" },
+  { key: "preview", label: "Preview", group: "Previews" },
+  { key: "prediction", label: "Prediction", group: "Predictions" },
+  { key: "defended", label: "Defended", group: "Defended pictures" },
+];
+const kindLabel = (channel) => KINDS.find((kind) => kind.key === channel.kind).label;
+const channelLabel = (channel) => [`${kindLabel(channel)} ${channel.name}`, channel.dataset, channel.evaluation].filter(Boolean).join(" · ");
+
+function channelOptions(isOffered, chosen) {
+  return KINDS.map(({ key, group }) => {
+    const options = CHANNELS.map((channel, place) => (channel.kind === key && isOffered(place) ? h("option", { value: place, selected: place === chosen }, channelLabel(channel)) : null)).filter(Boolean);
+    return options.length ? h("optgroup", { label: group }, options) : null;
+  });
+}
 
 // Pictures come after the script, so that a large page shows itself before all of it is read. A block is whole once
 // something follows it.
