@@ -17,6 +17,7 @@ from gear.collecting.lookup import look_up
 from gear.collecting.patch_sources import PatchSet
 from gear.config.collection import CollectionConfig, SplitConfig
 from gear.config.dump import to_plain
+from gear.config.nodes import Place
 from gear.contracts.rendering import RendererInfo
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import SplitInfo
@@ -31,7 +32,7 @@ from gear.values.serial import Json, to_json
 from gear.world.assets.asset_hash import assets_digest
 from gear.world.scene_spec import SceneSpec
 
-KINDS = ("probes", "scans")
+KINDS = ("probes", "scans", "flow")
 """Kinds of additional files that a config may request for each sample; a plan lists only the requested ones."""
 
 
@@ -92,6 +93,7 @@ def resolve(config: CollectionConfig) -> Job:
     spec, owner = named.task.spec, named.task.owner
     config, library, split, weather, patch = named.config, named.library, named.split, named.weather, named.patch
     _check_effects(config, named.task)
+    _check_flow(config, split)
     info = SplitInfo(
         town=library.town_name, scene=config.scene, split=config.split, seed=split.seed, patch_label=patch.label
     )
@@ -176,6 +178,17 @@ def _check_effects(config: CollectionConfig, task: PluginEntry) -> None:
                 if place is not None and place.line:
                     raise place.error(f"camera.{error.field}", error.problem) from error
                 raise ConfigError("camera", 0, 0, error.field, error.problem) from error
+
+
+def _check_flow(config: CollectionConfig, split: SplitConfig) -> None:
+    """Refuses optical flow of single pictures, which have no next frame.
+
+    Raises:
+        ConfigError: the split has no driving sequences, and the config asks for flow.
+    """
+    if config.flow and split.frames == 1:
+        problem = f"split {config.split!r} has single pictures, and flow leads to the next frame; use --split video"
+        raise config.places.get("flow", Place("collection")).error("flow", problem)
 
 
 def dataset_root(config: CollectionConfig, info: SplitInfo, weather: Weather) -> Path:

@@ -9,6 +9,7 @@ from typing import Any
 
 from gear.camera.pipeline import CameraPipeline
 from gear.camera.reflection import MirrorView, Reflection
+from gear.collecting.flow_files import flow_files
 from gear.collecting.job import Job, versions
 from gear.collecting.probes import ProbeShot, compute_probes, shoot_probes
 from gear.collecting.scan_files import scan_files
@@ -18,6 +19,7 @@ from gear.dataset.output_checks import check_encoded
 from gear.dataset.plan import differences
 from gear.dataset.probe_files import AuxiliaryFiles, probe_files
 from gear.groundtruth.laser_scan import scan_cameras, scan_points
+from gear.groundtruth.optical_flow import FlowView, object_ids, optical_flow
 from gear.plugins.build import blamed, build, find
 from gear.plugins.catalogue import PluginEntry
 from gear.render.registry import open_renderer
@@ -35,6 +37,14 @@ from gear.world.world import World
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class LaterFrame:
+    """The next frame of a driving sequence, without colour: its record, and the view of its first camera."""
+
+    record: SceneRecord
+    view: FlowView
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Shot:
     """The renders of one scene.
 
@@ -45,6 +55,8 @@ class Shot:
         geoms, objects: tables of the geoms and of the objects in the scene, for the ground truth.
         probes: renders with black and white patch surfaces; None unless probes are collected.
         scan: depth views of a laser scan; empty unless scans are collected.
+        later: the next frame of the driving sequence, as the first camera sees it; None unless flow is collected, and
+            for the last frame of a sequence.
     """
 
     record: SceneRecord
@@ -54,6 +66,7 @@ class Shot:
     objects: Mapping[int, SceneObject]
     probes: ProbeShot | None = None
     scan: tuple[RawView, ...] = ()
+    later: LaterFrame | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -85,6 +98,7 @@ class Session:
         scan: tuple[RawView, ...] = ()
         if self.job.config.scans:
             scan = self.renderer.render(placed.stage, scan_cameras(record.cameras[0]), colour=False)
+        later = self._later(record) if self.job.config.flow else None  # it moves the actors, so it comes last
         return Shot(
             record=record,
             raw=raw,
@@ -93,7 +107,17 @@ class Session:
             objects=placed.objects,
             probes=probes,
             scan=scan,
+            later=later,
         )
+
+    def _later(self, record: SceneRecord) -> LaterFrame | None:
+        """Renders depth and ids of the next frame of a sequence; None for the last frame of a sequence."""
+        if record.frame == self.job.split.frames - 1:
+            return None
+        later = self.record(record.index + 1)
+        placed = self.world.place(later)
+        (raw,) = self.renderer.render(placed.stage, later.cameras[:1], colour=False)
+        return LaterFrame(record=later, view=_flow_view(later, raw, placed.geoms))
 
     def to_frame(self, shot: Shot) -> Frame:
         """Turns raw renders into pictures by the camera pipeline.
@@ -124,7 +148,7 @@ class Session:
         return sample, encoded, self._further_files(shot, reflections)
 
     def _further_files(self, shot: Shot, reflections: Sequence[Reflection | None]) -> AuxiliaryFiles:
-        """Probes and laser scan, where the job asks for them."""
+        """Probes, laser scan and optical flow, where the job asks for them."""
         split, index = self.job.plan.info.split, shot.record.index
         found: AuxiliaryFiles = {}
         if shot.probes is not None:
@@ -132,7 +156,16 @@ class Session:
             found = probe_files(probes, split, index)
         if shot.scan:
             found = {**found, **scan_files(scan_points([view.depth_m for view in shot.scan]), split, index)}
+        if shot.later is not None:
+            now = _flow_view(shot.record, shot.raw[0], shot.geoms)
+            flow = optical_flow(now, shot.later.view, shot.record, shot.later.record)
+            found = {**found, **flow_files(flow, now.camera.name, split, index)}
         return found
+
+
+def _flow_view(record: SceneRecord, raw: RawView, geoms: GeomTable) -> FlowView:
+    """The first camera's view of a scene, for optical flow."""
+    return FlowView(camera=record.cameras[0], depth_m=raw.depth_m, object_id=object_ids(raw.geom_id, geoms.object_id))
 
 
 @contextlib.contextmanager

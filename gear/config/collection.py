@@ -129,6 +129,8 @@ class CollectionConfig:
         patch_seed: seed of random patches, separate from the split's seed, so all splits show the same patch.
         probes: whether to store renders with each patch surface black and white, which the exact compositor needs.
         scans: whether to store a laser scan (Velodyne HDL-64E) of each sample, for `gear export --layout kitti`.
+        flow: whether to store the optical flow to the next frame of a driving sequence, for `gear export --layout
+            kitti-flow`.
         simulation: name or path of the simulation config.
         options: the task's own options (`gear plugins show TASK`).
         places: file, line and column of each given value, by key.
@@ -152,6 +154,7 @@ class CollectionConfig:
     patch_seed: int = 0
     probes: bool = False
     scans: bool = False
+    flow: bool = False
     simulation: str = "default"
     options: Node = field(default_factory=lambda: Mapping({}, Place("defaults")))
     places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)

@@ -10,7 +10,7 @@ CARD, CROISSANT = "README.md", "croissant.json"
 CARDS = (CARD, CROISSANT)
 """The files in the root that describe the dataset."""
 
-PROBES, SCANS = "probes", "scans"
+PROBES, SCANS, FLOWS = "probes", "scans", "flow"
 """Kinds of auxiliary files of a sample."""
 
 
@@ -42,7 +42,7 @@ def is_reserved(relative: str, split: str) -> bool:
     parts = PurePosixPath(relative.casefold()).parts
     if parts[:1] != (GEAR,):
         return "/".join(parts) in {card.casefold() for card in CARDS}
-    return len(parts) != 4 or parts[1] != split.casefold() or parts[2] not in (PROBES, SCANS)
+    return len(parts) != 4 or parts[1] != split.casefold() or parts[2] not in (PROBES, SCANS, FLOWS)
 
 
 def plan_path(split: str) -> str:

@@ -29,8 +29,8 @@ class Plan:
         patch: label and sha256 of the patch's pictures.
         info: names and seed for the format's index files.
         samples: number of frames of the split.
-        auxiliary: kinds of additional files of each sample (`probes`, `scans`), which do not change pictures and
-            labels.
+        auxiliary: kinds of additional files of each sample (`probes`, `scans`, `flow`), which do not change pictures
+            and labels.
         recipe: the collection's config without paths, from which damaged files can be made again; None in datasets of
             earlier versions.
     """

@@ -1,3 +1,3 @@
 """The layouts to which `gear export` can write a dataset. Each module defines one layout as `LAYOUT`; the modules
-`layout` and `registry` contain shared code.
+`layout`, `registry` and `sequences` contain shared code.
 """

@@ -9,7 +9,7 @@ from gear.formats import exports
 from gear.formats.exports.layout import Layout
 from gear.values.errors import UnknownNameError
 
-NO_LAYOUTS = ("layout", "registry")
+NO_LAYOUTS = ("layout", "registry", "sequences")
 """Modules of this folder that do not define a layout."""
 
 

@@ -2,6 +2,7 @@ import pytest
 
 from gear.formats.exports.layout import Layout
 from gear.formats.exports.registry import find_layout, layout_names
+from gear.formats.exports.sequences import TASKS
 from gear.values.errors import UnknownNameError
 
 
@@ -17,7 +18,8 @@ def test_each_layout_takes_the_datasets_of_its_task() -> None:
     assert found == {
         "cityscapes": ("semseg",), "coco": ("detect2d",), "kitti": ("stereo3d",), "kitti-depth": ("depth",),
         "hf": (), "parquet": (), "webdataset": (),
-        "yolo": ("detect2d",),
+        "yolo": ("detect2d",), "mot": ("detect2d",), "kitti-tracking": ("stereo3d",),
+        "kitti-odometry": TASKS, "kitti-raw": TASKS, "kitti-flow": TASKS,
     }  # fmt: skip
 
 

@@ -1,0 +1,69 @@
+"""Shared by the layouts of driving sequences: the sequences of a dataset, and their pictures and calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+
+from gear.contracts.tasks import Sidecar
+from gear.formats.cityscapes import paths as cityscapes_paths
+from gear.formats.exports.layout import ExportSplit
+from gear.formats.kitti_object import Calibration
+from gear.values.errors import DatasetError
+from gear.values.scene import SceneRecord
+
+TASKS = ("detect2d", "semseg", "stereo3d", "depth")
+"""Tasks whose pictures `pictures_of` finds."""
+
+
+def driving_splits(splits: Sequence[ExportSplit], layout: str) -> list[ExportSplit]:
+    """The splits that consist of driving sequences; splits of single pictures are left out.
+
+    Raises:
+        DatasetError: the dataset has no driving sequence.
+    """
+    driving = [split for split in splits if len(split.sidecars) > 1 and split.sidecars[1].record.frame == 1]
+    if not driving:
+        names = ", ".join(split.info.split for split in splits)
+        problem = f"has single pictures only; the layout {layout!r} is for driving sequences (collect --split video)"
+        raise DatasetError(f"split {names}", problem)
+    return driving
+
+
+def sequences_of(split: ExportSplit) -> Iterator[list[Sidecar]]:
+    """The sidecars of each sequence of a split, in order of time."""
+    for _, group in groupby(split.sidecars, key=lambda sidecar: sidecar.record.sequence):
+        yield list(group)
+
+
+def records_of(sequence: Sequence[Sidecar]) -> list[SceneRecord]:
+    """The scene records of a sequence, in order of time."""
+    return [sidecar.record for sidecar in sequence]
+
+
+def pictures_of(split: ExportSplit, record: SceneRecord) -> Mapping[str, str]:
+    """The paths of the left picture and, in a stereo dataset, of the right picture of a sample, by camera name.
+
+    The paths are relative to the root of the dataset; the task of the split is one of `TASKS`.
+    """
+    name, index = split.info.split, record.index
+    match split.task:
+        case "stereo3d":
+            return {"left": f"{name}/image_2/{index:06d}.png", "right": f"{name}/image_3/{index:06d}.png"}
+        case "detect2d":
+            return {"left": f"images/{name}/rgb_{index:04d}.png"}
+        case "depth":
+            return {"left": f"leftImg8bit/{name}/rgb_{index:04d}.png"}
+        case _:
+            return {"left": cityscapes_paths(split.info.town, name, record.sequence, record.frame).image}
+
+
+def calibration_of(record: SceneRecord) -> Calibration:
+    """The calibration of a sample's cameras; with one camera, the baseline is 0."""
+    left = record.cameras[0]
+    right_m = 0.0
+    if len(record.cameras) > 1:
+        left_from_world = left.world_from_camera_transform.inverse()
+        offset_m = left_from_world.apply(record.cameras[1].world_from_camera.position_m)
+        right_m = round(float(offset_m[0]), 6)
+    return Calibration(intrinsics=left.intrinsics, baseline_m=right_m)
