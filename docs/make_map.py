@@ -24,6 +24,11 @@ ROOMS: dict[str, tuple[float, str, str]] = {
     "cli": (0.62, "command line", "one small file per command: reads arguments, calls the verb, prints"),
     "verbs": (0.62, "what a user does", "`collect`, `train`, `attack`, `evaluate`, `gap`, `bench` and the other verbs"),
     "view": (0.81, "HTML page", "the page that `gear view` writes"),
+    "driving": (
+        0.3,
+        "closed loop",
+        "vehicle, scenarios, traffic that reacts, from pictures to motion",
+    ),
     "measuring": (
         0.46,
         "models over data",
@@ -68,7 +73,7 @@ ROOMS: dict[str, tuple[float, str, str]] = {
 
 GROUPS = (
     ("what users run", 2),
-    ("what verbs share", 3),
+    ("what verbs share", 4),
     ("plugins and their parts", 2),
     ("worlds, labels, files", 2),
     ("basics", 4),

@@ -1,6 +1,6 @@
-"""The five hooks that a plugin implements. They take no arguments, have no effects and return specs.
+"""The six hooks that a plugin implements. They take no arguments, have no effects and return specs.
 
-gear's own tasks, models, attacks and defenses are registered through the same hooks.
+gear's own tasks, models, attacks, defenses and controllers are registered through the same hooks.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 
 import pluggy
 
-from gear.contracts.specs import AttackSpec, DefenseSpec, MetricSpec, ModelSpec, TaskSpec
+from gear.contracts.specs import AttackSpec, ControllerSpec, DefenseSpec, MetricSpec, ModelSpec, TaskSpec
 
 PROJECT = "gear"
 hookspec = pluggy.HookspecMarker(PROJECT)
@@ -44,6 +44,12 @@ def gear_defenses() -> Iterable[DefenseSpec[Any]]:
     """Hook that returns the specs of a plugin's defenses. A defense cleans pictures or detects patches in front of
     a model.
     """
+    return ()
+
+
+@hookspec
+def gear_controllers() -> Iterable[ControllerSpec[Any]]:
+    """Hook that returns the specs of a plugin's controllers. A controller drives the ego car in `gear drive`."""
     return ()
 
 

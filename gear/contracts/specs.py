@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, Literal, TypeVar
 
 from gear.contracts.attacks import Attack
+from gear.contracts.controllers import Controller
 from gear.contracts.defenses import Defense
 from gear.contracts.models import Model, PublishedWeights, Recipe
 from gear.contracts.tasks import Evaluator, Task
@@ -33,8 +34,8 @@ class Spec(Generic[ConfigT, ProductT]):
         name: name by which users select the plugin; matches `[a-z][a-z0-9_]*`.
         summary: description in one line.
         config: frozen dataclass of the options, all with defaults.
-        build: function that makes the task, model, attack, defense or evaluator from the options; imports heavy
-            packages.
+        build: function that makes the task, model, attack, defense, controller or evaluator from the options; imports
+            heavy packages.
         protocol: version of the plugin protocol for which the plugin was written.
     """
 
@@ -169,13 +170,29 @@ class MetricSpec(Spec[ConfigT, Evaluator[Any, Any]]):
     less_is_better: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerSpec(Spec[ConfigT, Controller]):
+    """The spec of a controller, which drives the ego car in `gear drive`.
+
+    Attributes:
+        tasks: names of the tasks whose predictions it reads; empty for a controller without a network.
+        needs_views: whether it receives the pictures themselves, as a policy that drives end to end does.
+        needs_truth: whether it receives the true positions of all road users; only for comparisons.
+    """
+
+    tasks: tuple[str, ...] = ()
+    needs_views: bool = False
+    needs_truth: bool = False
+
+
 AnySpec = Spec[Any, Any]
-Kind = Literal["task", "model", "attack", "defense", "metric"]
-KINDS: tuple[Kind, ...] = ("task", "model", "attack", "defense", "metric")
+Kind = Literal["task", "model", "attack", "defense", "controller", "metric"]
+KINDS: tuple[Kind, ...] = ("task", "model", "attack", "defense", "controller", "metric")
 SPEC_TYPES: dict[Kind, type[AnySpec]] = {
     "task": TaskSpec,
     "model": ModelSpec,
     "attack": AttackSpec,
     "defense": DefenseSpec,
+    "controller": ControllerSpec,
     "metric": MetricSpec,
 }

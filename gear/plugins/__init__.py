@@ -1,1 +1,1 @@
-"""Discovery and building of plugins, and the built-in tasks, models, attacks and defenses, one file each."""
+"""Discovery and building of plugins, and the built-in plugins of all kinds, one file each."""

@@ -56,7 +56,7 @@ def name_of_task(written: JsonMapping[str, Any]) -> str:
 
 
 def build(found: PluginEntry, options: Node = NO_OPTIONS) -> Any:
-    """Builds a plugin's product (a task, model, attack, defense or metric) from its options.
+    """Builds a plugin's product (a task, model, attack, defense, controller or metric) from its options.
 
     Raises:
         ConfigError: the options do not fit.

@@ -35,4 +35,10 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.attacks.rp2",
     "gear.plugins.attacks.thys",
     "gear.plugins.attacks.control",
+    "gear.plugins.controllers.detect2d",
+    "gear.plugins.controllers.stereo3d",
+    "gear.plugins.controllers.depth",
+    "gear.plugins.controllers.semseg",
+    "gear.plugins.controllers.truth",
+    "gear.plugins.controllers.blind",
 )

@@ -19,6 +19,7 @@ HOOK_OF: dict[Kind, str] = {
     "model": "gear_models",
     "attack": "gear_attacks",
     "defense": "gear_defenses",
+    "controller": "gear_controllers",
     "metric": "gear_metrics",
 }
 """Names of the hooks that return specs, by kind of plugin."""

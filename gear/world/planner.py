@@ -112,7 +112,7 @@ class ScenePlanner:
             most = STATIC_OBJECT_BASE - 1
             raise PlacementError(world.scene_name, f"{len(state.spawns)} road users, {most} at most; lower the counts")
         actors = tuple(
-            _actor(number, spawn, state.poses[body])
+            actor_record(number, spawn, state.poses[body])
             for number, (body, spawn) in enumerate(state.spawns.items(), start=1)
         )
         carrier = next((actor.id for actor in actors if actor.role == "carrier"), None)
@@ -132,7 +132,8 @@ class ScenePlanner:
         )
 
 
-def _actor(number: int, spawn: Spawn, world_from_actor: RigidTransform) -> ActorRecord:
+def actor_record(number: int, spawn: Spawn, world_from_actor: RigidTransform) -> ActorRecord:
+    """The record of a road user with the id `number`, at its pose on the ground."""
     velocity = world_from_actor.rotation[:, 0] * spawn.speed_mps
     rounded = [round(float(v), POSE_DIGITS) + 0.0 for v in velocity]
     velocity_mps: Vec3 = (rounded[0], rounded[1], rounded[2])

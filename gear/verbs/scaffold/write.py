@@ -31,6 +31,8 @@ USE: dict[Kind, str] = {
     " with `--probes`; `gear collect --patch PATCH` puts it into the world.",
     "defense": "Use it: `gear evaluate --model NAME --defense {{name}} --data DIR` is its row in an evaluation;"
     " `gear defend DIR --defense {{name}} --out DIR2` cleans a dataset's pictures.",
+    "controller": "Use it: name it in a config of `gear drive`, `drivers: {mine: {controller: {{name}}}}`; `gear drive"
+    " my.yml --out DIR` drives with it.",
     "metric": "Use it: `gear evaluate --model NAME --data DIR --report {{name}}` adds its columns to an evaluation.",
 }
 
@@ -39,7 +41,7 @@ def new_package(kind: str, name: str, *, out: str | Path = ".") -> Path:
     """Writes a complete small Python package for a plugin: code, tests, README and licence.
 
     Args:
-        kind: `task`, `model`, `attack`, `defense` or `metric`.
+        kind: `task`, `model`, `attack`, `defense`, `controller` or `metric`.
         name: name of the plugin, such as `my_blur`; hyphens are replaced by underscores.
         out: existing or new folder in which the package's folder `gear-<kind>-<name>` is created.
 

@@ -35,7 +35,7 @@ class Polyline:
 
     def segment(self, s_m: float) -> int:
         """Index of the segment at an arc length; beyond the ends, the index of the first or last segment."""
-        return int(np.clip(np.searchsorted(self.s_m, s_m, side="right") - 1, 0, len(self.s_m) - 2))
+        return min(max(int(self.s_m.searchsorted(s_m, side="right")) - 1, 0), len(self.s_m) - 2)
 
     def at(self, s_m: float, lateral_m: float = 0.0) -> tuple[Array, float]:
         """The point beside the line at an arc length, and the heading of the line there.

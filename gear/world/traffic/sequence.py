@@ -105,7 +105,7 @@ class SequenceSimulator:
             if spawn.lane
         }
         people = {
-            body: self._moving_person(spawn)
+            body: moving_person(self._lanes, spawn)
             for body, spawn in road_users.spawns.items()
             if spawn.walk is not None and spawn.speed_mps > 0
         }
@@ -113,7 +113,7 @@ class SequenceSimulator:
             disc
             for body, spawn in road_users.spawns.items()
             if body not in vehicles and body not in people
-            for disc in _discs(spawn)
+            for disc in standing_discs(spawn)
         ]
         traffic = TrafficSimulation(list(vehicles.values()), list(people.values()), grounded, self._junctions)
         order = {body: number for number, body in enumerate(road_users.spawns)}
@@ -151,16 +151,16 @@ class SequenceSimulator:
                 half_length_m = spawn.actor_type.half_length_m
                 if is_still:
                     point, yaw_rad = vehicle_pose(vehicle.route.line, vehicle.s_m, half_length_m, vehicle.lateral_m)
-                    now = _at(spawn, point, yaw_rad, vehicle.speed_mps)
+                    now = moved(spawn, point, yaw_rad, vehicle.speed_mps)
                 else:
                     point, yaw_rad, pace = moving_pose(
                         vehicle.route.line, vehicle.s_m, half_length_m, vehicle.lateral_m
                     )
-                    now = _at(spawn, point, yaw_rad, vehicle.speed_mps * pace)
+                    now = moved(spawn, point, yaw_rad, vehicle.speed_mps * pace)
             elif body in people:
                 person = people[body]
                 point, yaw_rad = person.first_place() if is_still else person.place()
-                now = _at(spawn, point, yaw_rad, person.speed_mps)
+                now = moved(spawn, point, yaw_rad, person.speed_mps)
             else:
                 spawns[body], poses[body] = spawn, road_users.poses[body]
                 continue
@@ -201,27 +201,31 @@ class SequenceSimulator:
             half_width_m=spawn.actor_type.half_width_m,
         )
 
-    def _moving_person(self, spawn: Spawn) -> MovingPedestrian:
-        assert spawn.walk is not None
-        walk = self._lanes.walks[spawn.walk.walk]
-        return MovingPedestrian(
-            line=walk.line,
-            s_m=spawn.walk.s_m,
-            lateral_m=spawn.walk.lateral_m,
-            direction=spawn.walk.direction,
-            pace_mps=spawn.speed_mps,
-            speed_mps=spawn.speed_mps,
-            beyond_m=OFF_THE_ROAD_M if walk.is_crossing else -OFF_THE_ROAD_M,
-        )
+
+def moving_person(lanes: LaneGraph, spawn: Spawn) -> MovingPedestrian:
+    """The motion of a person who was drawn on a walk of a town."""
+    assert spawn.walk is not None
+    walk = lanes.walks[spawn.walk.walk]
+    return MovingPedestrian(
+        line=walk.line,
+        s_m=spawn.walk.s_m,
+        lateral_m=spawn.walk.lateral_m,
+        direction=spawn.walk.direction,
+        pace_mps=spawn.speed_mps,
+        speed_mps=spawn.speed_mps,
+        beyond_m=OFF_THE_ROAD_M if walk.is_crossing else -OFF_THE_ROAD_M,
+    )
 
 
-def _discs(spawn: Spawn) -> list[tuple[float, float, float, float]]:
+def standing_discs(spawn: Spawn) -> list[tuple[float, float, float, float]]:
+    """Discs (x, y, z, radius) in metres that cover a standing road user."""
     actor_type = spawn.actor_type
     point_m = np.array([spawn.x_m, spawn.y_m, spawn.near_z_m])
     return vehicle_discs(point_m, spawn.yaw_rad, actor_type.front_m, actor_type.rear_m, actor_type.half_width_m)
 
 
-def _at(spawn: Spawn, point_m: Array, yaw_rad: float, speed_mps: float) -> Spawn:
+def moved(spawn: Spawn, point_m: Array, yaw_rad: float, speed_mps: float) -> Spawn:
+    """The same road user at another place: (3,) point on the ground, heading in radians and speed."""
     return replace(
         spawn,
         x_m=float(point_m[0]),

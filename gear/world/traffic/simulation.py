@@ -58,6 +58,8 @@ class MovingVehicle:
         speed_mps: current speed.
         cruise_mps: desired speed on a free road.
         front_m, rear_m, half_width_m: distances of its front, rear and sides from its middle.
+        is_driven: whether the caller moves it, as the ego car of a closed loop; the other road users react to it, and
+            it has priority in junctions.
     """
 
     route: Route
@@ -68,6 +70,7 @@ class MovingVehicle:
     front_m: float
     rear_m: float
     half_width_m: float
+    is_driven: bool = False
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
@@ -81,6 +84,7 @@ class MovingPedestrian:
         pace_mps: walking speed without obstacles.
         speed_mps: current speed.
         beyond_m: how far the person walks past the end of the line; negative to stop before the end.
+        is_driven: whether the caller moves the person; the other road users react to the person.
     """
 
     line: Polyline
@@ -90,6 +94,7 @@ class MovingPedestrian:
     pace_mps: float
     speed_mps: float
     beyond_m: float
+    is_driven: bool = False
 
     @property
     def is_at_end(self) -> bool:
@@ -176,12 +181,14 @@ class TrafficSimulation:
         self._obstacles = list(obstacles)
         self._junctions = junctions
         for index, vehicle in enumerate(self.vehicles):
+            if vehicle.is_driven:
+                continue
             gap_m, _ = self._gap(index, self._discs())
             brakeable_mps = math.sqrt(2 * BRAKING_MPS2 * max(0.0, gap_m - STANDSTILL_GAP_M))
             vehicle.speed_mps = min(vehicle.speed_mps, vehicle.cruise_mps, brakeable_mps)
 
     def advance(self, duration_s: float) -> None:
-        """Moves all road users by a time span, in steps of at most `MAX_STEP_S`."""
+        """Moves all road users by a time span, in steps of at most `MAX_STEP_S`, except those that the caller moves."""
         steps = max(1, math.ceil(duration_s / MAX_STEP_S - 1e-9))
         for _ in range(steps):
             self._step(duration_s / steps)
@@ -189,12 +196,19 @@ class TrafficSimulation:
     def _step(self, step_s: float) -> None:
         discs = self._discs()
         stops = self._stop_lines()
-        accelerations = [self._acceleration(index, discs, stops[index]) for index in range(len(self.vehicles))]
+        accelerations = [
+            0.0 if vehicle.is_driven else self._acceleration(index, discs, stops[index])
+            for index, vehicle in enumerate(self.vehicles)
+        ]
         steps_allowed = self._free_to_step(discs)
         for vehicle, acceleration in zip(self.vehicles, accelerations, strict=True):
+            if vehicle.is_driven:
+                continue
             vehicle.speed_mps = max(0.0, vehicle.speed_mps + acceleration * step_s)
             vehicle.s_m += vehicle.speed_mps * step_s
         for person, is_free in zip(self.people, steps_allowed, strict=True):
+            if person.is_driven:
+                continue
             person.speed_mps = person.pace_mps if is_free else 0.0
             person.s_m += person.direction * person.speed_mps * step_s
 
@@ -248,7 +262,9 @@ class TrafficSimulation:
             rear_m, front_m = vehicle.s_m - vehicle.rear_m, vehicle.s_m + vehicle.front_m
             for lane, start_m, end_m in self._junctions.crossings(vehicle.route):
                 if end_m > rear_m and start_m - front_m < GIVE_WAY_M:
-                    claims.append((max(0.0, start_m - front_m), index, lane))
+                    distance_m = max(0.0, start_m - front_m)
+                    # A vehicle inside the junction goes first, then one that the caller moves, then the nearest.
+                    claims.append((distance_m if not vehicle.is_driven else min(distance_m, 1e-6), index, lane))
         stops = [math.inf] * len(self.vehicles)
         granted: list[tuple[int, str]] = []
         for distance_m, index, lane in sorted(claims):
@@ -289,7 +305,8 @@ class TrafficSimulation:
             rows += [(*disc, vx, vy, float(index)) for disc in discs]
         for person in self.people:
             point, heading_rad = person.place()
-            vx, vy = person.pace_mps * math.cos(heading_rad), person.pace_mps * math.sin(heading_rad)
+            pace_mps = person.speed_mps if person.is_driven else person.pace_mps
+            vx, vy = pace_mps * math.cos(heading_rad), pace_mps * math.sin(heading_rad)
             for ahead_s in PERSON_FORESIGHT_S:
                 x, y = float(point[0]) + vx * ahead_s, float(point[1]) + vy * ahead_s
                 rows.append((x, y, float(point[2]), PERSON_RADIUS_M, vx, vy, -2.0))

@@ -1,0 +1,1 @@
+"""The built-in controllers of the closed loop, one file each, and what the baselines have in common."""

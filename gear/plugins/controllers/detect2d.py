@@ -1,0 +1,79 @@
+"""The baseline on 2D boxes: the foot of each box is a point on the flat ground in front of the car."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gear.contracts.controllers import Observation
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import ControllerSpec
+from gear.plugins.controllers.baseline import Baseline, BaselineConfig
+from gear.plugins.controllers.corridor import Corridor, ground_points
+from gear.plugins.controllers.tracker import Sighting
+from gear.values.errors import FieldError
+
+ROAD_USERS = frozenset({1, 2, 3, 4, 6, 7, 8})
+"""COCO's category ids of road users: person, bicycle, car, motorcycle, bus, train and truck."""
+
+FARTHEST_M = 80.0
+"""Distance beyond which a foot on the ground is too uncertain: one pixel is several metres."""
+
+NEAR_GAP_M = 1.0
+"""Gap that is assumed for an object whose foot is below the picture."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detect2dDriverConfig(BaselineConfig):
+    """Options of the baseline on 2D boxes.
+
+    Attributes:
+        min_score: smallest confidence of a detection that counts, 0 to 1.
+    """
+
+    min_score: float = 0.5
+
+    def __post_init__(self) -> None:
+        BaselineConfig.__post_init__(self)
+        if not 0 <= self.min_score <= 1:
+            raise FieldError("min_score", f"must be 0 to 1, got {self.min_score:g}")
+
+
+class Detect2dDriver(Baseline):
+    """The baseline driver with a detector of 2D boxes."""
+
+    def __init__(self, config: Detect2dDriverConfig) -> None:
+        super().__init__(config)
+        self._min_score = config.min_score
+
+    def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
+        """The box of a road user whose foot is in the corridor with the smallest gap."""
+        camera, gaps_m = observation.cameras[0], []
+        for detection in observation.prediction:
+            if detection.score < self._min_score or detection.category_id not in ROAD_USERS:
+                continue
+            left_px, _, right_px, bottom_px = detection.box_px  # edge pixels: index pixels plus one half
+            foot_px = np.array([[column - 0.5, bottom_px - 0.5] for column in np.linspace(left_px, right_px, 5)])
+            foot_m = ground_points(camera, foot_px)
+            if not np.isfinite(foot_m).all():
+                continue
+            gap_m = corridor.gap_m(foot_m, FARTHEST_M)
+            if gap_m is not None:
+                gaps_m.append(min(gap_m, NEAR_GAP_M) if bottom_px >= camera.height_px - 1 else gap_m)
+        return Sighting(gap_m=min(gaps_m)) if gaps_m else None
+
+
+spec = ControllerSpec(
+    name="detect2d",
+    summary="Brakes for 2D boxes: the foot of a box on the ground plane.",
+    config=Detect2dDriverConfig,
+    build=Detect2dDriver,
+    tasks=("detect2d",),
+)
+
+
+@hookimpl
+def gear_controllers() -> list[ControllerSpec[Detect2dDriverConfig]]:
+    """Hook of the plugin system: returns the controller plugin that this module defines."""
+    return [spec]

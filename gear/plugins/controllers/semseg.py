@@ -1,0 +1,103 @@
+"""The baseline on semantic segmentation: the end of the drivable area in the corridor, on the flat ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gear.contracts.controllers import Observation, Points
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import ControllerSpec
+from gear.plugins.controllers.baseline import Baseline, BaselineConfig
+from gear.plugins.controllers.corridor import Corridor, ground_pixels
+from gear.plugins.controllers.tracker import Sighting
+from gear.values.errors import FieldError
+
+DRIVABLE = (6, 7, 9, 10)
+"""Cityscapes' label ids of ground on which cars drive: ground, road, parking and rail track."""
+
+FARTHEST_M = 45.0
+"""Arc length on the path up to which the ground is searched, metres; beyond it a row of pixels is several metres."""
+
+STEP_M, ACROSS = 0.5, 9
+"""Step along the path in metres, and number of points across the corridor."""
+
+BLOCKED_M = 1.0
+"""Length along the path, metres, over which the ground must be not drivable to be an obstacle."""
+
+NEAR_GAP_M = 1.0
+"""Gap that is assumed where the drivable area ends below the picture."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SemsegDriverConfig(BaselineConfig):
+    """Options of the baseline on semantic segmentation.
+
+    Attributes:
+        least_drivable: share of the corridor's width that must be drivable, 0 to 1.
+    """
+
+    least_drivable: float = 0.85
+
+    def __post_init__(self) -> None:
+        BaselineConfig.__post_init__(self)
+        if not 0 <= self.least_drivable <= 1:
+            raise FieldError("least_drivable", f"must be 0 to 1, got {self.least_drivable:g}")
+
+
+class SemsegDriver(Baseline):
+    """The baseline driver with a map of labels."""
+
+    def __init__(self, config: SemsegDriverConfig) -> None:
+        super().__init__(config)
+        self._least_drivable = config.least_drivable
+
+    def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
+        """The end of the drivable area in the corridor."""
+        labels = np.asarray(observation.prediction)
+        arc_m = np.arange(corridor.front_m, min(FARTHEST_M, corridor.length_m), STEP_M)
+        if not len(arc_m):
+            return None
+        points_m = _across(corridor, arc_m)
+        pixels, is_seen = ground_pixels(observation.cameras[0], points_m.reshape(-1, 2))
+        rows = np.clip(np.rint(pixels[:, 1]), 0, labels.shape[0] - 1).astype(np.intp)
+        columns = np.clip(np.rint(pixels[:, 0]), 0, labels.shape[1] - 1).astype(np.intp)
+        is_drivable = np.isin(labels[rows, columns], DRIVABLE).reshape(len(arc_m), ACROSS)
+        is_seen = is_seen.reshape(len(arc_m), ACROSS)
+        counts = is_seen.sum(axis=1)
+        share = (is_drivable & is_seen).sum(axis=1) / np.maximum(counts, 1)
+        known = np.flatnonzero(counts > ACROSS // 2)
+        is_blocked = share[known] < self._least_drivable
+        run = round(BLOCKED_M / STEP_M)
+        for first in range(len(known) - run + 1):
+            if is_blocked[first : first + run].all():
+                gap_m = float(arc_m[known[first]]) - corridor.front_m
+                return Sighting(gap_m=min(gap_m, NEAR_GAP_M) if first == 0 else gap_m)
+        return None
+
+
+def _across(corridor: Corridor, arc_m: Points) -> Points:
+    """(N, ACROSS, 2) points across the corridor at (N,) arc lengths, in the ego frame."""
+    lengths_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corridor.path_m, axis=0), axis=1))])
+    middle = np.stack([np.interp(arc_m, lengths_m, corridor.path_m[:, axis]) for axis in (0, 1)], axis=1)
+    directions = corridor.directions(arc_m)
+    left = np.stack([-directions[:, 1], directions[:, 0]], axis=1)
+    offsets_m = np.linspace(-corridor.half_width_m, corridor.half_width_m, ACROSS)
+    points: Points = middle[:, None] + offsets_m[None, :, None] * left[:, None]
+    return points
+
+
+spec = ControllerSpec(
+    name="semseg",
+    summary="Brakes for the end of the drivable area in the corridor.",
+    config=SemsegDriverConfig,
+    build=SemsegDriver,
+    tasks=("semseg",),
+)
+
+
+@hookimpl
+def gear_controllers() -> list[ControllerSpec[SemsegDriverConfig]]:
+    """Hook of the plugin system: returns the controller plugin that this module defines."""
+    return [spec]

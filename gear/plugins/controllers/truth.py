@@ -1,0 +1,81 @@
+"""The controller with perfect perception, the ceiling of a comparison: it knows the true positions of road users."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gear.contracts.controllers import Observation, Obstacle, Points
+from gear.contracts.hookspecs import hookimpl
+from gear.contracts.specs import ControllerSpec
+from gear.plugins.controllers.baseline import HEADWAY_S, STANDSTILL_GAP_M, Baseline, BaselineConfig
+from gear.plugins.controllers.corridor import Corridor
+from gear.plugins.controllers.tracker import Sighting
+
+FORESIGHT_S = {"person": 3.0, "vehicle": 1.0}
+"""Time over which the motion of a road user is continued in a straight line along the path, seconds."""
+
+FORESIGHT_STEP_S = 0.1
+ONCOMING_MPS = -1.0
+"""Speed along the path below which a vehicle comes towards the ego car; the motion of such a vehicle is not continued,
+because it keeps to its own lane.
+"""
+
+
+class Truth(Baseline):
+    """The baseline driver with the true positions of all road users, and their motion over the next seconds."""
+
+    def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
+        """The nearest road user that is in the corridor, or that will be there when the car arrives."""
+        seen = [self._sighting(observation, corridor, obstacle) for obstacle in observation.obstacles]
+        return min((one for one in seen if one is not None), key=lambda one: one.gap_m, default=None)
+
+    def _sighting(self, observation: Observation, corridor: Corridor, obstacle: Obstacle) -> Sighting | None:
+        outline_m = outline(obstacle)
+        arc_m, left_m = corridor.along(outline_m)
+        middle = np.array([[obstacle.ahead_m, obstacle.left_m]])
+        direction = corridor.directions(corridor.along(middle)[0])[0]
+        velocity = np.array(obstacle.velocity_mps)
+        along_mps = float(direction @ velocity)
+        aside_mps = float(direction[0] * velocity[1] - direction[1] * velocity[0])
+        if float(arc_m.max()) < corridor.front_m or float(arc_m.min()) > corridor.length_m:
+            return None
+        if left_m.min() < corridor.half_width_m and left_m.max() > -corridor.half_width_m:
+            return Sighting(gap_m=max(0.0, float(arc_m.min()) - corridor.front_m), speed_mps=along_mps)
+        if obstacle.kind == "vehicle" and along_mps < ONCOMING_MPS:
+            return None
+        for step in range(1, round(FORESIGHT_S[obstacle.kind] / FORESIGHT_STEP_S) + 1):
+            later_s = step * FORESIGHT_STEP_S
+            aside_m = left_m + aside_mps * later_s
+            if aside_m.min() > corridor.half_width_m or aside_m.max() < -corridor.half_width_m:
+                continue
+            reach_m = observation.ego.speed_mps * (later_s + HEADWAY_S) + STANDSTILL_GAP_M
+            gap_m = float(arc_m.min()) + along_mps * later_s - corridor.front_m
+            if 0 <= gap_m <= reach_m:
+                return Sighting(gap_m=max(0.0, float(arc_m.min()) - corridor.front_m), speed_mps=max(0.0, along_mps))
+        return None
+
+
+def outline(obstacle: Obstacle) -> Points:
+    """(8, 2) corners and middles of the sides of an obstacle's footprint, in the ego frame."""
+    c, s = math.cos(obstacle.yaw_rad), math.sin(obstacle.yaw_rad)
+    signs = np.array([(1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1)], np.float64)
+    local = signs * np.array([obstacle.half_length_m, obstacle.half_width_m])
+    points: Points = local @ np.array([[c, s], [-s, c]]) + np.array([obstacle.ahead_m, obstacle.left_m])
+    return points
+
+
+spec = ControllerSpec(
+    name="truth",
+    summary="Knows all road users and brakes for them: the ceiling of every comparison.",
+    config=BaselineConfig,
+    build=Truth,
+    needs_truth=True,
+)
+
+
+@hookimpl
+def gear_controllers() -> list[ControllerSpec[BaselineConfig]]:
+    """Hook of the plugin system: returns the controller plugin that this module defines."""
+    return [spec]

@@ -1,0 +1,117 @@
+"""The readers of obstacles against a synthetic street, in which every distance is known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gear.contracts.controllers import Obstacle
+from gear.contracts.specs import TaskSpec
+from gear.plugins.controllers import blind, depth, detect2d, semseg, stereo3d, truth
+from gear.plugins.controllers.corridor import Corridor
+from gear.plugins.controllers.tracker import Sighting
+from gear.plugins.manager import catalogue
+from gear.testing.controller_contract import CAR, obstacles_of, straight_road
+from gear.testing.synthetic import synthetic_frame
+from gear.testing.things import CAR as CAR_PARTS
+from gear.testing.things import PERSON, Thing
+
+READERS = {"detect2d": detect2d, "stereo3d": stereo3d, "depth": depth, "semseg": semseg}
+TOLERANCE_M = {"detect2d": 1.2, "stereo3d": 0.1, "depth": 0.8, "semseg": 1.5}
+"""Largest error of a gap at 20 m in pictures of 640 x 320: the grid of the ground, of the pixels, of the percentile."""
+
+
+def car(ahead_m: float, left_m: float = 0.0, number: int = 2) -> Thing:
+    return Thing(parts=CAR_PARTS, position_m=(ahead_m, left_m, 0.0), object_id=number, role="npc")
+
+
+def person(ahead_m: float, left_m: float = 0.0) -> Thing:
+    return Thing(parts=PERSON, position_m=(ahead_m, left_m, 0.0), object_id=3, role="pedestrian")
+
+
+def sighting(name: str, things: list[Thing]) -> Sighting | None:
+    """What a reader sees when its network is perfect."""
+    spec = READERS[name].spec
+    task = catalogue().get("task", name).spec
+    assert isinstance(task, TaskSpec)
+    built: Any = task.build(task.config(width_px=640, height_px=320))
+    frame, record = synthetic_frame(built.rig(), things)
+    observation = straight_road(built.as_prediction(built.ground_truth(frame, record)), rig=built.rig())
+    controller: Any = spec.build(spec.config())
+    return controller.nearest(observation, Corridor.of(observation))
+
+
+@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("ahead_m", [12.0, 22.0])
+def test_the_gap_to_a_car_ahead_is_measured(name: str, ahead_m: float) -> None:
+    found = sighting(name, [car(ahead_m)])
+    assert found is not None
+    assert found.gap_m == pytest.approx(ahead_m - 2.1 - CAR.front_m, abs=TOLERANCE_M[name])
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_person_in_the_lane_is_seen(name: str) -> None:
+    found = sighting(name, [person(15.0)])
+    assert found is not None and found.gap_m == pytest.approx(15.0 - 0.25 - CAR.front_m, abs=1.5)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_cars_in_the_next_lanes_are_no_obstacles(name: str) -> None:
+    assert sighting(name, [car(20.0, 3.5), car(20.0, -3.5, number=4)]) is None
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_the_nearer_of_two_counts(name: str) -> None:
+    found = sighting(name, [car(30.0), person(14.0)])
+    assert found is not None and found.gap_m < 13.0
+
+
+def test_the_blind_one_sees_nothing() -> None:
+    observation = straight_road(obstacles=obstacles_of([car(10.0)]))
+    assert blind.Blind(blind.BaselineConfig()).nearest(observation, Corridor.of(observation)) is None
+
+
+def true_sighting(*obstacles: Obstacle, speed_mps: float = 10.0) -> Sighting | None:
+    observation = straight_road(obstacles=obstacles, speed_mps=speed_mps)
+    return truth.Truth(truth.BaselineConfig()).nearest(observation, Corridor.of(observation))
+
+
+def walker(ahead_m: float, left_m: float, velocity_mps: tuple[float, float]) -> Obstacle:
+    return Obstacle(
+        id=5,
+        kind="person",
+        ahead_m=ahead_m,
+        left_m=left_m,
+        yaw_rad=0.0,
+        half_length_m=0.3,
+        half_width_m=0.3,
+        velocity_mps=velocity_mps,
+    )
+
+
+def test_truth_measures_exactly() -> None:
+    found = true_sighting(*obstacles_of([car(20.0)]))
+    assert found == Sighting(gap_m=pytest.approx(20.0 - 2.1 - CAR.front_m), speed_mps=0.0)
+
+
+def test_truth_sees_who_will_step_into_the_lane() -> None:
+    assert true_sighting(walker(20.0, -4.0, (0.0, 1.4))) is not None
+    assert true_sighting(walker(20.0, -4.0, (0.0, 0.0))) is None, "who stands on the sidewalk is no obstacle"
+    assert true_sighting(walker(20.0, -4.0, (0.0, -1.4))) is None, "who walks away is none"
+    assert true_sighting(walker(60.0, -4.0, (0.0, 1.4)), speed_mps=5.0) is None, "who is gone by then is none"
+
+
+def test_truth_does_not_brake_for_oncoming_vehicles_on_their_lane() -> None:
+    oncoming = Obstacle(
+        id=4,
+        kind="vehicle",
+        ahead_m=25.0,
+        left_m=3.5,
+        yaw_rad=np.pi,
+        half_length_m=2.1,
+        half_width_m=0.9,
+        velocity_mps=(-10.0, -0.8),
+    )
+    assert true_sighting(oncoming) is None
