@@ -15,7 +15,8 @@ from tests.docs.blocks import DOCS, ROOT, pages
 
 def test_there_is_a_page_for_every_kind_of_plugin() -> None:
     found = [path.stem for path in sorted((DOCS / "how-to").glob("write-a*.md"))]
-    assert found == ["write-a-defense", "write-a-metric", "write-a-model", "write-a-task", "write-an-attack"]
+    kinds = ["controller", "defense", "metric", "model", "task"]
+    assert found == [*(f"write-a-{kind}" for kind in kinds), "write-an-attack"]
 
 
 def test_a_folder_holds_the_dataset_of_one_task_on_every_page() -> None:
