@@ -15,6 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from gear.networks import graph_model
 from gear.networks.checkpoint_states import Candidate, entries_of
 from gear.networks.shipped import check_file
 from gear.networks.weights import read
@@ -79,11 +80,15 @@ def read_published(path: str | Path) -> dict[str, Tensor]:
 def read_entries(path: str | Path) -> list[Candidate]:
     """Reads the mappings of a checkpoint or a safetensors file that hold tensors, the most likely network first.
 
+    A graph model of TensorFlow.js (a JSON file) gives one mapping, with the weights of its convolutions.
+
     Raises:
         GearError: the file does not exist, cannot be read, would run code, or holds no tensors.
     """
     file = Path(path)
     check_file(file)
+    if file.suffix == graph_model.SUFFIX:
+        return entries_of(graph_model.read_graph_model(file), file)
     return entries_of(read(file)[0] if file.suffix == ".safetensors" else _load(file), file)
 
 

@@ -16,6 +16,7 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.models.stereo_rcnn",
     "gear.plugins.models.stereo_centre",
     "gear.plugins.models.fasterrcnn_r50_fpn",
+    "gear.plugins.models.nanodet_coco",
     "gear.plugins.models.retinanet_r50_fpn",
     "gear.plugins.models.retinanet_r18_fpn",
     "gear.plugins.models.huggingface",

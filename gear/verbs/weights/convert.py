@@ -90,7 +90,8 @@ def convert_weights(
 
     Args:
         model: name of a model plugin.
-        source: a PyTorch checkpoint (zip or older format), or a safetensors file.
+        source: a PyTorch checkpoint (zip or older format), a safetensors file, or the JSON file of a graph model of
+            TensorFlow.js.
         out: file to write; must end in `.safetensors`.
         settings: `KEY=VALUE` texts for the model's options that change its graph.
         entry: path of the checkpoint's entry to convert, such as `ema` or `checkpoint.model`; "" takes the first one
