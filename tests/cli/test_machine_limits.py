@@ -60,4 +60,5 @@ def test_few_file_descriptors_are_one_line(tmp_path: Path) -> None:
         env={**os.environ, "OMP_NUM_THREADS": "1"},
     )  # fmt: skip
     assert done.returncode == 2, done.stderr
-    assert done.stderr.count("\n") == 1 and done.stderr.startswith("gear: "), done.stderr
+    said = [line for line in done.stderr.splitlines() if "samples" not in line]  # a slow machine shows progress
+    assert len(said) == 1 and said[0].startswith("gear: "), done.stderr
