@@ -33,8 +33,8 @@ from gear.networks.detection.options import OfficialDetectorOptions
 
 LOGITS, SIDES, CENTRES_PX = "cls_logits", "box_sides", "centres_px"
 
-MEAN_RGB = tuple(value / 255 for value in (123.675, 116.28, 103.53))
-STD_RGB = tuple(value / 255 for value in (58.395, 57.12, 57.375))
+MEAN_RGB = (123.675 / 255, 116.28 / 255, 103.53 / 255)
+STD_RGB = (58.395 / 255, 57.12 / 255, 57.375 / 255)
 """Normalisation of the training code: mean and standard deviation for red, green, blue pictures in 0..1."""
 
 ANCHOR_STRIDES = 8.0

@@ -119,17 +119,17 @@ class Head(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        # One convolution for each scale, in a list of its own, as in the published weights.
-        self.cls_convs = nn.ModuleList(nn.ModuleList([Convolution(CHANNELS, CHANNELS)]) for _ in STRIDES_PX)
+        # One convolution for each scale, in a sequence of its own, as in the published weights.
+        self.cls_convs = nn.ModuleList(nn.Sequential(Convolution(CHANNELS, CHANNELS)) for _ in STRIDES_PX)
         self.gfl_cls = nn.ModuleList(nn.Conv2d(CHANNELS, CLASSES + 4 * BINS, 1) for _ in STRIDES_PX)
 
     def forward(self, maps: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
         """Class logits (B, N, 80) and box logits (B, N, 4, 11) of all N cells, the finest scale first, by rows."""
         outputs = []
-        for features, (convolution,), last in zip(maps, self.cls_convs, self.gfl_cls, strict=True):
+        for features, convolution, last in zip(maps, self.cls_convs, self.gfl_cls, strict=True):
             outputs.append(last(convolution(features)).flatten(2))
-        logits, sides = torch.cat(outputs, dim=2).transpose(1, 2).split((CLASSES, 4 * BINS), dim=2)
-        return logits, sides.unflatten(2, (4, BINS))
+        cells = torch.cat(outputs, dim=2).transpose(1, 2)
+        return cells[..., :CLASSES], cells[..., CLASSES:].unflatten(2, (4, BINS))
 
 
 class NanoDetGraph(nn.Module):
