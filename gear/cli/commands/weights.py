@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "convert", help="convert a published weights file to safetensors, with all keys checked"
     )
     converting.add_argument("model", metavar="MODEL", help="model plugin; gear models")
-    converting.add_argument("source", metavar="IN", help="the published weights file: .pth, .pt, .pkl, .safetensors, or .json (TensorFlow.js)")
+    converting.add_argument(
+        "source", metavar="IN", help="published weights: .pth, .pt, .pkl, .safetensors, .json (TensorFlow.js)"
+    )
     converting.add_argument("out", metavar="OUT", help="the file to write; ends in .safetensors")
     converting.add_argument("--half", action="store_true", help="store matrices in float16, half the size")
     converting.add_argument(

@@ -129,7 +129,7 @@ class Head(nn.Module):
         for features, convolution, last in zip(maps, self.cls_convs, self.gfl_cls, strict=True):
             outputs.append(last(convolution(features)).flatten(2))
         cells = torch.cat(outputs, dim=2).transpose(1, 2)
-        return cells[..., :CLASSES], cells[..., CLASSES:].unflatten(2, (4, BINS))
+        return cells[..., :CLASSES], cells[..., CLASSES:].reshape(*cells.shape[:2], 4, BINS)
 
 
 class NanoDetGraph(nn.Module):
