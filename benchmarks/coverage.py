@@ -6,7 +6,10 @@ A large population of pictures stands for all that could be collected; its metri
 from it, each is given intervals by several methods, and the share of datasets whose interval holds the truth is
 printed: 95 % is right, and less means that the intervals are too narrow. Prints the table of docs/results/intervals.md.
 
-What a mean over classes is compared with is the population's mean over the classes that the dataset shows.
+A mean over classes is compared with the population's mean over the classes that the dataset shows.
+
+Methods: `percentile` and `bca` are bootstrap intervals, `student` is the jackknife with Student's t without a
+correction for skewness, and `gear` is the interval that `gear evaluate` gives.
 """
 
 from __future__ import annotations
@@ -22,15 +25,29 @@ from scipy import stats
 
 from gear.contracts.evaluation import Draws
 from gear.formats.cityscapes import LABELS
-from gear.measuring.intervals import LEFT_OUT, REAL, Interval, Values, jackknife_interval, leave_one_out
+from gear.measuring.intervals import (
+    LEFT_OUT,
+    REAL,
+    Interval,
+    Values,
+    interval_at_limit,
+    is_constant,
+    jackknife_interval,
+    leave_one_out,
+)
 from gear.measuring.statistics import auroc, auroc_interval
 from gear.metrics.coco_curves import Matches, average_precision, known_mean, resampled
+from gear.metrics.kitti_ap import curves, resampled_r40
+from gear.metrics.kitti_match import Chosen
 from gear.metrics.semantic import EVALUATED, SemanticEvaluator
 from gear.values.rng import derive_rng
 
 POPULATION = 6000
+KITTI_POPULATION = 1500
+"""Number of different pictures for KITTI's AP, whose matching is slow."""
+
 RESAMPLES = 400
-METHODS = ("percentile", "bca", "jackknife")
+METHODS = ("percentile", "bca", "student", "gear")
 SAMPLES = (6, 10, 20, 50)
 
 Rng = np.random.Generator
@@ -52,6 +69,10 @@ class Kind(Protocol):
         Args:
             chosen: (N,) numbers of pictures of the population.
             draws: (R, N) places in `chosen`, filled up with `LEFT_OUT`.
+
+        Returns:
+            The metric, its (R,) values over the draws, and the truth; NaN for the mean of the metric over all datasets
+            of N pictures.
         """
         ...
 
@@ -169,6 +190,65 @@ def _resampled(parts: Sequence[Matches], draws: Draws) -> Values:
     return np.concatenate([resampled(parts, row[row != LEFT_OUT][None]) for row in draws])
 
 
+class KittiAp:
+    """Mean of KITTI's AP at 40 recalls over three classes, which are in nearly all, two thirds and one third of the
+    pictures.
+
+    The share of a picture's labels that are detected, and the number of its false alarms, follow the picture's ease.
+    AP R40 has no value at some of the 40 recalls if a class has fewer than 41 labels, so it depends on the number of
+    pictures even if the detector stays the same.
+
+    Args:
+        rng: draws the population.
+        is_of_size: whether the truth is the mean of AP over all datasets of the same number of pictures, instead of AP
+            over the population.
+    """
+
+    limits = (0.0, 1.0)
+
+    def __init__(self, rng: Rng, *, is_of_size: bool) -> None:
+        self._is_of_size = is_of_size
+        ease = rng.normal(0, 0.6, KITTI_POPULATION)
+        self._chosen = [
+            [_kitti_picture(rng, share, rate, easy - 0.3 * place) for easy in ease]
+            for place, (share, rate) in enumerate(((0.98, 5.0), (0.65, 3.0), (0.35, 2.0)))
+        ]
+        every = [] if is_of_size else self._chosen
+        self._truths = np.array([curves(pictures)[0][1:].mean() for pictures in every])
+
+    def measure(self, chosen: Indices, draws: Draws) -> tuple[float, Values, float]:
+        """See `Kind`."""
+        every = np.arange(len(chosen))[None]
+        parts = [[pictures[number % KITTI_POPULATION] for number in chosen] for pictures in self._chosen]
+        whole = np.array([resampled_r40(part, every)[0] for part in parts])
+        rows = [row[row != LEFT_OUT] for row in draws]
+        values = np.array([resampled_r40(part, np.array(rows)) for part in parts])
+        return float(np.nanmean(whole)), known_mean(values, (0,)), self._truth(~np.isnan(whole))
+
+    def _truth(self, is_shown: npt.NDArray[np.bool_]) -> float:
+        return math.nan if self._is_of_size else float(self._truths[is_shown].mean())
+
+
+def _kitti_picture(rng: Rng, share: float, rate: float, ease: float) -> Chosen:
+    """The labels and detections of one class in one picture: each label has one detection at most, which overlaps no
+    other label.
+    """
+    labels = rng.poisson(rate) + 1 if rng.random() < share else 0
+    hits, alarms = rng.binomial(labels, 1 / (1 + math.exp(-(1.2 + ease)))), rng.poisson(1.2 * math.exp(-0.3 * ease))
+    count = hits + alarms
+    overlaps = np.zeros((labels, count))
+    overlaps[np.arange(hits), np.arange(hits)] = 0.9
+    return Chosen(
+        label_state=np.zeros(labels, np.int8),
+        detection_state=np.zeros(count, np.int8),
+        scores=rng.normal(np.where(np.arange(count) < hits, 1.0, -0.8), 1.2),
+        overlaps=overlaps,
+        angle_gain=np.ones((labels, count)),
+        excused=np.zeros(count, np.bool_),
+        min_overlap=0.7,
+    )
+
+
 class Auroc:
     """Area under the ROC curve of twins' scores, which share what their street adds."""
 
@@ -191,30 +271,46 @@ class Auroc:
         return auroc_interval(self._high[chosen].tolist(), self._low[chosen].tolist(), range(len(chosen)))
 
 
-class MeanError:
-    """Mean of a picture's error in metres, which is skewed as depth errors are."""
+class MeanOfPictures:
+    """Mean of a number of each picture.
 
-    limits = (0.0, math.inf)
+    Args:
+        values: (P,) numbers of the population's pictures.
+        limits: smallest and largest possible mean.
+    """
 
-    def __init__(self, rng: Rng) -> None:
-        self._errors = rng.lognormal(1.5, 0.4, POPULATION)
+    def __init__(self, values: Values, limits: Interval) -> None:
+        self._values, self.limits = values, limits
 
     def measure(self, chosen: Indices, draws: Draws) -> tuple[float, Values, float]:
         """See `Kind`."""
         often = _often(draws, len(chosen))
-        values = self._errors[chosen]
-        return float(values.mean()), often @ values / often.sum(axis=1), float(self._errors.mean())
+        values = self._values[chosen]
+        return float(values.mean()), often @ values / often.sum(axis=1), float(self._values.mean())
 
+
+def skewed(spread: float) -> Callable[[Rng], Kind]:
+    """Errors in metres whose logarithms have the given standard deviation."""
+    return lambda rng: MeanOfPictures(rng.lognormal(1.5, spread, POPULATION), (0.0, math.inf))
+
+
+AGAINST_ALL = "mean AP R40 of KITTI, against AP of all pictures"
 
 BY_NAME: Mapping[str, Callable[[Rng], Kind]] = {
-    "miou": MeanIou,
-    "miou, all classes everywhere": lambda rng: MeanIou(rng, is_everywhere=True),
-    "miou, patch minus none": lambda rng: MeanIou(rng, harm=1.5),
-    "ap": MeanAp,
-    "auroc": Auroc,
-    "mean error": MeanError,
+    "mIoU": MeanIou,
+    "mIoU, all classes in every picture": lambda rng: MeanIou(rng, is_everywhere=True),
+    "mIoU, patch minus none": lambda rng: MeanIou(rng, harm=1.5),
+    "mean AP of COCO": MeanAp,
+    "mean AP R40 of KITTI": lambda rng: KittiAp(rng, is_of_size=True),
+    AGAINST_ALL: lambda rng: KittiAp(rng, is_of_size=False),
+    "AUROC": Auroc,
+    "mean of a skewed error (skewness 1.3)": skewed(0.4),
+    "mean of a skewed error (skewness 3.7)": skewed(0.8),
+    "mean share near 1": lambda rng: MeanOfPictures(rng.beta(4.5, 0.5, POPULATION), (0.0, 1.0)),
+    "share of pictures near 1": lambda rng: MeanOfPictures((rng.random(POPULATION) < 0.97) * 1.0, (0.0, 1.0)),
 }
 KINDS = tuple(BY_NAME)
+BOOTSTRAP = ("percentile", "bca")
 
 
 def coverage(
@@ -223,23 +319,45 @@ def coverage(
     """Shares of the simulated datasets whose interval holds the truth, by method."""
     rng = derive_rng(seed, "coverage")
     population = kind(rng)
-    held: dict[str, list[bool]] = {method: [] for method in methods}
+    ends: dict[str, list[Interval]] = {method: [] for method in methods}
+    truths, found = [], []
     for _ in range(simulations):
         chosen = rng.integers(0, POPULATION, samples)
         left_out = leave_one_out(range(samples))
         value, replicates, truth = population.measure(chosen, left_out)
         drawn = np.zeros(0)
-        if set(methods) != {"jackknife"}:
+        if set(methods) & set(BOOTSTRAP):
             _, drawn, _ = population.measure(chosen, rng.integers(0, samples, (RESAMPLES, samples)))
         for method in methods:
-            if method == "jackknife" and isinstance(population, Auroc):
-                interval = population.interval(chosen)
-            elif method == "jackknife":
-                interval = jackknife_interval(value, replicates, population.limits)
+            if method == "gear":
+                interval = _gears(population, chosen, value, replicates)
+            elif method == "student":
+                interval = _students(value, replicates)
             else:
                 interval = _percentiles(drawn) if method == "percentile" else _bca(value, drawn, replicates)
-            held[method].append(interval is not None and interval[0] <= truth <= interval[1])
-    return {method: float(np.mean(values)) for method, values in held.items()}
+            ends[method].append(interval or (math.nan, math.nan))
+        truths.append(truth)
+        found.append(value)
+    true = np.where(np.isnan(truths), np.mean(found), truths)
+    low_high = {method: np.array(values) for method, values in ends.items()}
+    return {m: float(np.mean((each[:, 0] <= true) & (true <= each[:, 1]))) for m, each in low_high.items()}
+
+
+def _gears(population: Kind, chosen: Indices, value: float, replicates: Values) -> Interval | None:
+    """As an evaluation gives it."""
+    if isinstance(population, Auroc):
+        return population.interval(chosen)
+    if value in population.limits and is_constant(replicates):
+        return interval_at_limit(value, len(chosen), population.limits)
+    return jackknife_interval(value, replicates, population.limits)
+
+
+def _students(value: float, replicates: Values) -> Interval:
+    """The jackknife's standard error times Student's t (Tukey 1958)."""
+    count = len(replicates)
+    error = math.sqrt((count - 1) / count * np.square(replicates - replicates.mean()).sum())
+    reach = float(stats.t.ppf(0.975, count - 1)) * error
+    return value - reach, value + reach
 
 
 def _percentiles(drawn: Values) -> Interval:
@@ -260,16 +378,20 @@ def _bca(value: float, drawn: Values, replicates: Values) -> Interval:
 
 
 def main() -> None:
-    """Prints one line a metric and number of samples."""
+    """Prints one line for each metric and number of samples."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--simulations", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
+    parser.add_argument("--metrics", nargs="+", choices=KINDS, default=KINDS)
     args = parser.parse_args()
-    print(f"| metric | samples | {' | '.join(METHODS)} |\n|---|---|{'---|' * len(METHODS)}")
-    for name, kind in BY_NAME.items():
+    print(f"| metric | samples | {' | '.join(args.methods)} |\n|---|---|{'---|' * len(args.methods)}")
+    for name in args.metrics:
         for samples in SAMPLES:
-            found = coverage(kind, samples=samples, simulations=args.simulations, methods=METHODS, seed=args.seed)
-            print(f"| {name} | {samples} | {' | '.join(f'{100 * found[m]:.1f} %' for m in METHODS)} |", flush=True)
+            found = coverage(
+                BY_NAME[name], samples=samples, simulations=args.simulations, methods=args.methods, seed=args.seed
+            )
+            print(f"| {name} | {samples} | {' | '.join(f'{100 * found[m]:.1f} %' for m in args.methods)} |", flush=True)
 
 
 if __name__ == "__main__":

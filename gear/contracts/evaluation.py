@@ -170,3 +170,14 @@ class Ranged(Protocol):
     def range_of(self, metric: str) -> tuple[float, float]:
         """Smallest and largest possible value of a metric; infinite on a side without bound."""
         ...
+
+
+@runtime_checkable
+class Counting(Protocol):
+    """An evaluator with metrics that are numbers of events per picture, such as false alarms; if no event occurs, the
+    interval of such a metric is that of a Poisson mean.
+    """
+
+    def counted(self) -> frozenset[str]:
+        """The names of these metrics; their range, if stated, is 0 to infinity."""
+        ...

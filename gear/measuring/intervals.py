@@ -3,13 +3,13 @@
 The samples of one street form a cluster, because they are not independent. The metric is computed once without each
 cluster. The spread of these replicates gives the standard error (Tukey, 1958; Efron and Stein, Annals of Statistics
 1981). Student's t gives the width, with degrees of freedom for replicates of unequal weight (Satterthwaite, Biometrics
-1946).
+1946). Hall's transformation (Journal of the Royal Statistical Society B, 1992) corrects for skewness: errors in metres
+have a long tail to the right, and shares near 1 a long tail to the left, so the interval is longer on that side.
 
 The bootstrap is not used, because a mean over classes, such as mIoU or mAP, leaves out classes that no drawn sample
 shows. Resamples show fewer classes than the dataset, so bootstrap percentiles are biased, and they are too narrow for
-few streets. In simulations with a known true value (docs/results/intervals.md, `benchmarks/coverage.py`), 95 %
-bootstrap percentiles cover it in 80 to 94 % of the cases for mIoU, and BCa intervals in 75 to 93 %. The intervals of
-this module cover it in 95 to 97 % for mIoU, and in 92 to 97 % for other metrics.
+few streets. docs/results/intervals.md shows how often the intervals of several methods contain a known true value in
+simulations (`benchmarks/coverage.py`).
 
 The interval is valid for the classes that the dataset shows, and not for any other classes.
 """
@@ -72,7 +72,7 @@ def leave_one_out(clusters: Sequence[Hashable]) -> Draws:
 def jackknife_interval(value: float, replicates: Values, limits: Interval = REAL) -> Interval | None:
     """The 95 % confidence interval of a metric.
 
-    If all replicates are equal, both ends are the metric's value itself.
+    If all replicates are equal, both ends are the metric's value itself; see `interval_at_limit`.
 
     Args:
         value: the metric over all samples.
@@ -85,13 +85,41 @@ def jackknife_interval(value: float, replicates: Values, limits: Interval = REAL
     count = len(replicates)
     if count < 2 or not math.isfinite(value) or not np.isfinite(replicates).all():
         return None
-    deviations = replicates - replicates.mean()
-    if np.abs(deviations).max() <= NEGLIGIBLE * np.abs(replicates).max():
+    if is_constant(replicates):
         return value, value
-    squares = np.square(deviations)
+    changes = replicates.mean() - replicates  # a cluster with a large metric has a positive change
+    squares = np.square(changes)
     error = math.sqrt((count - 1) / count * squares.sum())
-    reach = _students_t(_degrees_of_freedom(squares)) * error
-    return max(limits[0], value - reach), min(limits[1], value + reach)
+    skewness = float((changes**3).mean() / squares.mean() ** 1.5) / math.sqrt(count)
+    reach = _students_t(_degrees_of_freedom(squares))
+    below, above = _unskewed(reach, skewness) * error, _unskewed(-reach, skewness) * error
+    return max(limits[0], value - below), min(limits[1], value - above)
+
+
+def is_constant(replicates: Values) -> bool:
+    """Whether replicates differ by no more than rounding."""
+    return bool(np.abs(replicates - replicates.mean()).max() <= NEGLIGIBLE * np.abs(replicates).max())
+
+
+def _unskewed(quantile: float, skewness: float) -> float:
+    """The inverse of Hall's transformation, which maps a quantile of Student's t to a quantile of the studentised mean
+    of a skewed distribution.
+
+    Hall's transformation of a studentised mean T is monotone and nearly free of skewness:
+
+        g(T) = T + a T² / 3 + a² T³ / 27 + a / 6.
+
+    Args:
+        quantile: the quantile x of Student's t.
+        skewness: a, the sample skewness divided by the square root of the number of clusters.
+
+    Returns:
+        T with g(T) = x, which is 3 ((1 + a (x - a / 6))^(1/3) - 1) / a, and x itself for a = 0.
+    """
+    step = skewness * (quantile - skewness / 6)
+    if abs(step) < NEGLIGIBLE:
+        return quantile
+    return 3 * (math.expm1(math.log1p(step) / 3) if step > -1 else float(np.cbrt(1 + step)) - 1) / skewness
 
 
 def _degrees_of_freedom(squares: Values) -> float:
@@ -138,16 +166,19 @@ def separated_interval(value: float, clusters: int) -> Interval:
     return (1 - reach, 1.0) if value > 0.5 else (0.0, reach)
 
 
-def extreme_rate_interval(value: float, clusters: int, limits: Interval) -> Interval:
-    """The interval of a rate that is 0 or 1, for which all replicates are equal.
+def interval_at_limit(value: float, clusters: int, limits: Interval) -> Interval:
+    """The 95 % confidence interval of a share that is 0 or 1, or of a number per picture that is 0. All jackknife
+    replicates are equal in this case, so their spread cannot be used.
 
     A share of 0 or 1 has the exact interval of Clopper and Pearson (Biometrika 1934), in which each cluster counts as
-    one trial. A number per picture of 0 has the exact upper end of a Poisson mean (Garwood, Biometrika 1936), 3.69 per
-    cluster. Both are conservative where samples of one cluster are less alike.
+    one trial. It also holds for a mean of values in 0..1, such as an IoU: a cluster is at the limit with a probability
+    of at most the mean's distance from the other limit. A number per picture of 0 has the exact upper end of a Poisson
+    mean (Garwood, Biometrika 1936), 3.69 per cluster. Both are conservative where samples of one cluster are less
+    alike.
 
     Args:
         value: 0 or 1.
-        clusters: number of clusters on which the rate rests, at least 1.
+        clusters: number of clusters on which the metric rests, at least 1.
         limits: smallest and largest possible value: 0 and 1 of a share, 0 and infinity of a number per picture.
     """
     from scipy import stats
@@ -157,3 +188,14 @@ def extreme_rate_interval(value: float, clusters: int, limits: Interval) -> Inte
         return 0.0, float(stats.chi2.isf(tail, 2)) / 2 / clusters
     reach = float(stats.beta.isf(tail, 1, clusters))
     return (1 - reach, 1.0) if value > 0.5 else (0.0, reach)
+
+
+def combined_interval(one: float, one_ends: Interval, other: float, other_ends: Interval) -> Interval:
+    """The 95 % confidence interval of the difference of two metrics, from the interval of each.
+
+    The distances to the ends are added as squares, as for independent estimates (Newcombe, Statistics in Medicine 1998,
+    method 10). For metrics of the same scenes, which mostly rise and fall together, the interval is conservative.
+    """
+    below = math.hypot(one - one_ends[0], other_ends[1] - other)
+    above = math.hypot(one_ends[1] - one, other - other_ends[0])
+    return one - other - below, one - other + above

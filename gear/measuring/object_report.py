@@ -88,6 +88,10 @@ class ObjectEvaluator:
         """
         return 0.0, 1.0 if metric in STATE_METRICS else math.inf
 
+    def counted(self) -> frozenset[str]:
+        """The metrics that are numbers of events per picture: the false alarms."""
+        return frozenset(ALARM_METRICS)
+
 
 def _middle_m(camera_from_surface: tuple[float, ...]) -> Vec3:
     """Middle of a surface in the camera's frame, from its pose as 16 numbers."""

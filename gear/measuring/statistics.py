@@ -13,13 +13,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gear.contracts.evaluation import Additive, Draws, Limited, Ranged, Resampled
+from gear.contracts.evaluation import Additive, Counting, Draws, Limited, Ranged, Resampled
 from gear.contracts.tasks import Evaluator
 from gear.measuring.intervals import (
     LEFT_OUT,
     REAL,
     Interval,
     Values,
+    combined_interval,
+    interval_at_limit,
+    is_constant,
     jackknife_interval,
     leave_one_out,
     numbered,
@@ -32,6 +35,9 @@ FLIPS = 9_999
 
 FLIPS_AT_ONCE = 1_000
 """Number of sign patterns that the test processes at a time, which bounds its memory."""
+
+SHARE = (0.0, 1.0)
+"""Range of a share."""
 
 ROUNDING = 1e-9
 """Relative difference up to which two sums of differences count as equal."""
@@ -48,28 +54,46 @@ class Metrics:
         replicates: (C,) values of a metric, each computed without one of the C clusters, by name of the metric.
         ceilings: values that perfect predictions of the same samples would reach, for metrics where this is below 1.
         limits: smallest and largest possible value of a metric, by name, if the evaluator states them.
+        support: number of clusters that show what a metric is about, by name, for shares that are exactly 0 or 1 and
+            for counts that are 0, with and without each cluster. For example, the AP of a class rests on the clusters
+            that show the class.
     """
 
     overall: Mapping[str, float]
     replicates: Mapping[str, Values]
     ceilings: Mapping[str, float]
     limits: Mapping[str, Interval] = field(default_factory=dict)
+    support: Mapping[str, int] = field(default_factory=dict)
 
     def interval(self, name: str) -> Interval | None:
-        """The ends of a metric's 95 % confidence interval by the jackknife; None if it is undefined."""
+        """The ends of a metric's 95 % confidence interval, by the jackknife or, for `support`'s metrics, exact ones.
+
+        None if it is undefined. This includes an error that is 0 on all samples, because these samples do not tell how
+        large it is on others.
+        """
         if name not in self.replicates:
             return None
-        return jackknife_interval(self.overall[name], self.replicates[name], self.limits.get(name, REAL))
+        value, limits = self.overall[name], self.limits.get(name, REAL)
+        if name in self.support:
+            return interval_at_limit(value, self.support[name], limits)
+        interval = jackknife_interval(value, self.replicates[name], limits)
+        return None if interval == (value, value) and value in limits else interval
 
 
 def difference_interval(one: Metrics, other: Metrics, name: str) -> Interval | None:
     """The 95 % confidence interval of the difference of a metric between two datasets with the same scenes.
 
     Each jackknife replicate leaves the same cluster out of both datasets, so the interval is that of the paired
-    difference.
+    difference. If one of the metrics is a share of exactly 0 or 1, its replicates show no spread, and the interval is
+    combined from the intervals of both.
     """
     if name not in one.replicates or name not in other.replicates:
         return None
+    if name in one.support or name in other.support:
+        ends, other_ends = one.interval(name), other.interval(name)
+        if ends is None or other_ends is None:
+            return None
+        return combined_interval(one.overall[name], ends, other.overall[name], other_ends)
     here, there = one.limits.get(name, REAL), other.limits.get(name, REAL)
     with np.errstate(invalid="ignore"):  # inf - inf is NaN: such a metric has no interval
         replicates = one.replicates[name] - other.replicates[name]
@@ -97,18 +121,54 @@ def gather(
     overall = held(whole.result())
     ceilings = dict(whole.ceilings()) if isinstance(whole, Limited) else {}
     limits = {name: whole.range_of(name) for name in overall} if isinstance(whole, Ranged) else {}
+    replicates = _replicates(fresh, whole, parts, draws, overall)
+    counted = whole.counted() if isinstance(whole, Counting) else frozenset()
+    at_limit = [
+        name
+        for name, values in replicates.items()
+        if len(values) > 1 and is_constant(values) and _is_at_limit(overall[name], limits.get(name), name in counted)
+    ]
+    support = {}
+    if at_limit:
+        alone = _replicates(fresh, whole, parts, _complement(draws), at_limit)
+        support = {name: max(1, int(np.isfinite(alone[name]).sum())) for name in at_limit}
+    return Metrics(overall=overall, replicates=replicates, ceilings=ceilings, limits=limits, support=support)
+
+
+def _is_at_limit(value: float, limits: Interval | None, is_count: bool) -> bool:
+    """Whether a metric has an exact interval: a share of 0 or 1, or a number of events of 0."""
+    return value in SHARE if limits == SHARE else is_count and value == 0
+
+
+def _complement(draws: Draws) -> Draws:
+    """(R, N) indices of the samples that each row of `draws` leaves out, padded with `LEFT_OUT`."""
+    left_out = np.full_like(draws, LEFT_OUT)
+    for row, drawn in zip(left_out, draws, strict=True):
+        missing = np.setdiff1d(np.arange(draws.shape[1]), drawn)
+        row[: len(missing)] = missing
+    return left_out
+
+
+def _replicates(
+    fresh: Callable[[], AnyEvaluator],
+    whole: AnyEvaluator,
+    parts: Sequence[AnyEvaluator],
+    draws: Draws,
+    names: Iterable[str],
+) -> dict[str, Values]:
+    """(R,) metrics over each row of `draws`, which may be padded with `LEFT_OUT`; NaN where a metric is undefined."""
     replicates: dict[str, Values] = {}
     counts = (draws != LEFT_OUT).sum(axis=1)
     for count in np.unique(counts):  # evaluators want as many samples in every draw
         rows = np.flatnonzero(counts == count)
         block = draws[rows]
         block = block[block != LEFT_OUT].reshape(len(rows), count)
-        for name, values in _replicates(fresh, whole, parts, block, overall).items():
+        for name, values in _of_equal_size(fresh, whole, parts, block, names).items():
             replicates.setdefault(name, np.full(len(draws), np.nan))[rows] = values
-    return Metrics(overall=overall, replicates=replicates, ceilings=ceilings, limits=limits)
+    return replicates
 
 
-def _replicates(
+def _of_equal_size(
     fresh: Callable[[], AnyEvaluator],
     whole: AnyEvaluator,
     parts: Sequence[AnyEvaluator],

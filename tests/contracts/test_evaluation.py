@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from gear.contracts.evaluation import Additive, KeepsPredictions, Limited, Maskable, Ranged, Reports, Resampled
+from gear.contracts.evaluation import (
+    Additive,
+    Counting,
+    KeepsPredictions,
+    Limited,
+    Maskable,
+    Ranged,
+    Reports,
+    Resampled,
+)
 from gear.contracts.specs import TaskSpec
 from gear.plugins.build import find
 
@@ -25,10 +34,10 @@ def test_built_in_tasks_offer_what_they_implement(name: str) -> None:
         assert isinstance(task, protocol)
     evaluator = task.evaluator()
     assert {
-        protocol for protocol in (Additive, Resampled, Limited, Ranged) if isinstance(evaluator, protocol)
+        protocol for protocol in (Additive, Resampled, Limited, Ranged, Counting) if isinstance(evaluator, protocol)
     } == OFFERS[name]
 
 
 def test_an_object_without_the_methods_offers_nothing() -> None:
-    for protocol in (KeepsPredictions, Maskable, Reports, Additive, Resampled, Limited, Ranged):
+    for protocol in (KeepsPredictions, Maskable, Reports, Additive, Resampled, Limited, Ranged, Counting):
         assert not isinstance(object(), protocol)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
 from gear.measuring.intervals import LEFT_OUT, jackknife_interval, leave_one_out
 from gear.measuring.statistics import (
     ROUNDING,
+    Metrics,
     auroc,
     auroc_interval,
     clustered,
@@ -108,3 +111,82 @@ def test_unknown_differences_of_a_cluster_do_not_count() -> None:
     sums = clustered(table, ["a", "b", "a", "b", "a"])
     assert np.array_equal(sums[:, :2], [[1, nan], [7, 3]], equal_nan=True)
     assert sums[:, 2].tolist() == [0, 2], f"0.1 + 0.2 - 0.3 is 0 but for a share of less than {ROUNDING}"
+
+
+class Found(Summed):
+    """The share of objects that are found; a sample without objects (NaN) adds nothing."""
+
+    def totals(self) -> Mapping[str, Any]:
+        known = np.isfinite(self.values)
+        return {"sum": np.nansum(self.values), "count": known.sum()}
+
+    def metrics(self, totals: Mapping[str, Any]) -> Mapping[str, Any]:
+        with np.errstate(invalid="ignore"):
+            return {"share": np.asarray(totals["sum"] / totals["count"])}
+
+    def result(self) -> Mapping[str, float]:
+        return {name: float(value) for name, value in self.metrics(self.totals()).items()}
+
+    def range_of(self, metric: str) -> tuple[float, float]:
+        return 0.0, 1.0
+
+
+def shares(*values: float, clusters: list[int] | None = None) -> Metrics:
+    return gather(Found, [Found(value) for value in values], leave_one_out(clusters or range(len(values))))
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+def test_a_share_at_its_limit_rests_on_the_streets_that_show_it(value: float) -> None:
+    """Five streets show an object, two of them in two samples each, and three streets show none."""
+    nan = math.nan
+    found = shares(value, value, value, value, value, value, value, nan, nan, nan, clusters=[0, 0, 1, 1, *range(2, 8)])
+    exact = binomtest(int(5 * value), 5).proportion_ci(0.95, method="exact")
+    assert found.support == {"share": 5}
+    assert found.interval("share") == pytest.approx((exact.low, exact.high))
+
+
+def test_only_shares_at_their_limits_have_a_support() -> None:
+    assert shares(0.5, 0.5, 0.5).support == {} and shares(0.5, 0.5, 0.5).interval("share") == (0.5, 0.5)
+    assert shares(1.0, 1.0, 0.9).support == {} and shares(1.0).support == {}
+    assert shares(1.0).interval("share") is None
+
+
+def test_a_difference_of_a_share_at_its_limit_is_combined_from_both() -> None:
+    clean, patched = shares(1.0, 0.8, 0.9, 1.0, 0.7), shares(0.0, 0.0, 0.0, 0.0, 0.0)
+    low, high = difference_interval(patched, clean, "share") or (0, 0)
+    clean_low, clean_high = clean.interval("share") or (0, 0)
+    _, patched_high = patched.interval("share") or (0, 0)
+    assert low == pytest.approx(-0.88 - (clean_high - 0.88)), "nothing is below a share of 0"
+    assert high == pytest.approx(-0.88 + math.hypot(patched_high, 0.88 - clean_low)) and low < -0.88 < high
+    both = difference_interval(shares(*[1.0] * 8), shares(*[1.0] * 8), "share") or (0, 0)
+    assert both == pytest.approx((-0.369, 0.369), abs=1e-3), "2.5 % of eight trials that all succeed"
+
+
+class Alarms(Summed):
+    """False alarms per picture."""
+
+    def range_of(self, metric: str) -> tuple[float, float]:
+        return 0.0, math.inf
+
+    def counted(self) -> frozenset[str]:
+        return frozenset({"mean"})
+
+
+class Errors(Summed):
+    """Errors in metres."""
+
+    def range_of(self, metric: str) -> tuple[float, float]:
+        return 0.0, math.inf
+
+
+def test_no_event_in_ten_streets_has_the_interval_of_a_poisson_mean() -> None:
+    silent = gather(Alarms, [Alarms(0.0) for _ in range(10)], leave_one_out(range(10)))
+    low, high = silent.interval("mean") or (1, 1)
+    assert low == 0 and math.exp(-10 * high) == pytest.approx(0.025)
+    loud = gather(Alarms, [Alarms(1.0) for _ in range(10)], leave_one_out(range(10)))
+    assert loud.interval("mean") == (1, 1), "each picture has one"
+
+
+def test_an_error_of_nothing_has_no_interval() -> None:
+    found = gather(Errors, [Errors(0.0) for _ in range(10)], leave_one_out(range(10)))
+    assert found.interval("mean") is None, "metres cannot be counted"

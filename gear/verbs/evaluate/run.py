@@ -41,7 +41,7 @@ from gear.verbs.evaluate.table import table
 FIT = "fit.json"
 """Name of the file with the report of a defense on its calibration."""
 
-INTERVALS = "95 %: jackknife over streets, Student's t"
+INTERVALS = "95 %: jackknife over streets, Student's t corrected for skewness; exact where a share is 0 or 1"
 """The note in results.json on how the intervals are computed."""
 
 LEARNT = {"calibration", "calibration_samples"}

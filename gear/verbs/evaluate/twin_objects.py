@@ -15,7 +15,7 @@ from gear.measuring.intervals import (
     LEFT_OUT,
     Interval,
     Values,
-    extreme_rate_interval,
+    interval_at_limit,
     jackknife_interval,
     leave_one_out,
 )
@@ -126,7 +126,7 @@ def _rate(counts: Values, bases: Values, kept: Sequence[npt.NDArray[np.int64]], 
     interval = jackknife_interval(value, replicates, limits)
     if interval == (value, value) and value in limits:
         streets = sum(bool(bases[row].sum() < bases.sum()) for row in kept)  # that have a base
-        interval = extreme_rate_interval(value, streets, limits)
+        interval = interval_at_limit(value, streets, limits)
     return Estimate(value=value, interval=interval)
 
 
