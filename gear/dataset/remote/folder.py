@@ -19,7 +19,8 @@ _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*(::|://)")
 _LOCAL = re.compile(r"(?:file|local):///?(?=/)")
 
 PACKAGES = {"s3": "s3fs", "s3a": "s3fs", "gs": "gcsfs", "gcs": "gcsfs", "az": "adlfs", "abfs": "adlfs"}
-"""Names of the packages that fsspec needs for some protocols."""
+"""Names of the packages that fsspec needs for object stores, by protocol. Object stores have no folders, and the packages
+would create a missing bucket instead."""
 
 
 def is_address(out: str | Path) -> bool:
@@ -61,6 +62,7 @@ class RemoteFolder:
         except Exception as error:  # the constructors of file systems read credentials, and may raise anything
             raise DatasetError(address, f"cannot be opened ({_line(error)})") from error
         self._root = root.rstrip("/")
+        self._has_folders = not PACKAGES.keys() & set(re.split("::|://", address))
 
     def names(self) -> list[str]:
         """The names of the files and folders directly in the folder; empty if it does not exist.
@@ -97,7 +99,8 @@ class RemoteFolder:
         """
         path = self._path(relative)
         with self._explained(f"cannot write {relative}"):
-            self._files.makedirs(path.rpartition("/")[0], exist_ok=True)
+            if self._has_folders:
+                self._files.makedirs(path.rpartition("/")[0], exist_ok=True)
             self._files.pipe_file(path, data)
 
     def remove(self, relative: str) -> None:

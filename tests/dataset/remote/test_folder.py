@@ -90,3 +90,13 @@ def test_an_error_of_the_file_system_is_one_line(
     with pytest.raises(DatasetError, match="cannot write a") as caught:
         RemoteFolder(f"{remote}/folder").write("a", b"")
     assert str(caught.value).endswith(said) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("address", "count"), [("memory://gear-tests/folder", 1), ("s3://gear-tests/folder", 0)])
+def test_no_bucket_is_created(address: str, count: int, remote: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Object stores have no folders, and a misspelt bucket is an error."""
+    memory, made = fsspec.filesystem("memory"), list[str]()
+    monkeypatch.setattr(fsspec.core, "url_to_fs", lambda address: (memory, "/gear-tests/folder"))
+    monkeypatch.setattr(memory, "makedirs", lambda path, exist_ok: made.append(path))
+    RemoteFolder(address).write("a", b"1")
+    assert len(made) == count and memory.cat_file("/gear-tests/folder/a") == b"1"
