@@ -9,7 +9,7 @@ from gear.contracts.executors import Executor, Needs
 from gear.dataset import executors
 from gear.values.errors import UnknownNameError
 
-NO_ENGINES = ("engines", "in_process", "parts", "threads")
+NO_ENGINES = ("engines", "in_process", "jobs", "parts", "threads")
 """Modules of the room that are no engine."""
 
 DEFAULT = "processes"

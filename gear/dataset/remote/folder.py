@@ -19,8 +19,9 @@ _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*(::|://)")
 _LOCAL = re.compile(r"(?:file|local):///?(?=/)")
 
 PACKAGES = {"s3": "s3fs", "s3a": "s3fs", "gs": "gcsfs", "gcs": "gcsfs", "az": "adlfs", "abfs": "adlfs"}
-"""Names of the packages that fsspec needs for object stores, by protocol. Object stores have no folders, and the packages
-would create a missing bucket instead."""
+"""Names of the packages that fsspec needs for object stores, by protocol. Object stores have no folders, and the
+packages would create a missing bucket instead.
+"""
 
 
 def is_address(out: str | Path) -> bool:

@@ -6,21 +6,18 @@ parallel; the next wave begins when all of them have ended.
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gear.contracts.executors import MOST_FAILURES, Executor, Outcome, Report
+from gear.contracts.executors import Executor, Outcome, Report
+from gear.dataset.executors.jobs import carry_out_jobs, run_jobs, shared_folder
 from gear.values.errors import GearError
 from gear.values.progress import Callbacks
 from gear.verbs.bench.carry_out import carry_out
 from gear.verbs.bench.plan import Step
-
-FURTHER_TRIES = 2
-"""Number of further attempts to carry out a step whose worker was lost."""
 
 INPUTS = ("data", "val", "calibration", "calibration_patched", "patch")
 """Arguments of a step that name folders, which other steps may have made."""
@@ -141,14 +138,7 @@ class _Running:
     def carry_out_in_workers(self, executor: Executor, positions: Sequence[int]) -> None:
         """Carries out the steps at some positions in parallel; steps whose worker was lost are tried again."""
         work = partial(make_steps, self.steps, self.root, str(Path.cwd()), ALONE)
-        left = positions
-        for _ in range(1 + FURTHER_TRIES):
-            executor.run(work, left, self._report)
-            left = [one for one in left if one in self.failed and not self.failed[one].is_final]
-        for position in positions:
-            if position not in self.ended:
-                problem = f"{self.steps[position].title}: not carried out, because other steps failed in a row"
-                self._report(Outcome(index=position, kind="failed", error=problem, is_final=True))
+        run_jobs(executor, work, positions, self._report)
 
     def _report(self, outcome: Outcome) -> None:
         """Notes the outcome of a step."""
@@ -205,35 +195,12 @@ def make_steps(
     Raises:
         GearError: the folder is not there on the worker's machine.
     """
-    in_row = 0
-    with _current_folder(folder):
-        for index in indices:
-            step, warnings = steps[index], list[str]()
-            callbacks = Callbacks.of(on_warning=warnings.append)
-            try:
-                value = carry_out(step, root, callbacks, changed=changed if step.verb == "collect" else None)
-            except GearError as error:
-                in_row += 1
-                report(Outcome(index=index, kind="failed", error=str(error), is_final=True))
-                if in_row >= MOST_FAILURES:
-                    return
-                continue
-            in_row = 0
-            kept = value if step.verb == "evaluate" else None
-            report(Outcome(index=index, value=StepResult(value=kept, warnings=tuple(warnings))))
 
+    def call(index: int) -> StepResult:
+        step, warnings = steps[index], list[str]()
+        callbacks = Callbacks.of(on_warning=warnings.append)
+        value = carry_out(step, root, callbacks, changed=changed if step.verb == "collect" else None)
+        return StepResult(value=value if step.verb == "evaluate" else None, warnings=tuple(warnings))
 
-@contextlib.contextmanager
-def _current_folder(folder: str | None) -> Iterator[None]:
-    """A context with another current folder; None changes nothing.
-
-    Raises:
-        GearError: the folder is not there.
-    """
-    if folder is None:
-        yield
-        return
-    if not Path(folder).is_dir():
-        raise GearError(f"{folder} is not there on this machine; run the bench in a folder that all machines share")
-    with contextlib.chdir(folder):
-        yield
+    with shared_folder(folder):
+        carry_out_jobs(call, indices, report)

@@ -145,7 +145,7 @@ def test_a_worker_whose_steps_all_fail_takes_no_more(carried_out: list[str]) -> 
 
 
 def test_a_machine_without_the_folder_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(GearError, match="is not there on this machine; run the bench in a folder that all machines"):
+    with pytest.raises(GearError, match="is not there on this machine; run the command in a folder that all machines"):
         make_steps(STEPS, Path(), str(tmp_path / "elsewhere"), {}, [0], lambda outcome: None)
 
 
