@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from gear.measuring.gap.report import GapReport
     from gear.plugins.datasets import Dataset, Twins, open_dataset, open_twins
     from gear.values.errors import GearError
+    from gear.verbs.attack.per_scene import attack_scenes
     from gear.verbs.attack.report import AttackReport
     from gear.verbs.attack.run import attack
     from gear.verbs.bench.report import BenchReport
@@ -62,6 +63,7 @@ __all__ = [
     "VerifyReport",
     "ViewReport",
     "attack",
+    "attack_scenes",
     "average_weights",
     "bench",
     "collect",
@@ -104,6 +106,7 @@ _HOME = {
     "VerifyReport": "gear.verbs.verify.report",
     "ViewReport": "gear.view.write",
     "attack": "gear.verbs.attack.run",
+    "attack_scenes": "gear.verbs.attack.per_scene",
     "bench": "gear.verbs.bench.run",
     "average_weights": "gear.verbs.weights.average",
     "collect": "gear.verbs.collect.run",

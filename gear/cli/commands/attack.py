@@ -18,6 +18,7 @@ EXAMPLE = """examples:
   gear attack --model ddrnet23_slim_depth --attack carla_gear --steps 5100 --data data/depth --out patches/paper
   gear attack --model ddrnet23_slim --attack square --queries 5000 --data data/b01 --out patches/black-box
   gear attack --model ddrnet23_slim --data data/b01 --data data/b02 --data data/b01-sunset --out patches/universal
+  gear attack --model ddrnet23_slim --per-scene --engine-workers 4 --data data/train --out patches
   gear attack --model ddrnet23_slim --data data/b01 --out patches/b01 --verify data/b01-val
   gear collect --task semseg --scene billboard01 --split test --patch patches/b01 --out data/b01-patched
 
@@ -27,7 +28,7 @@ The folder --out gets patch_0.png, …, patch.safetensors, attack.json and figur
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of `gear attack` to its argument parser."""
-    from gear.cli.commands.evaluate import add_calibration
+    from gear.cli.commands.evaluate import add_calibration, add_engine
     from gear.cli.commands.gap import add_places
 
     parser.epilog = EXAMPLE
@@ -97,6 +98,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--verify", metavar="DIR", help="dataset with probes on which the patches are rendered and compared afterwards"
     )
     add_places(parser)
+    parser.add_argument(
+        "--per-scene",
+        action="store_true",
+        help="make patches for each scene of --data, in OUT/<town>-<scene>; --data may be a folder of datasets",
+    )
+    add_engine(parser, "scenes that are attacked")
     parser.add_argument("--compositor", default="transport", metavar="NAME", help="transport, or homography")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random draws (0)")
     parser.add_argument("--allow-test-data", action="store_true", help="optimise on test splits too")
@@ -124,12 +131,39 @@ def run(args: argparse.Namespace) -> int:
             "--town and --scenes are of the dataset that --verify names; add --verify DIR, or leave them out"
         )
     request = request_of(AttackRequest, args, models=tuple(args.model), guard=guard_of(args))
+    if args.per_scene:
+        return attack_per_scene(args, request)
+    if args.engine is not None or args.address is not None or args.engine_workers != 1:
+        raise GearError(
+            "--engine, --address and --engine-workers are for several scenes; add --per-scene, or leave them out"
+        )
     with Display("attack", unit=unit_of(request)) as display:
         report = run_attack(request, display.callbacks)
     if args.verify is None or not args.json:
         print(json.dumps(report.facts, indent=2) if args.json else report.summary())
     if args.verify is not None:
         check_rendered(args, request, report.facts)
+    return 0
+
+
+def attack_per_scene(args: argparse.Namespace, request: AttackRequest) -> int:
+    """Runs one attack for each scene (`--per-scene`), prints the results and returns exit code 0."""
+    import json
+
+    from gear.dataset.executors.engines import DEFAULT
+    from gear.reporting.display import Display
+    from gear.values.errors import GearError
+    from gear.verbs.attack.per_scene import Engine, run_attack_scenes
+
+    if args.verify is not None:
+        raise GearError("--verify is for the patches of one attack; run it for each scene, without --per-scene")
+    engine = Engine(name=args.engine or DEFAULT, address=args.address, workers=args.engine_workers)
+    with Display("attack", unit="scene") as display:
+        reports = run_attack_scenes(request, engine, display.callbacks)
+    if args.json:
+        print(json.dumps({scene: report.facts for scene, report in reports.items()}, indent=2))
+    else:
+        print("\n".join(report.summary() for report in reports.values()))
     return 0
 
 

@@ -22,7 +22,6 @@ from gear.measuring.statistics import (
     gather,
     paired_p,
 )
-from gear.values.errors import DatasetError
 from gear.verbs.evaluate.report import ALARMS, Difference, Estimate, ObjectChanges, PairedTest, RowReport, Together
 from gear.verbs.evaluate.twin_objects import object_changes
 
@@ -45,7 +44,7 @@ class Measured:
         streets: the scene content that each sample shows, independently of weather and patch; samples of one street are
             not statistically independent.
         made: number of samples predicted in this run.
-        damaged: one error per stored prediction that could not be read.
+        damaged: one line per stored prediction that could not be read and was made again.
         known: cache of computed metrics by report and number of samples, because computing them is slow.
     """
 
@@ -55,7 +54,7 @@ class Measured:
     notes: list[Note]
     streets: list[Street]
     made: int
-    damaged: tuple[DatasetError, ...]
+    damaged: tuple[str, ...]
     known: dict[tuple[str, int], Metrics] = field(default_factory=dict, repr=False)
 
     def gathered(self, report: str, count: int | None = None) -> Metrics:
@@ -103,7 +102,7 @@ def row_report(row: Measured) -> RowReport:
         },
         samples=len(notes),
         made=row.made,
-        damaged=tuple(str(error) for error in row.damaged),
+        damaged=row.damaged,
         metrics=metrics_of(row),
         cost=mean_cost(notes),
         defense=mask_means(notes, has_patch=plan.info.patch_label != NO_PATCH),

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from gear.dataset.executors.engines import DEFAULT
 from gear.measuring.guard import Guard
 from gear.values.errors import GearError
 from gear.values.rng import check_seed
@@ -29,6 +30,9 @@ class EvaluateRequest:
     out: str | Path | None = None
     batch: int | None = None
     workers: int = 2
+    engine: str = DEFAULT
+    address: str | None = None
+    engine_workers: int = 1
     seed: int = 0
     pools: Mapping[str, Sequence[str | Path]] = field(default_factory=dict)
 
@@ -36,6 +40,13 @@ class EvaluateRequest:
         check_seed(self.seed)
         if min(1 if self.batch is None else self.batch, self.workers) < 1:
             raise GearError(f"batch and workers must be at least 1; got {self.batch}, {self.workers}")
+        if self.engine_workers < 1:
+            raise GearError(f"engine_workers must be at least 1, got {self.engine_workers}")
+
+    @property
+    def is_distributed(self) -> bool:
+        """Whether the workers of an engine evaluate the datasets; otherwise this process evaluates them."""
+        return self.engine != DEFAULT or self.address is not None or self.engine_workers > 1
 
     def folder(self, task: str) -> Path:
         """Returns the folder of the results: the requested one, or `evaluations/<task>/<model>[+<defense>]`."""

@@ -8,38 +8,35 @@ import importlib.metadata
 import platform
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from gear.config.dump import to_plain
+from gear.dataset.executors.engines import DEFAULT
 from gear.dataset.files import clear_scratch, inside, write_whole
 from gear.dataset.json_text import dump_json, load_json
 from gear.dataset.locks import alone_at_work
 from gear.dataset.plan import differences
 from gear.dataset.reading import Dataset
 from gear.dataset.store import check_output
-from gear.measuring.dataset_run import evaluate_row
 from gear.measuring.guard import Guard, open_guard
 from gear.measuring.guarded_model import GuardedModel
-from gear.measuring.metric_json import known_json
 from gear.measuring.notes import grouped
 from gear.measuring.open_datasets import opened, row_names
 from gear.measuring.plugin_selection import chosen_model
-from gear.measuring.scoring import Scorer
 from gear.measuring.shown_size import size_note
 from gear.reporting.display import displayed
 from gear.values.errors import DatasetError
 from gear.values.progress import Callbacks, Progress, Warn
 from gear.values.serial import Json
 from gear.verbs.evaluate.alarm_notes import alarm_notes
-from gear.verbs.evaluate.compare import Measured, compared, drive_note, row_report, streets_of, together
+from gear.verbs.evaluate.compare import Measured, compared, drive_note, row_report, together
+from gear.verbs.evaluate.distribute import FIT, measure_dataset, predict_in_workers, store_fit
 from gear.verbs.evaluate.pools import Pools, check_pools, pooled
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.request import EvaluateRequest
 from gear.verbs.evaluate.table import table
-
-FIT = "fit.json"
-"""Name of the file with the report of a defense on its calibration."""
 
 INTERVALS = "95 %: jackknife over streets, Student's t corrected for skewness; exact where a share is 0 or 1"
 """The note in results.json on how the intervals are computed."""
@@ -68,6 +65,9 @@ def evaluate(
     out: str | Path | None = None,
     batch: int | None = None,
     workers: int = 2,
+    engine: str = DEFAULT,
+    address: str | None = None,
+    engine_workers: int = 1,
     seed: int = 0,
     pools: Pools | None = None,
     progress: bool = False,
@@ -96,11 +96,15 @@ def evaluate(
         out: folder of the results; `evaluations/<task>/<model>[+<defense>]` by default.
         batch: samples per batch; by default one, or up to four small pictures for gear's own models.
         workers: number of threads that read samples, and of threads that compute metrics and write files.
+        engine: name of the engine whose workers evaluate whole datasets; `processes` uses processes on this machine.
+        address: address of the engine's cluster: a Ray cluster, or a partition of SLURM.
+        engine_workers: number of datasets that are evaluated at the same time. With more than one, a script needs
+            `if __name__ == "__main__":`.
         seed: seed of the defense's random draws and of the permutation tests.
         pools: roots of datasets that are evaluated as one, by name of the pool. Pools with the same scenes as the pools
             `none` and `random` are compared with these, sample by sample.
         progress: shows a progress bar.
-        on_progress: called after every sample.
+        on_progress: called after every sample; with an engine, first after every dataset.
         on_fit_progress: called after every calibration sample that the defense reads for the first time.
         on_warning: called with one line per damaged prediction that is made again, and per problem of the defense's
             calibration.
@@ -118,6 +122,9 @@ def evaluate(
         out=out,
         batch=batch,
         workers=workers,
+        engine=engine,
+        address=address,
+        engine_workers=engine_workers,
         seed=seed,
         pools=pools or {},
     )
@@ -185,14 +192,11 @@ def _fit_facts(root: Path, guarded: GuardedModel, request: EvaluateRequest, on_w
 
     Every problem in the report is passed on as a warning.
     """
-    report = guarded.fit_report()
-    if report is not None:
-        facts: Json = {"values": known_json(report.values), "problems": list(report.problems)}
-        write_whole(root, FIT, dump_json(facts))
+    store_fit(root, guarded)
     path = inside(root, FIT)
     if request.guard is None or not path.exists():
         return None
-    facts = load_json(path)
+    facts: Json = load_json(path)
     for problem in _problems(facts):
         on_warning(problem)
     return facts
@@ -209,27 +213,21 @@ def _measured(
     guarded: GuardedModel,
     callbacks: Callbacks,
 ) -> list[Measured]:
-    """Runs the model over the datasets, one after the other, and returns their samples' scores."""
+    """Runs the model over the datasets, and returns their samples' scores.
+
+    If an engine is requested, its workers predict the samples; the scores are then read from their notes.
+    """
+    predicted = predict_in_workers(request, datasets, guarded, callbacks) if request.is_distributed else None
     done = _counter(callbacks.on_progress, sum(len(one) for one in datasets))
     rows = []
-    for dataset, name in zip(datasets, names, strict=True):
-        scorer = Scorer(dataset, request.folder(dataset.plan.task["name"]), name, request.reports, guarded.plugin)
-        batch = request.batch or guarded.usual_batch(dataset)
-        row = evaluate_row(dataset, scorer, guarded, batch=batch, workers=request.workers, done=done)
-        scorer.finish(row.notes)
+    for position, (dataset, name) in enumerate(zip(datasets, names, strict=True)):
+        row = measure_dataset(request, dataset, name, guarded, done)
+        if predicted is not None:
+            work = predicted[position]
+            row = replace(row, made=row.made + work.made, damaged=(*work.damaged, *row.damaged))
         for problem in row.damaged:
             callbacks.on_warning(f"{problem}; the sample was predicted again")
-        rows.append(
-            Measured(
-                name=name,
-                dataset=dataset,
-                scorer=scorer,
-                notes=row.notes,
-                streets=streets_of(dataset),
-                made=row.made,
-                damaged=row.damaged,
-            )
-        )
+        rows.append(row)
     return rows
 
 
