@@ -28,7 +28,7 @@ The folder --out gets patch_0.png, …, patch.safetensors, attack.json and figur
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of `gear attack` to its argument parser."""
-    from gear.cli.commands.evaluate import add_calibration, add_engine
+    from gear.cli.commands.evaluate import add_engine
     from gear.cli.commands.gap import add_places
 
     parser.epilog = EXAMPLE
@@ -53,32 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="an option of the models",
     )  # fmt: skip
     add_device(parser, "model_settings")
-    parser.add_argument(
-        "--defense", metavar="NAME", help="defense that guards the models; the attack is adaptive to it"
-    )
-    parser.add_argument(
-        "--defense-set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="defense_settings",
-        help="an option of the defense",
-    )
-    add_calibration(parser)
-    parser.add_argument(
-        "--score-weight",
-        type=float,
-        default=1.0,
-        metavar="W",
-        help="weight of lowering the defense's score; 0 for none (1)",
-    )
-    parser.add_argument(
-        "--mask-weight",
-        type=float,
-        default=1.0,
-        metavar="W",
-        help="weight of removing the defense's mask from the patch; 0 for none (1)",
-    )
+    _add_defense(parser)
     parser.add_argument(
         "--val",
         action="append",
@@ -110,6 +85,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--force", action="store_true", help="replace the results of another attack in --out")
     parser.add_argument(
         "--json", action="store_true", help="print attack.json; with --verify, both as attack and verify"
+    )
+
+
+def _add_defense(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags of the defense that the attack takes into account."""
+    from gear.cli.commands.evaluate import add_calibration
+
+    parser.add_argument(
+        "--defense", metavar="NAME", help="defense that guards the models; the attack is adaptive to it"
+    )
+    parser.add_argument(
+        "--defense-set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="defense_settings",
+        help="an option of the defense",
+    )
+    add_calibration(parser)
+    parser.add_argument(
+        "--score-weight",
+        type=float,
+        default=1.0,
+        metavar="W",
+        help="weight of lowering the defense's score; 0 for none (1)",
+    )
+    parser.add_argument(
+        "--mask-weight",
+        type=float,
+        default=1.0,
+        metavar="W",
+        help="weight of removing the defense's mask from the patch; 0 for none (1)",
     )
 
 
