@@ -34,6 +34,11 @@ ROOMS: dict[str, tuple[float, str, str]] = {
         "models over data",
         "what verbs share when they measure: a guarded model, statistics, twins, the gap",
     ),
+    "leaderboard": (
+        0.9,
+        "records, rules",
+        "records of benchmark results, the rules that they must keep, and the rows of a leaderboard",
+    ),
     "collecting": (
         0.71,
         "making samples",

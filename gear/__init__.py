@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from gear.verbs.evaluate.run import evaluate
     from gear.verbs.export import export
     from gear.verbs.gap.run import gap
+    from gear.verbs.leaderboard.build import BoardReport, build_leaderboard
+    from gear.verbs.leaderboard.check import check_record
     from gear.verbs.merge import MergeReport, merge
     from gear.verbs.models import ModelFacts, list_models
     from gear.verbs.sheet import sheet
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AttackReport",
     "BenchReport",
+    "BoardReport",
     "CollectReport",
     "ConvertReport",
     "Dataset",
@@ -66,6 +69,8 @@ __all__ = [
     "attack_scenes",
     "average_weights",
     "bench",
+    "build_leaderboard",
+    "check_record",
     "collect",
     "convert_weights",
     "defend",
@@ -89,6 +94,7 @@ __all__ = [
 _HOME = {
     "AttackReport": "gear.verbs.attack.report",
     "BenchReport": "gear.verbs.bench.report",
+    "BoardReport": "gear.verbs.leaderboard.build",
     "CollectReport": "gear.collecting.run",
     "ConvertReport": "gear.verbs.weights.convert",
     "Dataset": "gear.plugins.datasets",
@@ -108,6 +114,8 @@ _HOME = {
     "attack": "gear.verbs.attack.run",
     "attack_scenes": "gear.verbs.attack.per_scene",
     "bench": "gear.verbs.bench.run",
+    "build_leaderboard": "gear.verbs.leaderboard.build",
+    "check_record": "gear.verbs.leaderboard.check",
     "average_weights": "gear.verbs.weights.average",
     "collect": "gear.verbs.collect.run",
     "convert_weights": "gear.verbs.weights.convert",

@@ -29,6 +29,7 @@ COMMANDS: dict[str, str] = {
     "defend": "write the pictures of a dataset as a defense cleans them",
     "evaluate": "measure a model, with or without a defense, on datasets, and compare twins",
     "bench": "run a benchmark of networks, defenses, scenes and patches, and write a report",
+    "leaderboard": "check records of benchmark results, and make a leaderboard of them",
     "verify": "check every file of a dataset, and make damaged samples again",
     "merge": "join the shards of one collection into one dataset",
     "export": "write a dataset in the layout of another tool",

@@ -46,5 +46,22 @@ class Shard:
         return sequence % self.count == self.number - 1
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picked(Shard):
+    """A part of a split that consists of chosen driving sequences, for checks of single samples.
+
+    Attributes:
+        sequences: numbers of the sequences, from 0; single pictures are sequences of one frame.
+    """
+
+    sequences: frozenset[int]
+    number: int = 1
+    count: int = 1
+
+    def holds(self, sequence: int) -> bool:
+        """Whether the part contains a driving sequence, given by its number from 0."""
+        return sequence in self.sequences
+
+
 WHOLE = Shard(number=1, count=1)
 """The only shard of an undivided split; it contains all samples."""

@@ -112,6 +112,24 @@ class GuardedModel:
         learn = partial(calibration.fit, defense, product, bare, self._views, self._seed)
         return CheckedDefense(found, product, bare if spec.needs_model or spec.taps else None, learn), wrapped
 
+    def is_random(self, pictures: Views) -> bool:
+        """Whether the defense gives another result for the same sample if its random generator has another state;
+        False without a defense.
+
+        Args:
+            pictures: (H, W, 3) uint8 pictures of one sample by camera name.
+        """
+        if self._guard is None:
+            return False
+        seen = {name: pictures[name] for name in self._views}
+        one, other = (
+            self._guard.apply(seen, derive_rng(self._seed, "randomness", self._guard_name, draw), 0) for draw in (0, 1)
+        )
+        same = [np.array_equal(one.views[name], other.views[name]) for name in one.views]
+        masks, others = one.mask or {}, other.mask or {}
+        same += [np.array_equal(masks[name], others[name]) for name in masks]
+        return one.score != other.score or not all(same)
+
     def usual_batch(self, dataset: Dataset[Any]) -> int:
         """The default number of samples in a batch of a dataset.
 

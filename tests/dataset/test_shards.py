@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gear.dataset.shards import WHOLE, Shard
+from gear.dataset.shards import WHOLE, Picked, Shard
 from gear.dataset.store import Store
 from gear.values.errors import GearError
 from tests.dataset.splits import plan
@@ -40,3 +40,8 @@ def test_a_longer_split_keeps_the_samples_of_its_shards(tmp_path: Path) -> None:
     second = Shard(number=2, count=3)
     short = Store(tmp_path, plan(samples=10)).indices(second)
     assert Store(tmp_path, plan(samples=20)).indices(second)[: len(short)] == short
+
+
+def test_a_picked_part_holds_what_was_picked() -> None:
+    part = Picked(sequences=frozenset({1, 4}))
+    assert [number for number in range(6) if part.holds(number)] == [1, 4]

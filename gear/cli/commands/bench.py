@@ -45,6 +45,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=workers, default=1, metavar="N", help="number of steps at the same time, or auto (1)"
     )
+    parser.add_argument(
+        "--record",
+        nargs="?",
+        const=True,
+        default=False,
+        choices=("model", "defense", "attack"),
+        metavar="KIND",
+        help="also write records for a leaderboard into OUT/records; `attack` for an attack against rows of others",
+    )
     parser.add_argument("--list", action="store_true", help="only print the commands of the benchmark")
     parser.add_argument("--json", action="store_true", help="print bench.json, or the steps, in place of the tables")
 

@@ -122,7 +122,7 @@ class Plan:
                 for model in contest.models:
                     yield from self._patch(contest, scene, model)
             for match in self.matches(contest):
-                yield self._evaluation(match)
+                yield self.evaluation(match)
 
     def matches(self, contest: Contest) -> Iterator[Match]:
         """Yields one evaluation per network of a task without a defense, and one per network and defense."""
@@ -183,6 +183,11 @@ class Plan:
         purposes differ.
         """
         return int(derive_rng(self.config.seed, "bench", purpose).integers(1 << 31))
+
+    @property
+    def calibration(self) -> Scene | None:
+        """The scene in which defenses are calibrated; None if the config names none."""
+        return self._calibration
 
     def _place(self, contest: Contest, scene: Scene) -> Path:
         return self._root / "data" / contest.folder / scene.label
@@ -284,7 +289,8 @@ class Plan:
             },
         )
 
-    def _evaluation(self, match: Match) -> Step:
+    def evaluation(self, match: Match) -> Step:
+        """Returns the step that measures a network, alone or behind a defense, on all of its datasets."""
         return Step(
             verb="evaluate",
             title=f"evaluate {self.name(match.model, match.defense)} in {match.contest.name}",

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from gear.collecting.workers import Workers, fitting_workers
 from gear.dataset.executors.engines import DEFAULT
+from gear.leaderboard.record import Kind
 from gear.values.errors import GearError
 
 
@@ -26,6 +27,7 @@ class BenchRequest:
     in_subprocess: bool = False
     engine: str = DEFAULT
     address: str | None = None
+    record: Kind | bool = False
 
     def __post_init__(self) -> None:
         if self.workers != "auto" and self.workers < 1:

@@ -23,6 +23,7 @@ from gear.dataset.files import clear_scratch, write_whole
 from gear.dataset.json_text import dump_json
 from gear.dataset.locks import alone_at_work
 from gear.dataset.store import check_output
+from gear.leaderboard.record import Kind
 from gear.measuring.plugin_selection import check_optics
 from gear.networks.runtime import has_cuda
 from gear.reporting.display import displayed
@@ -33,6 +34,7 @@ from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig
 from gear.verbs.bench.page import page
 from gear.verbs.bench.plan import Match, Plan, Step
+from gear.verbs.bench.recording import write_records
 from gear.verbs.bench.report import COLUMNS, BenchReport, Metric, Result, SceneMetric, TaskResult
 from gear.verbs.bench.request import BenchRequest
 from gear.verbs.bench.scenes import calibration_scene, located, measured_scenes
@@ -55,6 +57,7 @@ def bench(
     address: str | None = None,
     workers: Workers = 1,
     in_subprocess: bool = False,
+    record: Kind | bool = False,
     progress: bool = False,
     on_step: OnStep | None = None,
     on_progress: Progress | None = None,
@@ -80,6 +83,7 @@ def bench(
             a GPU, `processes` carries out one attack or evaluation at a time.
         in_subprocess: whether a single worker runs in a process of its own. Each collection in the calling process
             keeps about 20 MB, so True is better for large benches; a script then needs `if __name__ == "__main__":`.
+        record: whether records for a leaderboard are written into `records`; a name (`attack`) sets their kind.
         progress: shows a progress bar.
         on_step: called with a step, its number (from 1) and the number of steps: before each step, or after each step
             if several are carried out at the same time.
@@ -100,6 +104,7 @@ def bench(
         in_subprocess=in_subprocess,
         engine=engine,
         address=address,
+        record=record,
     )
     callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
     with displayed(callbacks, "bench", progress=progress) as shown:
@@ -122,6 +127,9 @@ def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | Non
         report = _report(plan, root, carried_out(steps, root, request, callbacks, on_step))
         write_whole(root, CONFIG, config)
         _write(report, plan, root)
+        if request.record:
+            kind = None if request.record is True else request.record
+            write_records(report, plan, Path(request.config).stem, kind)
     return report
 
 

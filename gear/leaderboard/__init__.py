@@ -1,0 +1,1 @@
+"""Records of benchmark results, the rules that they must keep, and the leaderboard that they make."""

@@ -1,0 +1,1 @@
+"""The verb `leaderboard`: checks records of results by measuring again, and builds the pages of a leaderboard."""

@@ -1,0 +1,96 @@
+"""`gear.build_leaderboard`: makes static pages of a folder of records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.dataset.files import explained, write_whole
+from gear.leaderboard.board import Table, tables
+from gear.leaderboard.reading import Filed, read_records
+from gear.leaderboard.record import SHA256, canonical
+from gear.leaderboard.verdict import Verdict, read_verdict
+from gear.values.errors import DatasetError, GearError
+from gear.values.serial import Json
+from gear.verbs.leaderboard.pages import index_page, record_page
+from gear.verbs.leaderboard.texts import board_json
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class BoardReport:
+    """The result of `gear.build_leaderboard`.
+
+    Attributes:
+        out: folder of the pages.
+        tables: tables of the leaderboard.
+        refused: one line per file that is no valid record or verdict.
+    """
+
+    out: Path
+    tables: tuple[Table, ...]
+    refused: tuple[str, ...]
+
+    def as_json(self) -> Json:
+        """Returns the content of board.json."""
+        return board_json(self.tables, self.refused)
+
+    def summary(self) -> str:
+        """Returns the result as text: counts, and one line per refused file."""
+        rows = [row for table in self.tables for row in table.rows]
+        ranked = sum(row.is_ranked for row in rows)
+        lines = [f"{self.out}: {len(rows)} rows, {ranked} of them ranked, in {len(self.tables)} tables"]
+        return "\n".join([*lines, *(f"refused: {line}" for line in self.refused)]) + "\n"
+
+
+def build_leaderboard(
+    records: str | Path, *, out: str | Path, checks: str | Path | None = None, commitment: str | None = None
+) -> BoardReport:
+    """Makes static pages of a folder of records: `index.html`, one page per record, and `board.json`.
+
+    Args:
+        records: folder with records (`*.json`).
+        out: folder of the pages.
+        checks: folder with verdicts of `gear leaderboard check --out`; only the maintainers of the leaderboard write
+            into it. Without it every row is claimed only.
+        commitment: salted hash of the withheld scenes, which the pages publish.
+
+    Raises:
+        GearError: a folder cannot be read or written, or the commitment is no hash.
+    """
+    if commitment is not None and not SHA256.fullmatch(commitment):
+        raise GearError("the commitment must be a SHA-256, as `gear leaderboard commit FILE` prints it")
+    refused: list[str] = []
+    filed: dict[str, Filed] = {}
+    for one in read_records(Path(records)):
+        if isinstance(one, DatasetError):
+            refused.append(f"{Path(one.path).name}: {one.problem}")
+        else:
+            filed.setdefault(one.sha256, one)
+    verdicts = {} if checks is None else _verdicts(Path(checks), refused)
+    found = tuple(tables(filed.values(), verdicts))
+    report = BoardReport(out=Path(out), tables=found, refused=tuple(refused))
+    with explained(report.out):
+        report.out.mkdir(parents=True, exist_ok=True)
+    for sha256, one in filed.items():
+        write_whole(report.out, f"records/{sha256}.html", record_page(one, verdicts.get(sha256)).encode())
+    write_whole(report.out, "board.json", canonical(report.as_json()))
+    write_whole(report.out, "index.html", index_page(found, refused, commitment).encode())
+    return report
+
+
+def _verdicts(folder: Path, refused: list[str]) -> dict[str, Verdict]:
+    """The verdicts of a folder by the SHA-256 of the record; a file counts only under its own name."""
+    found: dict[str, Verdict] = {}
+    with explained(folder):
+        paths = sorted(path for path in folder.iterdir() if path.suffix == ".json")
+    for path in paths:
+        try:
+            verdict = read_verdict(path)
+        except DatasetError as error:
+            refused.append(f"{path.name}: {error.problem}")
+            continue
+        if path.stem == verdict.record_sha256:
+            found[verdict.record_sha256] = verdict
+        else:
+            refused.append(f"{path.name}: is the verdict of another record, {verdict.record_sha256[:12]}")
+    return found

@@ -1,0 +1,38 @@
+"""The arguments of `gear.check_record` as a dataclass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.values.errors import GearError
+from gear.values.rng import check_seed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckRequest:
+    """The arguments of `gear.check_record`, which describes each of them.
+
+    Raises:
+        GearError: a number is out of range, or a commitment is given without the withheld scenes.
+    """
+
+    record: str | Path
+    work: str | Path
+    out: str | Path | None = None
+    patches: str | Path | None = None
+    samples: int = 4
+    fresh: int = 8
+    seed: int = 0
+    settings: tuple[str, ...] = ()
+    withheld: str | Path | None = None
+    commitment: str | None = None
+    most_pictures: int = 2000
+    device: str | None = None
+
+    def __post_init__(self) -> None:
+        check_seed(self.seed)
+        if self.samples < 1 or self.fresh < 0 or self.most_pictures < 1:
+            raise GearError("samples and most-pictures must be at least 1, and fresh at least 0")
+        if (self.commitment is None) != (self.withheld is None):
+            raise GearError("withheld scenes and their commitment belong together: give both or none")

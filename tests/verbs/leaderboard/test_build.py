@@ -1,0 +1,98 @@
+"""`gear leaderboard build`: pages of a folder of records, in which strangers' texts are escaped."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from gear.cli.main import main
+from gear.leaderboard.reading import encoded
+from gear.leaderboard.verdict import Verdict
+from gear.values.errors import GearError
+from gear.verbs.leaderboard.build import build_leaderboard
+from tests.leaderboard.conftest import VALUES, attacking, figures, filed, plugin, record, sha
+
+EVIL = "<script>alert(1)</script>\" onload='x'"
+
+
+class Tags(HTMLParser):
+    """Collects the tags and the text of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: set[str] = set()
+        self.text = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        assert not any(name.startswith("on") for name, _ in attrs)
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def put(folder: Path, name: str, data: bytes) -> None:
+    folder.mkdir(exist_ok=True)
+    (folder / name).write_bytes(data)
+
+
+def test_pages_of_records(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    alone = record(
+        {"none": 0.71, "random": 0.68, "patch": 0.30, "patch of other": 0.45}, reference=(),
+        entry={"kind": "model", "defense": None, "gradient": None},
+    )  # fmt: skip
+    evil = record(entry={"defense": plugin("evil"), "authors": EVIL, "paper": EVIL})
+    stronger = attacking(record(), 0.42, knowledge="black-box", steps=0, queries=900)
+    for name, one in {"a": record(), "b": alone, "c": evil, "d": stronger}.items():
+        put(tmp_path / "records", f"{name}.json", encoded(one))
+    put(tmp_path / "records", "e.json", b"{}")
+    sha256 = filed(stronger).sha256
+    verdict = Verdict(
+        record_sha256=sha256, state="reproduced", seed=0, repeated=1, fresh=0, environment={}, findings=()
+    )
+    put(tmp_path / "checks", f"{sha256}.json", verdict.encoded())
+    put(tmp_path / "checks", f"{sha('x')}.json", verdict.encoded())
+    words = ["leaderboard", "build", str(tmp_path / "records"), "--out", str(tmp_path / "site")]
+    assert main([*words, "--checks", str(tmp_path / "checks"), "--commitment", sha("secret")]) == 0
+    out = capsys.readouterr().out
+    assert "3 rows, 3 of them ranked, in 1 tables" in out
+    assert "e.json: is no gear-record" in out and "is the verdict of another record" in out
+    index = Tags((tmp_path / "site/index.html").read_text())
+    assert "script" not in index.tags and sha("secret") in index.text
+    assert "0.420 [0.420, 0.420] (patch, theirs (their-package 0.1), by others)" in index.text
+    assert "other: 0.450 [0.430, 0.470]" in index.text and "900 queries" not in index.text
+    board = json.loads((tmp_path / "site/board.json").read_text())
+    rows = board["tables"][0]["rows"]
+    assert [(row["defense"], row["worst"]["value"]) for row in rows] == [("evil", 0.5), ("guard", 0.42), ("-", 0.3)]
+    page = Tags((tmp_path / "site/records" / f"{filed(evil).sha256}.html").read_text())
+    assert "script" not in page.tags and EVIL in page.text
+
+
+def test_same_records_give_the_same_pages(tmp_path: Path) -> None:
+    put(tmp_path / "records", "a.json", encoded(record()))
+    put(tmp_path / "records", "copy.json", encoded(record()))
+    for site in ("one", "two"):
+        build_leaderboard(tmp_path / "records", out=tmp_path / site)
+    pages = [{p.name: p.read_bytes() for p in (tmp_path / site).rglob("*.html")} for site in ("one", "two")]
+    assert pages[0] == pages[1] and len(pages[0]) == 2
+
+
+def test_faults_and_flags_stand_on_the_page(tmp_path: Path) -> None:
+    weak = replace(record(), results=figures({**VALUES, "adaptive patch": 0.65}))
+    put(tmp_path / "records", "a.json", encoded(weak))
+    put(tmp_path / "records", "b.json", encoded(record(entry={"defense": plugin("dice"), "is_random": True})))
+    build_leaderboard(tmp_path / "records", out=tmp_path / "site")
+    text = Tags((tmp_path / "site/index.html").read_text()).text
+    assert "flag: adaptive patches are no worse" in text and "not ranked, because the defense is random" in text
+
+
+def test_a_wrong_commitment_or_folder_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(GearError, match="must be a SHA-256"):
+        build_leaderboard(tmp_path, out=tmp_path / "site", commitment="<b>")
+    with pytest.raises(GearError, match="cannot be read"):
+        build_leaderboard(tmp_path / "none", out=tmp_path / "site")
