@@ -26,7 +26,7 @@ from gear.camera.fractal import smooth_step
 from gear.camera.response import DISPLAY_POWER
 from gear.camera.surface_points import longest_edges, points_on
 from gear.values.frames import FloatImage, Shape, UInt16Image
-from gear.values.geometry import Array
+from gear.values.geometry import Array, RigidTransform
 from gear.values.scene import ActorRecord, CameraRecord, SceneRecord
 
 Mask = npt.NDArray[np.bool_]
@@ -54,7 +54,7 @@ the second, they fade to 0.
 
 _NEAREST_M, _FARTHEST_M = 0.3, 200.0
 _MOST_POINTS = 400_000
-_BAND_ROWS = 64
+_BAND_ROWS = 32
 _CUBE = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 _EDGES = np.array([(i, i | bit) for bit in (1, 2, 4) for i in range(8) if not i & bit])
 
@@ -104,6 +104,12 @@ def _grid(shape: Shape) -> tuple[int, int, float]:
     half_m = np.abs(shape.box_centre_m[:2]) + shape.box_size_m[:2] / 2 + _reach_m(shape)
     columns, rows = (2 * math.ceil(side * cells_per_m) + 1 for side in half_m)
     return rows, columns, cells_per_m
+
+
+def _radius_m(shape: Shape) -> float:
+    """Distance from an actor's origin within which its contact shadows lie, metres."""
+    rows, columns, cells_per_m = _grid(shape)
+    return math.hypot(columns, rows) / (2 * cells_per_m) + _STEP_M + _FADE_M
 
 
 def _layers(points: Array, rows: int, columns: int) -> list[Mask]:
@@ -199,7 +205,7 @@ class ContactShadows:
         shaded = linear_rgb.copy()
         for top in range(0, len(left), _BAND_ROWS):
             band = slice(top, top + _BAND_ROWS)
-            if (left[band] < 1).any():
+            if cv2.minMaxLoc(left[band])[0] < 1:
                 cv2.multiply(linear_rgb[band], cv2.merge([left[band]] * 3), dst=shaded[band], dtype=cv2.CV_16U)
         return shaded
 
@@ -211,11 +217,11 @@ class ContactShadows:
         `ContactShadows.apply` explains the arguments.
         """
         left: FloatImage | None = None
-        for actor in record.actors:
-            shape = self.shapes.get(actor.asset)
-            if shape is None:
-                continue
-            box = _box_in_picture(actor, shape, camera)
+        world_from_camera = camera.world_from_camera_transform
+        for actor in self._before_and_near(record, camera):
+            shape = self.shapes[actor.asset]
+            actor_from_camera = actor.world_from_actor.transform("world", "actor").inverse() @ world_from_camera
+            box = _box_in_picture(actor_from_camera, shape, camera)
             if box is None or not is_ground[box].any():
                 continue
             sky = self._sky(actor.asset, shape)
@@ -223,15 +229,27 @@ class ContactShadows:
                 left = np.ones(depth_m.shape, np.float32)
             for top in range(box[0].start, box[0].stop, _BAND_ROWS):
                 band = (slice(top, min(top + _BAND_ROWS, box[0].stop)), box[1])
-                where = is_ground[band]
-                if where.any():
-                    left[band] *= np.where(where, self._beside(actor, sky, depth_m, band, camera), np.float32(1))
+                if is_ground[band].any():
+                    left[band] *= self._beside(actor_from_camera, sky, depth_m, is_ground, band, camera)
         if left is None:
             return None
-        # Pixels on the silhouette of an object in front of the ground show some of the ground.
-        darkest = cv2.erode(left, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))
-        left = np.where(is_ground, left, 1 - OUTLINE * (1 - darkest))
+        _soften_outlines(left, is_ground)
         return left ** np.float32(DISPLAY_POWER) if self.is_display else left
+
+    def _before_and_near(self, record: SceneRecord, camera: CameraRecord) -> list[ActorRecord]:
+        """The actors that may darken ground in view: those with a shape that stand before the camera and near it.
+
+        This test takes a tenth of the time of the exact one, for which each actor's pose is inverted.
+        """
+        actors = [actor for actor in record.actors if actor.asset in self.shapes]
+        if not actors:
+            return []
+        reach_m = np.array([_radius_m(self.shapes[actor.asset]) for actor in actors])
+        from_camera = np.array([actor.world_from_actor.position_m for actor in actors], np.float64)
+        from_camera -= camera.world_from_camera_transform.translation_m
+        ahead = from_camera @ camera.world_from_camera_transform.rotation[:, 2]
+        is_near = (ahead + reach_m >= _NEAREST_M) & (ahead - reach_m <= _FARTHEST_M)
+        return [actor for actor, near in zip(actors, is_near.tolist(), strict=True) if near]
 
     def _sky(self, asset: str, shape: Shape) -> SkyOcclusion:
         if asset not in self._known:
@@ -239,27 +257,61 @@ class ContactShadows:
         return self._known[asset]
 
     def _beside(
-        self, actor: ActorRecord, sky: SkyOcclusion, depth_m: FloatImage, box: tuple[slice, slice], camera: CameraRecord
+        self,
+        actor_from_camera: RigidTransform,
+        sky: SkyOcclusion,
+        depth_m: FloatImage,
+        is_ground: Mask,
+        box: tuple[slice, slice],
+        camera: CameraRecord,
     ) -> FloatImage:
-        """(h, w) factors of one actor for the ground in a box of the picture."""
-        actor_from_camera = (
-            actor.world_from_actor.transform("world", "actor").inverse() @ camera.world_from_camera_transform
-        )
+        """(h, w) factors of one actor in a box of the picture, 1 where no ground is seen.
+
+        Masks are factors here, because masked assignments take as long as ten multiplications.
+        """
         turn = actor_from_camera.rotation.astype(np.float32)
         place = actor_from_camera.translation_m.astype(np.float32)
         z = depth_m[box]
         pinhole = camera.intrinsics
-        x = _slopes_of(box[1], pinhole.cx_px, pinhole.fx_px) * z
-        y = _slopes_of(box[0], pinhole.cy_px, pinhole.fy_px)[:, None] * z
-        ahead, left, up = (turn[i, 0] * x + turn[i, 1] * y + turn[i, 2] * z + place[i] for i in range(3))
+        x = _slopes_of(box[1], pinhole.cx_px, pinhole.fx_px)
+        y = _slopes_of(box[0], pinhole.cy_px, pinhole.fy_px)[:, None]
         scale, (rows, columns) = np.float32(sky.cells_per_m), sky.share.shape
-        hidden = cv2.remap(
-            sky.share, ahead * scale + columns // 2, left * scale + rows // 2, cv2.INTER_LINEAR, borderValue=0
-        )
-        level = 1 - smooth_step(np.abs(up), _STEP_M, _FADE_M)
+        # Where the map is read, to the actor's front and to its left, in cells; and the height of the ground.
+        places = []
+        for axis, unit, middle in ((0, scale, columns // 2), (1, scale, rows // 2), (2, np.float32(1), 0)):
+            along = x * (unit * turn[axis, 0]) + (y * turn[axis, 1] + turn[axis, 2]) * unit
+            along *= z
+            along += unit * place[axis] + np.float32(middle)
+            places.append(along)
+        hidden = cv2.remap(sky.share, places[0], places[1], cv2.INTER_LINEAR, borderValue=0)
+        hidden *= is_ground[box]
+        up = places[2]
+        level = 1 - smooth_step(np.abs(up, out=up), _STEP_M, _FADE_M)
         beside = np.float32(sky_share_beside(self.even_share))
         worth = beside + (1 - beside) * smooth_step(hidden, _BESIDE_TO, _FULL_FROM - _BESIDE_TO)
-        return np.asarray(1 - np.float32(MOST_HIDDEN) * hidden * worth * level, dtype=np.float32)
+        hidden *= np.float32(-MOST_HIDDEN)
+        hidden *= worth
+        hidden *= level
+        hidden += 1
+        cv2.patchNaNs(hidden, 1.0)
+        return np.asarray(hidden, dtype=np.float32)
+
+
+def _soften_outlines(left: FloatImage, is_ground: Mask) -> None:
+    """Darkens pixels on the silhouette of an object in front of the ground, which show some of the ground.
+
+    Args:
+        left: (H, W) factors for pixels that show ground, 1 for others; changed in place.
+        is_ground: (H, W) bool, True where a pixel shows ground.
+    """
+    rows = np.flatnonzero(left.min(axis=1) < 1)
+    if not len(rows):
+        return
+    part = np.s_[max(int(rows[0]) - 1, 0) : int(rows[-1]) + 2]
+    darkest = cv2.erode(left[part], cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3)))
+    darkest *= OUTLINE
+    darkest += 1 - OUTLINE
+    cv2.copyTo(darkest, (~is_ground[part]).view(np.uint8), left[part])
 
 
 def sky_share_beside(even_share: float) -> float:
@@ -274,14 +326,14 @@ def _slopes_of(part: slice, centre_px: float, focal_px: float) -> FloatImage:
     return ((np.arange(part.start, part.stop) - centre_px) / focal_px).astype(np.float32)
 
 
-def _box_in_picture(actor: ActorRecord, shape: Shape, camera: CameraRecord) -> tuple[slice, slice] | None:
+def _box_in_picture(
+    actor_from_camera: RigidTransform, shape: Shape, camera: CameraRecord
+) -> tuple[slice, slice] | None:
     """Rows and columns that contain all ground near an actor; None where it is out of view."""
     rows, columns, cells_per_m = _grid(shape)
     half_m = np.array((columns // 2, rows // 2)) / cells_per_m
     corners = _CUBE * (*half_m, _STEP_M + _FADE_M)
-    camera_from_actor = camera.world_from_camera_transform.inverse() @ actor.world_from_actor.transform(
-        "world", "actor"
-    )
+    camera_from_actor = actor_from_camera.inverse()
     corners = corners @ camera_from_actor.rotation.T + camera_from_actor.translation_m
     seen = _before_camera(corners)
     if not len(seen) or seen[:, 2].min() > _FARTHEST_M:

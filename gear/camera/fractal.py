@@ -70,5 +70,11 @@ def smooth_step(value: npt.NDArray[np.float32], edge: float, width: float) -> np
     """A smooth step function from 0 to 1, elementwise: 0 up to `edge`, 1 from `edge + width` on, and a cubic polynomial
     in between.
     """
-    t = np.clip((value - edge) / width, 0, 1)
-    return np.asarray(t * t * (3 - 2 * t), dtype=np.float32)
+    t = value - np.float32(edge)
+    t *= np.float32(1 / width)
+    np.clip(t, 0, 1, out=t)
+    rise = np.float32(-2) * t
+    rise += 3
+    rise *= t
+    rise *= t
+    return np.asarray(rise, dtype=np.float32)

@@ -20,6 +20,9 @@ STRENGTH = 0.55
 _DIRECTIONS = 6
 _COARSE_WIDTH_PX = 700
 _BAND_ROWS = 64
+_NEAREST = 2.5
+"""Largest distance, in radii, by which a neighbour may lie in front of its pixel."""
+
 _MAX_REACH = 0.06
 """Largest distance of samples from their pixel, as a share of the picture's width."""
 
@@ -49,31 +52,29 @@ def openness(depth_m: FloatImage, focal_px: float) -> FloatImage:
         reach = np.minimum(focal_px / step * radius_m * inverse, _MAX_REACH * inverse.shape[1]).astype(np.float32)
         # Neighbours closer than a pixel and a half would be interpolated from the pixel itself.
         counts = (reach > 1.5) & (inverse > 0)
-        limit = radius_m * inverse
+        # Differences of 1/z over (1/z)² are metres along the view.
+        radius = np.maximum(radius_m * inverse * inverse, np.float32(1e-9))
+        scale, nearest = 1 / radius, inverse + np.float32(_NEAREST) * radius
         for turn in range(_DIRECTIONS):
             angle = math.pi * (turn + 0.5 * (radius_m == RADII_M[0])) / _DIRECTIONS
             across, down = reach * np.float32(math.cos(angle)), reach * np.float32(math.sin(angle))
-            hollow += _pair(inverse, columns, rows, across, down, limit) * counts
+            one, other = (
+                cv2.remap(inverse, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+                for at in ((columns + across, rows + down), (columns - across, rows - down))
+            )
+            is_near = np.maximum(one, other) < nearest
+            is_near &= counts
+            # Twice the distance by which the mean of the pair lies in front of the pixel, in radii.
+            bend = np.add(one, other, out=one)
+            bend -= inverse
+            bend -= inverse
+            bend *= scale
+            np.clip(bend, 0, 1, out=bend)
+            bend *= is_near
+            hollow += bend
     seen = 1 - np.float32(STRENGTH / (len(RADII_M) * _DIRECTIONS)) * hollow
     seen = cv2.blur(seen, (5, 5), borderType=cv2.BORDER_REPLICATE)
     return np.asarray(cv2.resize(seen, (width, height), interpolation=cv2.INTER_LINEAR), dtype=np.float32)
-
-
-def _pair(
-    inverse: FloatImage, columns: FloatImage, rows: FloatImage, across: FloatImage, down: FloatImage, limit: FloatImage
-) -> FloatImage:
-    """(h, w) 0..1: how far the mean of two opposite neighbours lies in front of the pixel, in units of half a
-    radius.
-    """
-    one, other = (
-        cv2.remap(inverse, columns + s * across, rows + s * down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        for s in (np.float32(1), np.float32(-1))
-    )
-    # Differences of 1/z over (1/z)² are metres along the view; `limit` carries the radius.
-    scale = 1 / np.maximum(limit * inverse, np.float32(1e-9))
-    bend = (np.float32(0.5) * (one + other) - inverse) * scale
-    nearest = (np.maximum(one, other) - inverse) * scale
-    return np.asarray(np.clip(2 * bend, 0, 1) * (nearest < 2.5), dtype=np.float32)
 
 
 def shade(linear_rgb: UInt16Image, share: npt.NDArray[np.float32]) -> UInt16Image:
