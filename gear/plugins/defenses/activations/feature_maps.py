@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -15,6 +16,13 @@ from gear.values.frames import UInt8Image
 
 PAPERS_DEEPEST = "ct1"
 """Layer of BiSeNet that Z-Mask's supplement uses for detection, although `ct0` is deeper."""
+
+
+class _AllMapsKept(BaseException):
+    """Ends a forward pass as soon as all wanted feature maps are kept.
+
+    It is no `Exception`, so that a network that handles its own errors does not catch it.
+    """
 
 
 def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[str]) -> dict[str, Tensor]:
@@ -34,6 +42,8 @@ def feature_maps(model: Model, views: Mapping[str, UInt8Image], names: Iterable[
 
 def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> dict[str, Tensor]:
     """Feature maps of a batch by name of the tap (the layer that is read), with gradients if torch records them.
+
+    The forward pass ends after the last of these layers: the rest of the network is not computed.
 
     Args:
         model: model with these taps.
@@ -60,12 +70,15 @@ def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> d
             # The output is copied, because a later layer may change it in place. Of several runs, the first counts.
             if isinstance(output, Tensor):
                 seen.setdefault(name, output[:count].to("cpu", torch.float32, copy=True))
+            if len(seen) == len(wanted):
+                raise _AllMapsKept
 
         return hook
 
     handles = [taps[name].register_forward_hook(keep(name)) for name in wanted]
     try:
-        model.forward(batch)
+        with contextlib.suppress(_AllMapsKept):
+            model.forward(batch)
     finally:
         for handle in handles:
             handle.remove()

@@ -80,7 +80,8 @@ def pooled_sizes(z: Tensor, grid: Cells, kernel: Cells) -> Tensor:
     down, across = (_window_means(*sizes) for sizes in zip(z.shape[1:], grid, kernel, strict=True))
     sizes = torch.zeros(len(down), len(across))
     for channels in torch.split(z, CHANNELS_AT_ONCE):
-        sizes += (down @ channels @ across.T).abs().sum(dim=0)
+        # In place, because a copy of the windows takes a sixth of the time.
+        sizes += (down @ channels @ across.T).abs_().sum(dim=0)
     return on_grid(sizes[None] / len(z), grid)[0]
 
 

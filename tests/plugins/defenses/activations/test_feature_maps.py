@@ -10,7 +10,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from gear.plugins.defenses.activations.feature_maps import deepest, feature_maps, spread
+from gear.plugins.defenses.activations.feature_maps import deepest, feature_maps, spread, tapped
 from gear.plugins.defenses.activations.twin_masks import patch_area
 from gear.plugins.defenses.activations.zmask_layers import layers_of, looks
 from gear.testing.defense_contract import noisy_patch, street_picture
@@ -61,6 +61,18 @@ def test_hooks_are_gone_afterwards() -> None:
     assert not any(module._forward_hooks for module in model.modules())
 
 
+@pytest.mark.parametrize(("names", "last"), [(["first"], "first"), (["second", "first"], "second")])
+def test_the_network_is_not_run_beyond_the_last_map(names: list[str], last: str) -> None:
+    model, run = Pair(), []
+    for name, layer in model.taps().items():
+        layer.register_forward_hook(lambda *_, name=name: run.append(name))
+    batch = {name: torch.rand(1, 3, 32, 64, requires_grad=True) for name in ("left", "right")}
+    maps = tapped(model, batch, names)
+    assert run[-1] == last
+    maps[last].square().sum().backward()
+    assert batch["left"].grad is not None and float(batch["left"].grad.abs().sum()) > 0
+
+
 def test_what_is_no_map_and_what_is_not_there_is_named() -> None:
     with pytest.raises(GearError, match=r"tap 'odd' gives no feature map"):
         feature_maps(Pair(), pair(), ["odd"])
@@ -101,7 +113,7 @@ def test_networks_of_the_paper_get_the_paper_s_layers() -> None:
     assert (other.shallow, other.deep) == (("stem",), ("stem", "decoder"))
     given = layers_of(Named("stem", "trunk"), ("trunk",), ())  # type: ignore[arg-type]
     assert (given.shallow, given.deep) == (("trunk",), ("stem", "trunk"))
-    with pytest.raises(GearError, match="none"):
+    with pytest.raises(GearError, match="no taps"):
         layers_of(Named(), (), ())  # type: ignore[arg-type]
 
 
