@@ -1,15 +1,17 @@
-"""Lists the sections of `docs/results` whose numbers were measured with other inputs: `python docs/stale_results.py`.
+"""Marks which numbers of `docs/results` are current: `python docs/stale_results.py`.
 
 Each section of results names the inputs that its numbers depend on, with a digest of each: `towns` (everything in
-`mjcf`), `models` and `patches` (the shipped files). A section whose digest differs from that of
-the files in this checkout is stale: measure its numbers again before you compare them with new ones. The index page of
-the results lists the stale sections; a test fails when the list is out of date.
+`mjcf`), `models` and `patches` (the shipped files). A section whose digests are not those of the files in this checkout
+is stale: its numbers describe an earlier state, and have to be measured again before they are compared with new ones.
+The script writes the line *State* of each section, and the tables of current and of earlier sections on the index page
+of the results. A test fails if they are out of date.
 
 `python docs/stale_results.py digests [COMMIT]` prints the digests of this checkout, or of a commit, for a new section.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import re
 import subprocess
@@ -31,8 +33,9 @@ INPUTS = {
 IGNORED = {".md", ".pyc"}
 """Files on which no number depends."""
 
-BEGIN, END = "<!-- stale: written by docs/stale_results.py -->", "<!-- end of stale -->"
+BEGIN, END = "<!-- states: written by docs/stale_results.py -->", "<!-- end of states -->"
 LINE = re.compile(r"^- \*\*Inputs:\*\* (.*)$", re.MULTILINE)
+STATE = re.compile(r"^- \*\*State:\*\* .*\n", re.MULTILINE)
 DIGEST = re.compile(r"(\w+) `([0-9a-f]{8})`")
 
 
@@ -57,6 +60,7 @@ def digest_at(commit: str, folder: str) -> str:
     return _digest_of([(path.removeprefix(f"{folder}/"), facts.split()[2]) for facts, path in lines])
 
 
+@functools.cache
 def current() -> dict[str, str]:
     """Digests of this checkout by input."""
     return {name: digest(ROOT / folder) for name, folder in INPUTS.items()}
@@ -81,17 +85,41 @@ def sections() -> Iterator[tuple[Path, str, dict[str, str]]]:
             yield page, heading, inputs
 
 
-def index() -> str:
-    """The index page with the list of stale sections."""
+def changed(inputs: dict[str, str]) -> list[str]:
+    """The inputs of a section that are not those of this checkout."""
     now = current()
-    rows = []
+    return [name for name, value in inputs.items() if value != now[name]]
+
+
+def marked(page: Path) -> str:
+    """The text of a page of results with the line *State* of each section."""
+    start, *rest = re.split(r"^(?=## )", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    found = [inputs for path, _, inputs in sections() if path == page]
+    return start + "".join(_with_state(section, inputs) for section, inputs in zip(rest, found, strict=True))
+
+
+def _with_state(section: str, inputs: dict[str, str]) -> str:
+    other = changed(inputs)
+    state = f"**earlier**; since this measurement, these inputs have changed: {', '.join(other)}" if other else "current"
+    return LINE.sub(lambda line: f"{line[0]}\n- **State:** {state}", STATE.sub("", section))
+
+
+def index() -> str:
+    """The index page with the tables of current and of earlier sections."""
+    current_rows, earlier_rows = [], []
     for page, heading, inputs in sections():
-        changed = [name for name, value in inputs.items() if value != now[name]]
-        if changed:
-            rows.append(f"| [{page.stem}]({page.name}) | {heading} | {', '.join(changed)} |")
-    table = ["| page | section | inputs that changed since |", "|---|---|---|", *rows] if rows else ["None."]
+        row = f"| [{page.stem}]({page.name}) | {heading} |"
+        other = changed(inputs)
+        if other:
+            earlier_rows.append(f"{row} {', '.join(other)} |")
+        else:
+            current_rows.append(row)
+    tables = [
+        "", "### Current", "", "| page | section |", "|---|---|", *current_rows,
+        "", "### Earlier", "", "| page | section | inputs that changed since |", "|---|---|---|", *earlier_rows, "",
+    ]  # fmt: skip
     before, _, rest = INDEX.read_text(encoding="utf-8").partition(BEGIN)
-    return "\n".join([before + BEGIN, "", *table, "", END + rest.partition(END)[2]])
+    return "\n".join([before + BEGIN, *tables, END + rest.partition(END)[2]])
 
 
 def _digest_of(entries: list[tuple[str, str]]) -> str:
@@ -103,4 +131,5 @@ if __name__ == "__main__":
         at = {name: digest_at(sys.argv[2], folder) for name, folder in INPUTS.items()} if sys.argv[2:] else current()
         print(", ".join(f"{name} `{value}`" for name, value in at.items()))
     else:
-        INDEX.write_text(index(), encoding="utf-8")
+        for page in sorted(RESULTS.glob("*.md")):
+            page.write_text(index() if page == INDEX else marked(page), encoding="utf-8")

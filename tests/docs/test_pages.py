@@ -45,7 +45,7 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
 
 
 RESULTS = [page for page in pages() if page.parent.name == "results" and page.stem != "index"]
-LINES = ("Date", "Commit", "Machine", "Command", "Inputs")
+LINES = ("Date", "Commit", "Machine", "Command", "Inputs", "State")
 
 
 @pytest.mark.parametrize("page", RESULTS, ids=lambda page: page.stem)
@@ -54,7 +54,7 @@ def test_every_section_of_results_says_where_its_figures_come_from(page: Path) -
     assert sections
     for section in sections:
         heading, *lines = section.splitlines()
-        found = [re.match(r"- \*\*(\w+):\*\* \S", line) for line in lines[1:6]]
+        found = [re.match(r"- \*\*(\w+):\*\* \S", line) for line in lines[1:7]]
         assert [match and match[1] for match in found] == list(LINES), heading
         assert re.search(r"\d{4}-\d{2}-\d{2}", lines[1]) and re.search(r"\b[0-9a-f]{8}\b", lines[2]), heading
 
@@ -78,8 +78,10 @@ def test_commits_of_results_are_in_the_history() -> None:
     assert [line for line in answer.splitlines() if " commit " not in line] == []
 
 
-def test_the_list_of_stale_figures_is_fresh() -> None:
+def test_every_section_of_results_says_whether_it_is_current() -> None:
     made = runpy.run_path(str(DOCS / "stale_results.py"))
+    for page in RESULTS:
+        assert page.read_text(encoding="utf-8") == made["marked"](page), "run: python docs/stale_results.py"
     assert made["INDEX"].read_text(encoding="utf-8") == made["index"](), "run: python docs/stale_results.py"
 
 
