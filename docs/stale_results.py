@@ -100,7 +100,7 @@ def marked(page: Path) -> str:
 
 def _with_state(section: str, inputs: dict[str, str]) -> str:
     other = changed(inputs)
-    state = f"**earlier**; since this measurement, these inputs have changed: {', '.join(other)}" if other else "current"
+    state = f"**earlier**; these inputs have changed since: {', '.join(other)}" if other else "current"
     return LINE.sub(lambda line: f"{line[0]}\n- **State:** {state}", STATE.sub("", section))
 
 
