@@ -22,7 +22,7 @@ Graph = dict[str, set[str]]
 
 ROOMS: dict[str, tuple[float, str, str]] = {
     "cli": (0.62, "command line", "one small file per command: reads arguments, calls the verb, prints"),
-    "verbs": (0.62, "what a user does", "`collect`, `train`, `attack`, `evaluate`, `gap`, `bench` and the other verbs"),
+    "verbs": (0.62, "what a user does", "`collect`, `train`, `attack`, `evaluate`, `gap`, `bench`, `drive` and more"),
     "view": (0.81, "HTML page", "the page that `gear view` writes"),
     "envs": (0.3, "Gymnasium", "environments in which a policy drives the ego car of the closed loop"),
     "driving": (

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from gear.verbs.collect.run import collect
     from gear.verbs.defend.run import DefendReport, defend
     from gear.verbs.doctor import DoctorReport, doctor
+    from gear.verbs.drive.report import DriveReport
+    from gear.verbs.drive.run import drive
     from gear.verbs.evaluate.report import EvaluateReport
     from gear.verbs.evaluate.run import evaluate
     from gear.verbs.export import export
@@ -54,6 +56,7 @@ __all__ = [
     "Dataset",
     "DefendReport",
     "DoctorReport",
+    "DriveReport",
     "EvaluateReport",
     "GapReport",
     "GearError",
@@ -75,6 +78,7 @@ __all__ = [
     "convert_weights",
     "defend",
     "doctor",
+    "drive",
     "evaluate",
     "export",
     "gap",
@@ -100,6 +104,7 @@ _HOME = {
     "Dataset": "gear.plugins.datasets",
     "DefendReport": "gear.verbs.defend.run",
     "DoctorReport": "gear.verbs.doctor",
+    "DriveReport": "gear.verbs.drive.report",
     "EvaluateReport": "gear.verbs.evaluate.report",
     "GapReport": "gear.measuring.gap.report",
     "GearError": "gear.values.errors",
@@ -121,6 +126,7 @@ _HOME = {
     "convert_weights": "gear.verbs.weights.convert",
     "defend": "gear.verbs.defend.run",
     "doctor": "gear.verbs.doctor",
+    "drive": "gear.verbs.drive.run",
     "evaluate": "gear.verbs.evaluate.run",
     "export": "gear.verbs.export",
     "gap": "gear.verbs.gap.run",

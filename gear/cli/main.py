@@ -30,6 +30,7 @@ COMMANDS: dict[str, str] = {
     "evaluate": "measure a model, with or without a defense, on datasets, and compare twins",
     "bench": "run a benchmark of networks, defenses, scenes and patches, and write a report",
     "leaderboard": "check records of benchmark results, and make a leaderboard of them",
+    "drive": "drive cars in the closed loop with and without patches, and write a report",
     "verify": "check every file of a dataset, and make damaged samples again",
     "merge": "join the shards of one collection into one dataset",
     "export": "write a dataset in the layout of another tool",

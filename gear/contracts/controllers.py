@@ -91,8 +91,7 @@ class Observation:
         lane_width_m: width of the lane.
         cameras: cameras of the rig with their intrinsics and poses on the car; the first is the reference camera.
         prediction: prediction of the network in the format of its task; None for controllers without a network.
-        views: (H, W, 3) uint8 pictures by camera name, as the network sees them; empty unless the spec says
-            `needs_views`.
+        views: (H, W, 3) uint8 pictures by camera name, before any defense; empty unless the spec says `needs_views`.
         obstacles: the true positions of all other road users; empty unless the spec says `needs_truth`.
     """
 

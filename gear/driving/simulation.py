@@ -162,6 +162,22 @@ class DriveSimulation:
         return self._current[1]
 
     @property
+    def ids(self) -> Mapping[str, int]:
+        """Ids of all road users of the drive in progress, by body; the ego car has 1."""
+        return self._current[0].ids
+
+    @property
+    def assets(self) -> dict[str, str]:
+        """Names of the assets of all road users of the drive in progress, by body."""
+        return {body: spawn.actor_type.facts.name for body, spawn in self.start.road_users.spawns.items()}
+
+    @property
+    def scripted_id(self) -> int | None:
+        """Id of the road user that follows the scenario's script; None on a free road."""
+        scripted = self.start.lead or self.start.walker
+        return None if scripted is None else self.ids[scripted.body]
+
+    @property
     def _current(self) -> tuple[_Drive, Situation]:
         assert self._drive is not None and self._situation is not None, "call reset first"
         return self._drive, self._situation

@@ -22,8 +22,8 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 
 FENCES = {
-    "sh run", "sh", "python", "python parse", "yaml collection", "yaml scenes", "yaml camera", "yaml bench", "xml",
-    "text",
+    "sh run", "sh", "python", "python parse", "yaml collection", "yaml scenes", "yaml camera", "yaml bench",
+    "yaml drive", "yaml scenarios", "xml", "text",
 }  # fmt: skip
 
 DIRECTIVES = ("{",)

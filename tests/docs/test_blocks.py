@@ -20,6 +20,9 @@ from gear.cli.parser import Parser
 from gear.config.load import load_collection
 from gear.config.nodes import parse_file
 from gear.config.reader import read_node
+from gear.driving.config import DriveConfig
+from gear.driving.drives import plan_drives
+from gear.driving.scenario import load_scenarios
 from gear.world.scene_spec import SceneLibrary
 from tests.docs.blocks import FENCES, ROOT, Block, all_blocks, blocks_of, commands, pages
 
@@ -33,6 +36,20 @@ def test_every_block_says_what_it_is() -> None:
     strange = [f"{block}: {block.fence or '(no fence)'}" for page in pages() for block in blocks_of(page)
                if block.fence not in FENCES]  # fmt: skip
     assert not strange
+
+
+@pytest.mark.parametrize("block", all_blocks("yaml drive"), ids=str)
+def test_drive_configs_can_be_planned(block: Block, tmp_path: Path) -> None:
+    path = tmp_path / "drive.yml"
+    path.write_text(block.text)
+    assert plan_drives(read_node(DriveConfig, parse_file(path)), tmp_path).runs
+
+
+@pytest.mark.parametrize("block", all_blocks("yaml scenarios"), ids=str)
+def test_scenarios_can_be_read(block: Block, tmp_path: Path) -> None:
+    path = tmp_path / "scenarios.yml"
+    path.write_text(block.text)
+    assert load_scenarios(str(path)).scenarios
 
 
 @pytest.mark.parametrize("block", all_blocks("sh"), ids=str)

@@ -16,6 +16,7 @@ from gear.contracts.tasks import NO_PATCH
 from gear.dataset.files import read_bytes
 from gear.formats.png import decode_rgb
 from gear.plugins.datasets import open_dataset
+from gear.reporting.report_page import report_page
 from gear.values.frames import UInt8Image
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.plan import Plan, Weather
@@ -26,18 +27,6 @@ from gear.verbs.bench.validation import Contest
 
 PICTURE_PX, PATCH_PX, QUALITY = 560, 220, 82
 """Width of pictures and width of patches in pixels, and JPEG quality of both."""
-
-STYLE = """
-body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, "Noto Sans", sans-serif; color: #1b2027; background: #fff;
-  max-width: 76rem; margin: 2rem auto; padding: 0 1.25rem; }
-h1 { font-size: 1.5rem; margin: 0 0 .25rem; } h2 { font-size: 1.15rem; margin: 2.5rem 0 .5rem; }
-h3 { font-size: .95rem; margin: 1.5rem 0 .5rem; } p { margin: .25rem 0; } .dim { color: #5b6672; }
-.wide { overflow-x: auto; } table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; padding: .25rem .7rem; white-space: nowrap; } th { border-bottom: 2px solid #1b2027; }
-tr.first td { border-top: 1px solid #c5ccd4; } img { max-width: 100%; height: auto; }
-.row { display: flex; flex-wrap: wrap; gap: .75rem; align-items: flex-start; } figure { margin: 0; }
-figcaption { font-size: .8rem; color: #5b6672; } .row img { border: 1px solid #c5ccd4; display: block; }
-"""
 
 
 def page(report: BenchReport, plan: Plan) -> str:
@@ -58,13 +47,7 @@ def page(report: BenchReport, plan: Plan) -> str:
             name = _safe(f"bars of {task.metric.title} by network, defense and patch")
             parts.append(f'<p><img alt="{name}" src="data:image/svg+xml;base64,{drawn}"></p>')
         parts += [_scenes(task), *_pictures(plan, contest)]
-    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
-    return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>gear bench</title>\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head>\n'
-        f"<body><h1>gear bench</h1>\n" + "\n".join(parts) + "\n</body></html>\n"
-    )
+    return report_page("gear bench", parts)
 
 
 def _table(task: TaskResult) -> str:

@@ -1,0 +1,112 @@
+"""The config of `gear drive`: who drives, where, through which scenarios, and against which patches."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from gear.config.collection import MOST_CROWDED, WeatherConfig
+from gear.config.nodes import Mapping, Node, Place
+from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
+from gear.values.errors import FieldError
+from gear.values.serial import PLACES
+
+LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+PATCH = "patch"
+"""Name of the twin that shows the patch of the driver."""
+
+TWINS = (NO_PATCH, RANDOM_PATCH, PATCH)
+
+
+def _nothing() -> Node:
+    return Mapping({}, Place("defaults"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Driver:
+    """One driver: a controller, with the network and the defense through which it sees.
+
+    Attributes:
+        controller: name of the controller plugin.
+        set: options of the controller.
+        task: task whose cameras and predictions are used; empty for the first task that the controller reads.
+        options: options of the task, such as the size of the pictures.
+        model: name of the network; empty for a controller without a network.
+        model_set: options of the network, such as `weights`.
+        defense: name of a defense in front of the network; empty for none.
+        defense_set: options of the defense.
+        calibration, calibration_patched: datasets from which the defense learns; empty for none.
+        patch: the patch of the twin `patch`: a picture, a patch folder, or the name of an installed patch. `{town}`,
+            `{scene}` and `{model}` stand for the names of town, scene and network. Empty for no such twin.
+    """
+
+    controller: str
+    set: Node = field(default_factory=_nothing)
+    task: str = ""
+    options: Node = field(default_factory=_nothing)
+    model: str = ""
+    model_set: Node = field(default_factory=_nothing)
+    defense: str = ""
+    defense_set: Node = field(default_factory=_nothing)
+    calibration: str = ""
+    calibration_patched: str = ""
+    patch: str = ""
+    places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)
+
+    def __post_init__(self) -> None:
+        if self.defense and not self.model:
+            raise FieldError("defense", "protects a network, and the driver has none; name one with `model`")
+        if self.patch and not (self.model or self.task):
+            raise FieldError("patch", "is seen by nobody: the driver has no network and no cameras (`model`, `task`)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveConfig:
+    """The config of a study in the closed loop.
+
+    Attributes:
+        drivers: drivers by name.
+        towns: names of scenes, by town.
+        scenarios: speeds of the ego car in km/h, by name of the scenario; an empty list means the speeds of the
+            library. Empty for all scenarios of the library.
+        library: name or path of the library of scenarios.
+        twins: `none`, `random` and `patch`; drivers without cameras drive only `none`.
+        repeats: number of drives of each driver, place, scenario, speed and twin, with different seeds.
+        seed: seed of the first drive.
+        weather: a weather preset, or a preset and the parameters that differ from it.
+        crowd: factor on the scene's numbers of other vehicles and people, 0 to 10.
+        collect: further settings of the pictures, such as `quality`; the keys are those of `gear show-config`.
+        places: file, line and column of each given value, by key.
+    """
+
+    drivers: dict[str, Driver]
+    towns: dict[str, tuple[str, ...]]
+    scenarios: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    library: str = "standard"
+    twins: tuple[str, ...] = TWINS
+    repeats: int = 1
+    seed: int = 0
+    weather: WeatherConfig = field(default_factory=WeatherConfig)
+    crowd: float = 0.5
+    collect: Node = field(default_factory=_nothing)
+    places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)
+
+    def __post_init__(self) -> None:
+        for name, what in (("drivers", "driver"), ("towns", "town"), ("twins", "twin")):
+            if not getattr(self, name):
+                raise FieldError(name, f"names no {what}")
+        for label in self.drivers:
+            if not LABEL.fullmatch(label):
+                raise FieldError("drivers", f"{label!r} names folders and rows: letters, digits, `_`, `.` and `-`")
+        for town, scenes in self.towns.items():
+            if not scenes:
+                raise FieldError("towns", f"{town} names no scene")
+        for twin in self.twins:
+            if twin not in TWINS:
+                raise FieldError("twins", f"must be among {', '.join(TWINS)}, got {twin!r}")
+        if not 1 <= self.repeats <= 10_000:
+            raise FieldError("repeats", f"must be 1 to 10000, got {self.repeats}")
+        if self.seed < 0:
+            raise FieldError("seed", f"must not be negative, got {self.seed}")
+        if not 0 <= self.crowd <= MOST_CROWDED:
+            raise FieldError("crowd", f"must be 0 to {MOST_CROWDED:g}, got {self.crowd:g}")

@@ -1,0 +1,278 @@
+"""What each worker of a study does: opens places and networks, drives, and writes the folder of each drive."""
+
+from __future__ import annotations
+
+import contextlib
+import traceback
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from gear.collecting.job import Job, resolve
+from gear.collecting.lookup import look_up
+from gear.collecting.session import Session, open_session
+from gear.contracts.executors import MOST_FAILURES, Outcome, Report
+from gear.contracts.rendering import RendererInfo
+from gear.dataset.claims import Claims
+from gear.dataset.files import explained, write_alone
+from gear.dataset.guarded_paths import owned, remove_tree
+from gear.dataset.sealed_json import load_sealed, sealed_json
+from gear.dataset.whole_tree import whole_tree
+from gear.driving.drives import Cast, DriveRun, Drives
+from gear.driving.log import log_bytes, log_hash
+from gear.driving.loop import Sight, Wheel, drive
+from gear.driving.measures import Measures, measure
+from gear.driving.simulation import DriveSimulation
+from gear.driving.start import Draw
+from gear.measuring.calibration import NOTHING, opened_calibration
+from gear.measuring.guard import OpenedGuard
+from gear.measuring.guarded_model import GuardedModel
+from gear.plugins.build import build
+from gear.plugins.text import one_line
+from gear.values.errors import DatasetError, GearError, PlacementError
+from gear.values.serial import Json, from_json, to_json
+from gear.world.compilation.world_cache import load_or_compile
+from gear.world.scene_spec import SceneSpec
+
+LEAST_POOL = 4
+"""Smallest number of other vehicles and of people that a world can show, so that scenarios find their actors."""
+
+RESULT, LOG = "result.json", "log.jsonl"
+"""Names of the files in the folder of a drive."""
+
+CLAIMS = "drives"
+"""Name under which workers claim drives."""
+
+NOT_OF_A_DRIVE = (DatasetError, OSError, MemoryError)
+"""Errors of the disk and of the machine's limits, which end the study because they do not concern a single drive."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveResult:
+    """The result of one drive.
+
+    Attributes:
+        run: the drive.
+        measures: its measures.
+        log_sha256: hash of its log; equal drives have equal hashes.
+        patch: label of the patch that the scene showed.
+        weights_sha256: hash of the network's weights; None without a network.
+        renderer: the renderer with its driver and device; None where nothing was rendered.
+    """
+
+    run: DriveRun
+    measures: Measures
+    log_sha256: str
+    patch: str
+    weights_sha256: str | None = None
+    renderer: RendererInfo | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Place:
+    """A place in which drives of one driver take place."""
+
+    simulation: DriveSimulation
+    session: Session | None
+    job: Job | None
+
+
+@dataclass(slots=True, eq=False, kw_only=True)
+class _Workshop:
+    """The place and the network that were opened last; runs are ordered so that they rarely change."""
+
+    drives: Drives
+    place_key: tuple[str, str, str] | None = None
+    place: _Place | None = None
+    open_places: contextlib.ExitStack = field(default_factory=contextlib.ExitStack)
+    model_key: str = ""
+    model: GuardedModel | None = None
+
+    def place_of(self, run: DriveRun) -> _Place:
+        """World, simulation and renderer of a drive."""
+        cast = self.drives.casts[run.driver]
+        key = (f"{cast.task} {cast.driver.options}" if cast.task else "", run.town, run.scene)
+        if key != self.place_key:
+            self.open_places.close()
+            self.place_key, self.place = key, self._opened(run, cast)
+        assert self.place is not None
+        return self.place
+
+    def _opened(self, run: DriveRun, cast: Cast) -> _Place:
+        config = self.drives.collection(run)
+        if not cast.task:
+            named = look_up(config)
+            scene = named.scene
+            world = load_or_compile(
+                town=config.town, scene_name=config.scene, scene=with_pool(scene), weather=named.weather
+            )
+            return _Place(simulation=DriveSimulation(world, with_any_number(scene)), session=None, job=None)
+        job = resolve(config)
+        session = self.open_places.enter_context(open_session(replace(job, scene=with_pool(job.scene))))
+        simulation = DriveSimulation(session.world, with_any_number(job.scene))
+        return _Place(simulation=simulation, session=session, job=job)
+
+    def model_of(self, cast: Cast) -> GuardedModel | None:
+        """The network of a driver, with its defense; None without one."""
+        if cast.model is None:
+            return None
+        if self.model is None or self.model_key != cast.label:
+            self.model = GuardedModel(cast.model, _guard(cast), seed=self.drives.config.seed)
+            self.model_key = cast.label
+        return self.model
+
+
+def with_pool(scene: SceneSpec) -> SceneSpec:
+    """The scene of a world that has enough actors for scripted road users."""
+    return replace(
+        scene,
+        npc_vehicles=replace(scene.npc_vehicles, count=(0, max(LEAST_POOL, scene.npc_vehicles.count[1]))),
+        pedestrians=replace(scene.pedestrians, count=(0, max(LEAST_POOL, scene.pedestrians.count[1]))),
+    )
+
+
+def with_any_number(scene: SceneSpec) -> SceneSpec:
+    """The scene without smallest counts of road users, since the lane of the ego car is kept free."""
+    return replace(
+        scene,
+        npc_vehicles=replace(scene.npc_vehicles, count=(0, scene.npc_vehicles.count[1])),
+        pedestrians=replace(scene.pedestrians, count=(0, scene.pedestrians.count[1])),
+    )
+
+
+def _guard(cast: Cast) -> OpenedGuard:
+    if cast.defense is None or cast.model is None:
+        return OpenedGuard()
+    driver = cast.driver
+    calibration = NOTHING
+    if driver.calibration:
+        patched = driver.calibration_patched or None
+        calibration = opened_calibration(driver.calibration, patched, [cast.model], driver.defense)
+    return OpenedGuard(defense=cast.defense, calibration=calibration)
+
+
+def drive_all(drives: Drives, indices: Iterator[int], report: Report) -> None:
+    """Runs in one worker: makes drives one after another, and reports the outcome of each.
+
+    Args:
+        drives: the study.
+        indices: indices of the drives; those that another run has made or claimed are not made.
+        report: called with the outcome of each drive.
+
+    Raises:
+        GearError: a file cannot be written.
+    """
+    shop = _Workshop(drives=drives)
+    in_row = 0
+    with shop.open_places, Claims(drives.root, CLAIMS) as claims, single_thread(drives):
+        for index in indices:
+            if not claims.take(index):
+                report(Outcome(index=index, kind="elsewhere"))
+                continue
+            outcome = _outcome(shop, index)
+            claims.release(index)
+            in_row = in_row + 1 if outcome.kind == "failed" and not outcome.is_final else 0
+            report(outcome)
+            if in_row >= MOST_FAILURES:
+                return
+
+
+def _outcome(shop: _Workshop, index: int) -> Outcome:
+    """Makes one drive, unless it is there.
+
+    Raises:
+        DatasetError, OSError, MemoryError: a file cannot be written, or a limit of the machine is reached.
+    """
+    try:
+        return Outcome(index=index, kind="made" if _made(shop, shop.drives.runs[index]) else "elsewhere")
+    except NOT_OF_A_DRIVE:
+        raise
+    except Exception as error:
+        text = str(error) if isinstance(error, GearError) else one_line(error)
+        trace = "".join(traceback.format_exception(error))
+        is_final = isinstance(error, PlacementError)
+        return Outcome(index=index, kind="failed", error=text, trace=trace, is_final=is_final)
+
+
+def _made(shop: _Workshop, run: DriveRun) -> bool:
+    """Makes a drive and writes its folder; returns False if it is there already."""
+    drives = shop.drives
+    cast = drives.casts[run.driver]
+    place = shop.place_of(run)
+    patch = drives.patch(run, 0 if place.session is None else len(place.session.world.faces))
+    folder = drives.folder(run, patch)
+    if read_result(drives.root, folder) is not None:
+        return False
+    model, sight = shop.model_of(cast), None
+    if place.session is not None and place.job is not None:
+        session = replace(place.session, job=replace(place.session.job, patch=patch))
+        sight = Sight(session=session, rig=session.task.rig(), model=model)
+    wheel = Wheel(plugin=cast.controller.found, controller=build(cast.controller.found, cast.controller.options))
+    draw = Draw(name=run.scenario, scenario=drives.scenario(run), speed_mps=run.speed_kmh / 3.6, seed=run.seed)
+    log = drive(place.simulation, draw, wheel, sight)
+    data = log_bytes(log)
+    result = DriveResult(
+        run=run,
+        measures=measure(log),
+        log_sha256=log_hash(data),
+        patch=patch.label,
+        weights_sha256=None if model is None else model.weights_sha256,
+        renderer=None if place.job is None else place.job.renderer,
+    )
+    content = sealed_json({"identity": drives.identity(run, patch), "result": to_json(result)})
+    _write(drives.root, folder, {LOG: data, RESULT: content})
+    return True
+
+
+def _write(root: Path, folder: str, files: Mapping[str, bytes]) -> None:
+    """Writes the folder of a drive, which appears whole; a damaged one is replaced.
+
+    Raises:
+        DatasetError: a file cannot be written.
+    """
+    target = owned(root, folder)
+    if target.exists():
+        remove_tree(root, folder)
+    with explained(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+    with whole_tree(target, "drive") as unfinished:
+        for name, data in files.items():
+            write_alone(unfinished / name, data)
+
+
+def read_result(root: Path, folder: str) -> DriveResult | None:
+    """The result of a drive; None if it is not there, or its log does not have the hash that the result names.
+
+    Raises:
+        DatasetError: the result is damaged, or cannot be read.
+    """
+    path = root / folder / RESULT
+    if not path.is_file():
+        return None
+    content: Json = load_sealed(path)
+    result = from_json(DriveResult, content["result"], str(path))
+    log = root / folder / LOG
+    if not log.is_file() or log_hash(log.read_bytes()) != result.log_sha256:
+        return None
+    return result
+
+
+@contextlib.contextmanager
+def single_thread(drives: Drives) -> Iterator[None]:
+    """A context in which torch uses one thread, so that a network's numbers do not depend on the number of cores. Does
+    nothing if no driver has a network.
+    """
+    if all(cast.model is None for cast in drives.casts.values()):
+        yield
+        return
+    import torch
+
+    from gear.networks.runtime import prepare
+
+    prepare()
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

@@ -1,0 +1,37 @@
+"""The frame of a report as one self-contained HTML page: style sheet, policy, heading."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable
+
+STYLE = """
+body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, "Noto Sans", sans-serif; color: #1b2027; background: #fff;
+  max-width: 76rem; margin: 2rem auto; padding: 0 1.25rem; }
+h1 { font-size: 1.5rem; margin: 0 0 .25rem; } h2 { font-size: 1.15rem; margin: 2.5rem 0 .5rem; }
+h3 { font-size: .95rem; margin: 1.5rem 0 .5rem; } p { margin: .25rem 0; } .dim { color: #5b6672; }
+.wide { overflow-x: auto; } table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; padding: .25rem .7rem; white-space: nowrap; } th { border-bottom: 2px solid #1b2027; }
+tr.first td { border-top: 1px solid #c5ccd4; } img { max-width: 100%; height: auto; }
+.row { display: flex; flex-wrap: wrap; gap: .75rem; align-items: flex-start; } figure { margin: 0; }
+figcaption { font-size: .8rem; color: #5b6672; } .row img { border: 1px solid #c5ccd4; display: block; }
+"""
+
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+"""Content policy of the page: no scripts, no connections; pictures are inside the page."""
+
+
+def report_page(title: str, parts: Iterable[str]) -> str:
+    """The whole page as HTML text.
+
+    Args:
+        title: title and heading; it is escaped.
+        parts: HTML of the body, one element each.
+    """
+    safe = html.escape(title, quote=True)
+    return (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{safe}</title>\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head>\n'
+        f"<body><h1>{safe}</h1>\n" + "\n".join(parts) + "\n</body></html>\n"
+    )

@@ -1,0 +1,36 @@
+"""The report of a study in the closed loop as one self-contained HTML page."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+
+from gear.reporting.report_page import report_page
+from gear.verbs.drive.report import DriveReport
+from gear.verbs.drive.table import cells, legend, speed_cells
+
+
+def page(report: DriveReport) -> str:
+    """The whole page as HTML text. Names from configs are escaped, and the page has no scripts."""
+    parts = [f'<p class="dim">{html.escape(legend())}.</p>']
+    parts += ["<h2>Drivers, scenarios and twins</h2>", table(cells(report), 3)]
+    parts += ["<h2>By speed</h2>", table(speed_cells(report), 2)]
+    if report.failed:
+        failed = "".join(f"<li>{html.escape(title)}: {html.escape(problem)}</li>" for title, problem in report.failed)
+        parts.append(f"<h2>Drives that could not be made</h2><ul>{failed}</ul>")
+    return report_page("gear drive", parts)
+
+
+def table(rows: Sequence[Sequence[str]], named: int) -> str:
+    """An HTML table; cells of the first `named` - 1 columns that repeat the row above are left empty."""
+    head, *body = rows
+    top = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
+    lines, before = [], [""] * named
+    for row in body:
+        kept = next((i for i in range(named) if row[i] != before[i]), named)
+        shown = ["" if i < min(kept, named - 1) else cell for i, cell in enumerate(row)]
+        marked = " class=first" * (kept < named - 1)
+        lines.append(f"<tr{marked}>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in shown) + "</tr>")
+        before = list(row[:named])
+    inner = "\n".join(lines)
+    return f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>\n{inner}\n</tbody></table></div>'

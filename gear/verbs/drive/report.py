@@ -1,0 +1,229 @@
+"""The results of a study in the closed loop: rows of drives, exact intervals, and paired tests between twins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
+from gear.driving.worker import DriveResult
+from gear.measuring.intervals import CONFIDENCE, Interval
+from gear.values.serial import Json, to_json
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rate:
+    """A share of drives with its exact interval.
+
+    Attributes:
+        count, total: number of drives with the property, and of all drives.
+        interval: 95 % interval of Clopper and Pearson (Biometrika 1934); None without drives.
+    """
+
+    count: int
+    total: int
+    interval: Interval | None
+
+    @staticmethod
+    def of(flags: Iterable[bool]) -> Rate:
+        """The share of True among flags."""
+        from scipy import stats
+
+        values = list(flags)
+        if not values:
+            return Rate(count=0, total=0, interval=None)
+        exact = stats.binomtest(sum(values), len(values)).proportion_ci(CONFIDENCE, method="exact")
+        return Rate(count=sum(values), total=len(values), interval=(float(exact.low), float(exact.high)))
+
+    @property
+    def value(self) -> float:
+        """The share; NaN without drives."""
+        return self.count / self.total if self.total else math.nan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paired:
+    """The comparison of a twin with another twin over the same situations.
+
+    Attributes:
+        other: name of the other twin.
+        pairs: number of situations that both have driven.
+        only_here, only_there: situations in which only this twin, or only the other twin, crashed.
+        p: two-sided p of McNemar's exact test: how often chance alone gives crashes as unequal as these.
+        braking_delay_s: mean delay of the first braking, over situations in which both braked; None without any.
+        score: mean difference of the driving score.
+    """
+
+    other: str
+    pairs: int
+    only_here: int
+    only_there: int
+    p: float
+    braking_delay_s: float | None
+    score: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """All drives of one driver, scenario and twin, over all places, speeds and seeds.
+
+    Attributes:
+        driver, scenario, twin: what the drives have in common.
+        speed_kmh: their speed; None for all speeds together.
+        crashes: share of drives that ended in a crash.
+        impact_mps: mean impact speed of the crashes; None without a crash.
+        least_distance_m: mean of the least distances; None if no road user was there.
+        least_ttc_s: mean of the least times to collision; None if nothing was approached.
+        phantoms: share of drives with a phantom braking.
+        off_road: share of drives that left the lane.
+        lateral_peak_m: mean of the largest distances from the centre line.
+        jerk_rms_mps3: mean of the root mean square jerks.
+        score: mean driving score.
+        paired: comparisons with the twins `none` and `random`.
+    """
+
+    driver: str
+    scenario: str
+    twin: str
+    speed_kmh: float | None
+    crashes: Rate
+    impact_mps: float | None
+    least_distance_m: float | None
+    least_ttc_s: float | None
+    phantoms: Rate
+    off_road: Rate
+    lateral_peak_m: float
+    jerk_rms_mps3: float
+    score: float
+    paired: tuple[Paired, ...] = ()
+
+
+Key = tuple[str, str, str, float | None]
+"""Driver, scenario, twin and speed of a row."""
+
+Groups = dict[Key, list[DriveResult]]
+ALL = "all"
+"""Name of the row over all scenarios that have something in the way."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class DriveReport:
+    """The results of a study.
+
+    Attributes:
+        out: folder of the results.
+        results: the result of each drive.
+        failed: drives that could not be made, with the reason.
+        facts: config and versions, as JSON.
+        free: names of the scenarios without anything in the way.
+    """
+
+    out: Path
+    results: tuple[DriveResult, ...]
+    failed: tuple[tuple[str, str], ...]
+    facts: Json
+    free: frozenset[str] = frozenset()
+
+    def rows(self) -> list[Row]:
+        """One row for each driver, scenario and twin, and one over all scenarios that are not free roads."""
+        return self._grouped(lambda one: (one.run.driver, one.run.scenario, one.run.twin, None))
+
+    def by_speed(self) -> list[Row]:
+        """One row for each driver, twin and speed, over all scenarios that are not free roads."""
+        return self._grouped(lambda one: (one.run.driver, ALL, one.run.twin, one.run.speed_kmh), with_free=False)
+
+    def as_json(self) -> Json:
+        """The report as JSON: facts, rows, rows by speed, drives, failures."""
+        return {
+            "facts": self.facts,
+            "rows": [_known(to_json(row)) for row in self.rows()],
+            "by_speed": [_known(to_json(row)) for row in self.by_speed()],
+            "drives": [to_json(one) for one in self.results],
+            "failed": [{"drive": title, "problem": problem} for title, problem in self.failed],
+        }
+
+    def _grouped(self, key: Callable[[DriveResult], Key], *, with_free: bool = True) -> list[Row]:
+        groups: Groups = {}
+        for one in self.results:
+            driver, scenario, twin, speed_kmh = key(one)
+            names = {scenario} if with_free else set()
+            if one.run.scenario not in self.free:
+                names.add(ALL)
+            for name in sorted(names):
+                groups.setdefault((driver, name, twin, speed_kmh), []).append(one)
+        scenarios = list(dict.fromkeys(name for _, name, _, _ in groups if name != ALL))
+        drivers = list(dict.fromkeys(driver for driver, _, _, _ in groups))
+        order = {name: number for number, name in enumerate([*scenarios, ALL])}
+        keys = sorted(groups, key=lambda one: (drivers.index(one[0]), order[one[1]], one[3] or 0.0))
+        return [_row(one, groups) for one in keys]
+
+
+def _row(
+    key: tuple[str, str, str, float | None], groups: dict[tuple[str, str, str, float | None], list[DriveResult]]
+) -> Row:
+    driver, scenario, twin, speed_kmh = key
+    here = groups[key]
+    measures = [one.measures for one in here]
+    others = [NO_PATCH] if twin == RANDOM_PATCH else [] if twin == NO_PATCH else [NO_PATCH, RANDOM_PATCH]
+    paired = [
+        compared(here, groups[driver, scenario, other, speed_kmh], other)
+        for other in others
+        if (driver, scenario, other, speed_kmh) in groups
+    ]
+    return Row(
+        driver=driver,
+        scenario=scenario,
+        twin=twin,
+        speed_kmh=speed_kmh,
+        crashes=Rate.of(one.is_crash for one in measures),
+        impact_mps=_mean(one.impact_mps for one in measures),
+        least_distance_m=_mean(one.least_distance_m for one in measures),
+        least_ttc_s=_mean(one.least_ttc_s for one in measures),
+        phantoms=Rate.of(one.phantom_brakings > 0 for one in measures),
+        off_road=Rate.of(one.off_road_share > 0 for one in measures),
+        lateral_peak_m=_mean(one.lateral_peak_m for one in measures) or 0.0,
+        jerk_rms_mps3=_mean(one.jerk_rms_mps3 for one in measures) or 0.0,
+        score=_mean(one.score for one in measures) or 0.0,
+        paired=tuple(paired),
+    )
+
+
+def compared(here: Sequence[DriveResult], there: Sequence[DriveResult], other: str) -> Paired:
+    """Compares two twins over the situations that both have driven.
+
+    McNemar's test in its exact form: of the situations in which only one of the twins crashed, each is equally likely
+    to be either's (McNemar, Psychometrika 1947).
+    """
+    from scipy import stats
+
+    twins = {one.run.situation: one.measures for one in there}
+    pairs = [(one.measures, twins[one.run.situation]) for one in here if one.run.situation in twins]
+    only_here = sum(a.is_crash and not b.is_crash for a, b in pairs)
+    only_there = sum(b.is_crash and not a.is_crash for a, b in pairs)
+    unequal = only_here + only_there
+    delays = [a.braking_s - b.braking_s for a, b in pairs if a.braking_s is not None and b.braking_s is not None]
+    return Paired(
+        other=other,
+        pairs=len(pairs),
+        only_here=only_here,
+        only_there=only_there,
+        p=float(stats.binomtest(only_here, unequal, 0.5).pvalue) if unequal else 1.0,
+        braking_delay_s=_mean(delays),
+        score=_mean(a.score - b.score for a, b in pairs) or 0.0,
+    )
+
+
+def _mean(values: Iterable[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if known else None
+
+
+def _known(value: Json) -> Json:
+    """The same JSON with null for NaN."""
+    if isinstance(value, dict):
+        return {key: _known(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_known(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,31 @@
+"""The arguments of `gear.drive` as a dataclass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from gear.collecting.workers import Workers
+from gear.dataset.executors.engines import DEFAULT
+from gear.values.errors import GearError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveRequest:
+    """The arguments of `gear.drive`, which describes each of them.
+
+    Raises:
+        GearError: the number of workers is below 1.
+    """
+
+    config: str | Path
+    out: str | Path
+    settings: tuple[str, ...] = ()
+    device: str | None = None
+    workers: Workers = 1
+    engine: str = DEFAULT
+    address: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.workers != "auto" and self.workers < 1:
+            raise GearError(f"workers must be at least 1, got {self.workers}")

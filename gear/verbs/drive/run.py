@@ -1,0 +1,202 @@
+"""`gear.drive`: drives cars through scenarios with and without patches, and writes one report."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+from collections.abc import Iterable
+from functools import partial
+from pathlib import Path
+
+from gear.collecting.job import versions
+from gear.collecting.workers import Workers, fitting_workers
+from gear.config.dump import to_plain, to_yaml
+from gear.config.load import find_config
+from gear.config.nodes import parse_file
+from gear.config.overrides import with_overrides
+from gear.config.reader import read_node
+from gear.contracts.executors import Executor, Outcome
+from gear.dataset.claims import clear_claims
+from gear.dataset.executors.engines import DEFAULT, open_engine
+from gear.dataset.executors.in_process import InThisProcess
+from gear.dataset.files import clear_scratch, write_whole
+from gear.dataset.guarded_paths import remove_empty_folders
+from gear.dataset.json_text import dump_json
+from gear.dataset.layout import split_folder
+from gear.dataset.store import check_output
+from gear.driving.config import DriveConfig
+from gear.driving.drives import Drives, patches_of, plan_drives
+from gear.driving.worker import CLAIMS, DriveResult, drive_all, read_result
+from gear.reporting.display import displayed
+from gear.values.counted import counted
+from gear.values.errors import GearError
+from gear.values.progress import Callbacks, Progress, Warn
+from gear.verbs.drive.page import page
+from gear.verbs.drive.report import DriveReport
+from gear.verbs.drive.request import DriveRequest
+from gear.verbs.drive.table import text
+
+CONFIG = "drive.yml"
+"""Name of the file with the config, with all defaults filled in."""
+
+
+def drive(
+    config: str | Path,
+    *,
+    out: str | Path,
+    settings: Iterable[str] = (),
+    device: str | None = None,
+    workers: Workers = 1,
+    engine: str = DEFAULT,
+    address: str | None = None,
+    progress: bool = False,
+    on_progress: Progress | None = None,
+    on_warning: Warn | None = None,
+) -> DriveReport:
+    """Drives cars in the closed loop, with and without patches. Resumes an interrupted study drive by drive.
+
+    Ten times per second a picture is rendered, the network predicts, the controller decides, and the car and all other
+    road users move. Each drive depends only on the config and its seed.
+
+    The folder `out` gets `report.html`, `table.txt`, `drives.csv` (one line per drive), `drive.json`, `drive.yml` (the
+    config with all defaults filled in), and the folder `drives` with a log of each drive.
+
+    Args:
+        config: name (`gear drive quick`) or path of a drive config.
+        out: folder of all results.
+        settings: `KEY=VALUE` texts for any key of the config.
+        device: device of the networks; overrides the config.
+        workers: number of drives at the same time, or `auto`; the results do not depend on it.
+        engine: engine that makes the drives: `processes`, `ray` or `slurm`.
+        address: address of the engine's cluster; None without a cluster.
+        progress: shows a progress bar.
+        on_progress: called after every drive.
+        on_warning: called with lines on drives that could not be made.
+
+    Raises:
+        GearError: an error that the user can correct; the message is one line.
+    """
+    request = DriveRequest(
+        config=config,
+        out=out,
+        settings=tuple(settings),
+        device=device,
+        workers=workers,
+        engine=engine,
+        address=address,
+    )
+    callbacks = Callbacks.of(on_progress=on_progress, on_warning=on_warning)
+    with displayed(callbacks, "drive", progress=progress, unit="drive") as shown:
+        return run_drive(request, shown)
+
+
+def prepared(request: DriveRequest) -> Drives:
+    """Reads the config and looks up everything that it names, before the first drive.
+
+    Raises:
+        GearError: something in the config does not exist, does not fit, or cannot be read.
+    """
+    root = Path(request.out)
+    check_output(root, "write the drives into a folder of their own")
+    node = with_overrides(parse_file(find_config("drive", str(request.config))), request.settings, DriveConfig)
+    return plan_drives(read_node(DriveConfig, node), root.absolute(), request.device)
+
+
+def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
+    """Runs a study with the arguments in `request`, which `gear.drive` describes.
+
+    Raises:
+        GearError: an error that the user can correct, or a drive could not be made; the message is one line.
+    """
+    drives = prepared(request)
+    executor = _executor(request)
+    write_whole(drives.root, CONFIG, to_yaml(drives.config).encode())
+    failures = _made(drives, executor, callbacks)
+    clear_claims(drives.root, CLAIMS)
+    remove_empty_folders(drives.root, split_folder(CLAIMS))
+    results, failed = _gathered(drives, failures)
+    if not results:
+        raise GearError(f"{drives.root}: no drive could be made ({failed[0][1] if failed else 'there are none'})")
+    report = DriveReport(
+        out=Path(request.out),
+        results=tuple(results),
+        failed=tuple(failed),
+        facts={"config": to_plain(drives.config), "versions": versions()},
+        free=frozenset(name for name, one in drives.library.scenarios.items() if one.is_free),
+    )
+    for name, data in (
+        ("drives.csv", _csv(report)),
+        ("drive.json", dump_json(report.as_json())),
+        ("table.txt", text(report).encode()),
+        ("report.html", page(report).encode()),
+    ):
+        write_whole(drives.root, name, data)
+    clear_scratch(drives.root)
+    broken = [outcome for outcome in failures.values() if not outcome.is_final]
+    if broken:
+        first = broken[0]
+        raise GearError(
+            f"{drives.root}: {len(broken)} of {counted(len(drives.runs), 'drive')} could not be made"
+            f" ({drives.runs[first.index].title}: {first.error}); the report has the others; put the cause right and"
+            " run the same command again, which makes only what is missing"
+        )
+    return report
+
+
+def _executor(request: DriveRequest) -> Executor:
+    count = fitting_workers(request.workers)
+    if count == 1 and request.engine == DEFAULT and request.address is None:
+        return InThisProcess()
+    return open_engine(request.engine, workers=count, backend="raster", address=request.address)
+
+
+def _made(drives: Drives, executor: Executor, callbacks: Callbacks) -> dict[int, Outcome]:
+    """Makes the missing drives; returns the outcomes of those that failed."""
+    folders = [
+        drives.folder(run, patch) for run, patch in zip(drives.runs, patches_of(drives, drives.runs), strict=True)
+    ]
+    missing = [index for index, folder in enumerate(folders) if read_result(drives.root, folder) is None]
+    done, failures = len(folders) - len(missing), {}
+    callbacks.on_progress(done, len(folders))
+
+    def report(outcome: Outcome) -> None:
+        nonlocal done
+        done += 1
+        if outcome.kind == "failed":
+            failures[outcome.index] = outcome
+            callbacks.on_warning(f"{drives.runs[outcome.index].title}: {outcome.error}")
+        callbacks.on_progress(done, len(folders))
+
+    if missing:
+        executor.run(partial(drive_all, drives), missing, report)
+    return failures
+
+
+def _gathered(drives: Drives, failures: dict[int, Outcome]) -> tuple[list[DriveResult], list[tuple[str, str]]]:
+    results, failed = [], []
+    for index, (run, patch) in enumerate(zip(drives.runs, patches_of(drives, drives.runs), strict=True)):
+        result = read_result(drives.root, drives.folder(run, patch))
+        if result is not None:
+            results.append(result)
+        else:
+            problem = failures[index].error if index in failures else "another run is making it; run the command again"
+            failed.append((run.title, problem))
+    return results, failed
+
+
+def _csv(report: DriveReport) -> bytes:
+    """One line per drive: what it is, its measures, the hash of its log."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    first = report.results[0]
+    names = [field.name for field in dataclasses.fields(first.run)]
+    measured = [field.name for field in dataclasses.fields(first.measures)]
+    writer.writerow([*names, "patch", *measured, "log_sha256"])
+    for one in report.results:
+        values = [getattr(one.measures, name) for name in measured]
+        writer.writerow(
+            [*(getattr(one.run, name) for name in names), one.patch, *("" if v is None else v for v in values),
+             one.log_sha256]
+        )  # fmt: skip
+    return out.getvalue().encode()

@@ -1,0 +1,10 @@
+from __future__ import annotations
+
+from gear.reporting.report_page import POLICY, report_page
+
+
+def test_a_page_is_whole_and_escapes_its_title() -> None:
+    page = report_page("<b>", ["<p>one</p>", "<p>two</p>"])
+    assert page.startswith("<!doctype html>") and page.endswith("</body></html>\n")
+    assert "<title>&lt;b&gt;</title>" in page and "<h1>&lt;b&gt;</h1>" in page
+    assert POLICY in page and "<p>one</p>\n<p>two</p>" in page

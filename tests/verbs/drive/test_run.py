@@ -1,0 +1,122 @@
+"""`gear.drive` on the tiny town: files, resumption, equal hashes, exit codes."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+import gear
+from gear.cli.main import main
+from gear.dataset.guarded_paths import remove_tree
+from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
+from gear.values.errors import GearError
+from gear.verbs.drive.report import DriveReport
+from gear.verbs.drive.request import DriveRequest
+
+TEXT = f"""
+drivers:
+  truth: {{controller: truth}}
+  blind: {{controller: blind}}
+towns: {{"{TINY_TOWN}": [board]}}
+scenarios: {{stopped_lead: [40], crossing_pedestrian: [30], free_road: [30]}}
+collect: {{quality: fast, scenes: "{TINY_SCENES}"}}
+"""
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("drive") / "tiny.yml"
+    path.write_text(TEXT)
+    return path
+
+
+@pytest.fixture(scope="module")
+def report(config: Path) -> DriveReport:
+    return gear.drive(config, out=config.parent / "out")
+
+
+def hashes(report: DriveReport) -> list[str]:
+    return [one.log_sha256 for one in report.results]
+
+
+def test_truth_is_the_ceiling_and_blind_the_floor(report: DriveReport) -> None:
+    rows = {(row.driver, row.scenario): row for row in report.rows()}
+    assert rows["truth", "all"].crashes.count == 0 and rows["truth", "all"].crashes.total == 2
+    assert rows["blind", "all"].crashes.count == 2
+    assert rows["truth", "free_road"].phantoms.count == 0
+    assert rows["truth", "free_road"].score > 0.95 > 0.7 > rows["blind", "all"].score
+    assert not report.failed
+
+
+def test_the_files_of_a_study(report: DriveReport) -> None:
+    names = {path.name for path in report.out.iterdir()}
+    assert names == {"drive.yml", "drive.json", "drives.csv", "table.txt", "report.html", "drives"}
+    folders = list((report.out / "drives").glob("*/*"))
+    assert len(folders) == 6 and {p.name for folder in folders for p in folder.iterdir()} == {
+        "log.jsonl",
+        "result.json",
+    }
+    lines = list(csv.DictReader((report.out / "drives.csv").read_text().splitlines()))
+    assert [line["log_sha256"] for line in lines] == hashes(report)
+    assert json.loads((report.out / "drive.json").read_text())["drives"][0]["run"]["driver"] == "truth"
+    assert "McNemar" in (report.out / "report.html").read_text()
+
+
+def test_a_study_resumes_drive_by_drive(config: Path, report: DriveReport) -> None:
+    kept = sorted((report.out / "drives").glob("*/*"))
+    times = {folder: (folder / "result.json").stat().st_mtime_ns for folder in kept[1:]}
+    remove_tree(report.out, kept[0].relative_to(report.out).as_posix())
+    (kept[1] / "log.jsonl").write_text("damaged")
+    seen: list[tuple[int, int]] = []
+    again = gear.drive(config, out=report.out, on_progress=lambda done, total: seen.append((done, total)))
+    assert seen[0] == (4, 6) and seen[-1] == (6, 6)
+    assert hashes(again) == hashes(report)
+    assert all((folder / "result.json").stat().st_mtime_ns == times[folder] for folder in kept[2:])
+
+
+@pytest.mark.slow
+def test_hashes_do_not_depend_on_workers(config: Path, report: DriveReport, tmp_path: Path) -> None:
+    assert hashes(gear.drive(config, out=tmp_path / "two", workers=2)) == hashes(report)
+
+
+@pytest.mark.slow
+def test_a_driver_with_a_camera_drives_the_same_twins(config: Path, tmp_path: Path) -> None:
+    """A controller that ignores its pictures drives equally with every patch, and equally without pictures."""
+    settings = [
+        "drivers={eyes: {controller: blind, task: depth, options: {width_px: 256, height_px: 96}}}",
+        "scenarios={stopped_lead: [40]}",
+        "twins=[none, random]",
+    ]
+    found = gear.drive(config, out=tmp_path, settings=settings)
+    assert len(set(hashes(found))) == 1 and len(found.results) == 2
+    assert [one.patch for one in found.results] == ["none", "random"]
+    assert found.results[0].renderer is not None
+
+
+def test_the_command_line(config: Path, report: DriveReport, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["drive", str(config), "--out", str(report.out)]) == 0
+    shown = capsys.readouterr().out
+    assert "crossing_pedestrian" in shown and "McNemar" in shown
+    assert main(["drive", str(config), "--out", str(report.out), "--list"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 6
+    assert main(["drive", str(config), "--out", str(report.out), "--set", "drivers.truth.controller=truht"]) == 2
+    error = capsys.readouterr().err
+    assert "did you mean truth?" in error and error.count("\n") == 1
+
+
+def test_scenarios_without_a_place_are_listed_and_do_not_fail_the_study(config: Path, tmp_path: Path) -> None:
+    warned: list[str] = []
+    settings = ["scenarios={cut_in: [40], free_road: [30]}", "drivers={truth: {controller: truth}}"]
+    found = gear.drive(config, out=tmp_path, settings=settings, on_warning=warned.append)
+    assert len(found.results) == 1 and len(found.failed) == 1
+    assert "neighbouring lane" in found.failed[0][1] and len(warned) == 1
+    with pytest.raises(GearError, match="no drive could be made"):
+        gear.drive(config, out=tmp_path / "none", settings=[*settings, "scenarios={cut_in: [40]}"])
+
+
+def test_an_absurd_number_of_workers_is_refused() -> None:
+    with pytest.raises(GearError, match="at least 1"):
+        DriveRequest(config="quick", out="x", workers=0)
