@@ -8,7 +8,7 @@ from pathlib import Path
 
 from authoring.weights.ship import MADE_BY, MODELS, TRAINING, Measured, head, wrapped
 from gear.dataset.files import write_alone
-from gear.measuring.appearance_hash import current_look, read_look
+from gear.measuring.appearance_hash import current_appearance, read_appearance
 from gear.networks.weights import read, write
 from gear.values.errors import GearError
 
@@ -43,12 +43,12 @@ def renew(model: str, evaluation: Path, note: str, models: Path = MODELS) -> Pat
     target = models / f"{model}.safetensors"
     state, metadata = read(target)
     measured = Measured.read(evaluation, model, target)
-    trained = read_look(json.loads(metadata.get("look", "null")))
+    trained = read_appearance(json.loads(metadata.get("look", "null")))
     made, heading, rest = target.with_suffix(".md").read_text(encoding="utf-8").partition(f"\n{MADE_BY}\n")
     how, training, data = rest.partition(f"{TRAINING}\n")
     if trained is None or not (made and heading and training):
         raise GearError(f"{target}: it or its card does not say what look it knows or how it was made")
-    metadata |= measured.texts() | {"measured_look_hash": current_look(trained).hash}
+    metadata |= measured.texts() | {"measured_look_hash": current_appearance(trained).hash}
     write(target, state, metadata, halves=True)
     lines = [*head(target, metadata, measured), f"{MADE_BY}\n{how}" + "\n".join([*wrapped(note), f"{training}{data}"])]
     write_alone(target.with_suffix(".md"), "\n".join(lines).encode())

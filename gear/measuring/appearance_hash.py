@@ -1,8 +1,8 @@
 """Hashes of a dataset's appearance: the assets, light, camera response and renderer on which trained weights
 depend.
 
-Weights files record the appearance (`Look`) of their training data. If the appearance of the installed version differs
-from it, the networks may have to be trained again, and `gear models` says so.
+Weights files record the appearance (`Appearance`) of their training data. If the appearance of the installed version
+differs from it, the networks may have to be trained again, and `gear models` says so.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ RAMP = (0.01, 0.05, 0.2, 0.5, 0.8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Look:
+class Appearance:
     """The appearance of a dataset's pictures: hashes and names of everything that decides it, apart from seeds and
     scenes.
 
@@ -65,7 +65,7 @@ class Look:
         """The first 16 hexadecimal digits of the appearance's sha256; equal appearances have equal hashes."""
         return _digest(to_json(self))[:HASH_LENGTH]
 
-    def differences(self, other: Look) -> list[str]:
+    def differences(self, other: Appearance) -> list[str]:
         """Names the parts in which two appearances differ, such as `light` or `assets of town10`; empty if they
         are equal.
         """
@@ -78,21 +78,21 @@ class Look:
         ]
 
 
-def look_of(plans: Iterable[Plan]) -> Look:
+def appearance_of(plans: Iterable[Plan]) -> Appearance:
     """The appearance of datasets, computed from the plans that they were collected with.
 
     The light is computed with the installed version of gear, because a plan records only the version number of gear.
     """
     contents = [plan.content for plan in plans]
-    return Look(
+    return Appearance(
         assets={content["town"]: content["assets"] for content in contents},
-        renderers=tuple(sorted({_look_name(content["renderer"]["name"]) for content in contents})),
+        renderers=tuple(sorted({_appearance_name(content["renderer"]["name"]) for content in contents})),
         light=light_digest(),
         mujoco=", ".join(sorted({_minor(content["versions"]["mujoco"]) for content in contents})),
     )
 
 
-def current_look(trained: Look, digests: dict[str, str] | None = None) -> Look:
+def current_appearance(trained: Appearance, digests: dict[str, str] | None = None) -> Appearance:
     """The appearance that the towns of a training run have in the installed version of gear.
 
     Towns that are not installed are left out.
@@ -105,7 +105,7 @@ def current_look(trained: Look, digests: dict[str, str] | None = None) -> Look:
     for town in trained.assets.keys() - known.keys():
         with contextlib.suppress(GearError):
             known[town] = assets_digest(AssetLibrary.for_town(town))
-    return Look(
+    return Appearance(
         assets={town: known[town] for town in trained.assets if town in known},
         renderers=trained.renderers,
         light=light_digest(),
@@ -113,10 +113,10 @@ def current_look(trained: Look, digests: dict[str, str] | None = None) -> Look:
     )
 
 
-def read_look(value: Json) -> Look | None:
+def read_appearance(value: Json) -> Appearance | None:
     """Reads an appearance from JSON; returns None if the JSON does not describe an appearance."""
     try:
-        return from_json(Look, value, "look")
+        return from_json(Appearance, value, "look")
     except FieldError:
         return None
 
@@ -142,7 +142,7 @@ def light_digest() -> str:
     return _digest(presets)
 
 
-def _look_name(renderer: str) -> str:
+def _appearance_name(renderer: str) -> str:
     return ALIKE.get(renderer, renderer)
 
 

@@ -38,7 +38,7 @@ class WeightsFile:
 
     These values are stored as JSON: `data` (training data), `metrics` (values by name), `intervals` (their 95 %
     bounds), `options` (of the model, such as `input_scale`), `look` (the appearance,
-    `gear.measuring.appearance_hash.Look`) and `averaged` (hashes of the two weights files that were averaged).
+    `gear.measuring.appearance_hash.Appearance`) and `averaged` (hashes of the two weights files that were averaged).
 
     Attributes:
         path: path of the file.

@@ -123,7 +123,7 @@ def _changes(file: WeightsFile, digests: dict[str, str]) -> tuple[str, ...] | No
     if value is None:
         return None
     # Imported here because the comparison reads the towns' assets, which only shipped weights need.
-    from gear.measuring.appearance_hash import current_look, read_look
+    from gear.measuring.appearance_hash import current_appearance, read_appearance
 
-    look = read_look(value)
-    return None if look is None else tuple(look.differences(current_look(look, digests)))
+    appearance = read_appearance(value)
+    return None if appearance is None else tuple(appearance.differences(current_appearance(appearance, digests)))

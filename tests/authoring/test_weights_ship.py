@@ -11,7 +11,7 @@ import torch
 
 from authoring.weights.renew import renew
 from authoring.weights.ship import ship
-from gear.measuring.appearance_hash import Look, current_look
+from gear.measuring.appearance_hash import Appearance, current_appearance
 from gear.measuring.guarded_model import weights_digest
 from gear.networks.options import SegmentationOptions
 from gear.networks.shipped import inspect
@@ -125,7 +125,7 @@ def test_what_is_measured_again_keeps_its_numbers_and_its_history(run: Path, eva
     models = tmp_path / "models"
     path = ship([run], evaluation, run.parents[1], models, note="First.")
     state, texts = read(path)
-    trained = Look(assets={"nowhere": "1"}, renderers=("filament",), light="before", mujoco="4.0")
+    trained = Appearance(assets={"nowhere": "1"}, renderers=("filament",), light="before", mujoco="4.0")
     write(path, state, texts | {"look": json.dumps(to_json(trained))}, halves=True)
     results = json.loads((evaluation / "results.json").read_text())
     results["together"][0]["metrics"]["reference"]["miou"] = estimate(0.7)
@@ -135,7 +135,7 @@ def test_what_is_measured_again_keeps_its_numbers_and_its_history(run: Path, eva
     facts, again = inspect(path).facts(), read(path)[0]
     assert facts["metrics"] == {"miou": 0.7} and facts["look"] == to_json(trained), "it was trained on no other"
     assert facts["look_hash"] == "ab12" and facts["command"] == texts["command"]
-    assert facts["measured_look_hash"] == current_look(trained).hash != trained.hash
+    assert facts["measured_look_hash"] == current_appearance(trained).hash != trained.hash
     assert all(bool((state[key] == again[key]).all()) for key in state)
     card = path.with_suffix(".md").read_text()
     assert "| miou | 0.700 | 0.600 | 0.800 |" in card

@@ -11,7 +11,7 @@ import torch
 
 from gear.cli.main import main
 from gear.contracts.specs import ModelSpec
-from gear.measuring.appearance_hash import Look, current_look
+from gear.measuring.appearance_hash import Appearance, current_appearance
 from gear.networks import shipped
 from gear.networks.weights import write
 from gear.plugins.manager import catalogue
@@ -65,8 +65,8 @@ def test_every_builtin_network_says_how_large_it_is() -> None:
 def test_reference_weights_are_shown_and_marked_when_the_look_changed(
     packages: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    blank = Look(assets={"town10": ""}, renderers=("filament",), light="", mujoco="")
-    now = current_look(blank)
+    blank = Appearance(assets={"town10": ""}, renderers=("filament",), light="", mujoco="")
+    now = current_appearance(blank)
     old = dataclasses.replace(now, assets={"town10": "0" * 64})
     facts = {"metrics": {"miou": 0.625}, "data": {"training": [{"scene": "billboard01"}]}}
     ship(packages, "ddrnet23_slim", look=to_json(now), look_hash=now.hash, **facts)
@@ -80,9 +80,9 @@ def test_reference_weights_are_shown_and_marked_when_the_look_changed(
     lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
     assert "shipped, old appearance" in lines["bisenet_x39"] and "old appearance" not in lines["ddrnet23_slim"]
     assert main(["models", "show", "ddrnet23_slim"]) == 0
-    assert "miou 0.625; look is current" in capsys.readouterr().out
+    assert "miou 0.625; appearance is current" in capsys.readouterr().out
     assert main(["models", "show", "bisenet_x39"]) == 0
-    assert "trained on another look (assets of town10 changed)" in " ".join(capsys.readouterr().out.split())
+    assert "trained on another appearance (assets of town10 changed)" in " ".join(capsys.readouterr().out.split())
 
 
 def test_weights_that_do_not_state_their_look_are_not_judged(packages: Path) -> None:

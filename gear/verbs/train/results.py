@@ -20,7 +20,7 @@ from gear.config.reader import read_node
 from gear.contracts.specs import TaskSpec
 from gear.dataset.files import read_bytes, sha256, write_whole
 from gear.dataset.guarded_paths import remove_files
-from gear.measuring.appearance_hash import Look
+from gear.measuring.appearance_hash import Appearance
 from gear.networks.options import CIRCUMSTANCES
 from gear.networks.weights import serialised
 from gear.plugins.catalogue import PluginEntry
@@ -48,7 +48,7 @@ class Origin:
         config: config of the training.
         training, validation: training samples and validation samples.
         command: command line that repeats the training.
-        look: hashes and versions of assets, light and renderer of the training pictures.
+        appearance: hashes and versions of assets, light and renderer of the training pictures.
         picture_share: width of the training pictures divided by the task's default width.
     """
 
@@ -59,7 +59,7 @@ class Origin:
     training: Samples
     validation: Samples
     command: str
-    look: Look
+    appearance: Appearance
     picture_share: float
 
     def metadata(self, metrics: AnyMapping[str, Any]) -> dict[str, str]:
@@ -72,8 +72,8 @@ class Origin:
             "gear": version("mujoco-gear"),
             "command": self.command,
             "seed": str(self.config.seed),
-            "look": json.dumps(to_json(self.look), sort_keys=True),
-            "look_hash": self.look.hash,
+            "look": json.dumps(to_json(self.appearance), sort_keys=True),
+            "look_hash": self.appearance.hash,
             "data": json.dumps(data, sort_keys=True),
             "metrics": json.dumps(known(metrics), sort_keys=True),
             "options": json.dumps(self._options(), sort_keys=True),
@@ -200,7 +200,7 @@ def card(root: Path, origin: Origin, progress: TrainingState) -> str:
         f"batch {config.batch}, crop {_size(config.crop_px)}, {config.precision}",
         f"- {progress.step} steps in {progress.elapsed_s / 60:.1f} minutes; the weights are those after step "
         f"{progress.best_step}",
-        f"- look of the data: `{origin.look.hash}`",
+        f"- appearance of the data: `{origin.appearance.hash}`",
         *_size_lines(origin),
         "",
         "## Training data",
@@ -219,8 +219,8 @@ def card(root: Path, origin: Origin, progress: TrainingState) -> str:
         "",
         "## Limits",
         "",
-        "Trained on rendered pictures of gear's towns alone. It knows their looks, weathers and cameras; on real",
-        "pictures, or on towns that look otherwise, nothing is promised.",
+        "Trained only on rendered pictures of gear's towns, with their appearance, weathers and cameras. On real",
+        "pictures, or on towns with another appearance, the network may be much worse.",
         "",
     ]
     return "\n".join(lines)

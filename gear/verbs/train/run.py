@@ -14,7 +14,7 @@ from gear.dataset.files import clear_scratch
 from gear.dataset.locks import alone_at_work
 from gear.dataset.reading import scenes_of
 from gear.dataset.store import check_output
-from gear.measuring.appearance_hash import PLANNED, look_of
+from gear.measuring.appearance_hash import PLANNED, appearance_of
 from gear.measuring.plugin_selection import Chosen, check_camera
 from gear.networks.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
@@ -240,7 +240,7 @@ def _origin(request: TrainRequest, callbacks: Callbacks) -> Origin:
         command=command_of(
             request.task, request.model, request.data, request.val, request.command_flags, request.config_settings
         ),
-        look=look_of(dataset.plan for dataset in training.datasets),
+        appearance=appearance_of(dataset.plan for dataset in training.datasets),
         picture_share=share,
     )
 
