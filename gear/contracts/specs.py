@@ -61,14 +61,14 @@ class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
         original_name: name in CARLA-GeAR's configuration files and JSON; "" where CARLA-GeAR does not have the task.
         metric: the metric by which training chooses among checkpoints, of the evaluator or of a report
             (`<report>.<metric>`); "" chooses by the loss.
-        less_is_better: whether that metric is an error.
+        lower_is_better: whether that metric is an error.
     """
 
     views: tuple[str, ...]
     layout: str
     original_name: str = ""
     metric: str = ""
-    less_is_better: bool = False
+    lower_is_better: bool = False
     notes: Callable[[ConfigT], tuple[str, ...]] = no_notes
 
 
@@ -161,13 +161,13 @@ class MetricSpec(Spec[ConfigT, Evaluator[Any, Any]]):
         tasks: names of the tasks whose samples and predictions it understands; at least one.
         metric: name of the evaluator's main metric, by which predictions are compared.
         unit: unit of its metrics, such as `m` or `px`; "" for shares and counts.
-        less_is_better: whether the main metric is an error.
+        lower_is_better: whether the main metric is an error.
     """
 
     tasks: tuple[str, ...]
     metric: str
     unit: str = ""
-    less_is_better: bool = False
+    lower_is_better: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

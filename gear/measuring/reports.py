@@ -95,7 +95,7 @@ class Report:
             return None
         spec = self.plugin.found.spec
         assert isinstance(spec, MetricSpec)
-        said = {"metric": spec.metric, "unit": spec.unit, "less_is_better": spec.less_is_better}
+        said = {"metric": spec.metric, "unit": spec.unit, "lower_is_better": spec.lower_is_better}
         return self.plugin.facts() | said
 
 

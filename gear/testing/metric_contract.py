@@ -109,7 +109,7 @@ class MetricContract:
         for task in self.spec.tasks:
             good, bad = (self.gathered(self.pairs(task, spoilt=spoilt)).result() for spoilt in (False, True))
             better, worse = good[self.spec.metric], bad[self.spec.metric]
-            assert worse > better if self.spec.less_is_better else worse < better, (task, better, worse)
+            assert worse > better if self.spec.lower_is_better else worse < better, (task, better, worse)
 
     def test_merged_evaluators_equal_the_whole(self) -> None:
         """Merged evaluators of one sample each give the same metrics as one evaluator of all samples."""

@@ -53,7 +53,7 @@ class Bias:
 
 def metric(**facts: Any) -> MetricSpec[BiasConfig]:
     said: dict[str, Any] = {"name": "bias", "summary": "Mean error.", "config": BiasConfig, "build": Bias}
-    said |= {"tasks": ("depth",), "metric": "bias_m", "unit": "m", "less_is_better": True}
+    said |= {"tasks": ("depth",), "metric": "bias_m", "unit": "m", "lower_is_better": True}
     return MetricSpec(**(said | facts))
 
 
@@ -75,7 +75,7 @@ def test_a_metric_of_a_third_party_has_its_columns(tmp_path: Path, data: Path, m
     assert row.metrics["bias"]["bias_m"].interval is not None
     facts = json.loads((tmp_path / "results.json").read_text())["metric_plugins"]
     assert (
-        facts["bias"]["unit"] == "m" and facts["bias"]["less_is_better"] and facts["bias"]["package"] == "odd_package"
+        facts["bias"]["unit"] == "m" and facts["bias"]["lower_is_better"] and facts["bias"]["package"] == "odd_package"
     )
     assert facts["bias:limit_m=10,within_m=[0.5,2]"]["options"] == {"limit_m": 10.0, "within_m": [0.5, 2.0]}
     assert "bias.bias_m" in (tmp_path / "table.txt").read_text()

@@ -106,7 +106,7 @@ def test_a_model_that_is_not_what_it_should_be(facts: dict[str, Any], problem: s
     [
         ({"tasks": ()}, "its tasks are empty; name the tasks that it measures"),
         ({"unit": None}, "its unit must be a str, got NoneType"),
-        ({"less_is_better": "yes"}, "its less_is_better must be a bool, got str"),
+        ({"lower_is_better": "yes"}, "its lower_is_better must be a bool, got str"),
     ],
 )
 def test_a_metric_that_is_not_what_it_should_be(facts: dict[str, Any], problem: str) -> None:

@@ -41,7 +41,7 @@ class MeanOff:
 
 def metric(build: Any = MeanOff, **facts: Any) -> MetricSpec[Config]:
     said: dict[str, Any] = {"name": "error", "summary": "Mean error.", "config": Config, "tasks": ("depth",)}
-    return MetricSpec(**(said | {"metric": "error_m", "less_is_better": True, "build": build} | facts))
+    return MetricSpec(**(said | {"metric": "error_m", "lower_is_better": True, "build": build} | facts))
 
 
 class TestMeanOff(MetricContract):
@@ -81,7 +81,7 @@ class OtherName(MeanOff):
         (metric(Unmerged), "test_merged_evaluators_equal_the_whole"),
         (metric(ZeroAtFirst), "test_an_empty_evaluator_gives_nan"),
         (metric(OtherName), "test_metrics_are_numbers_by_name"),
-        (metric(less_is_better=False), "test_a_spoilt_prediction_is_worse"),
+        (metric(lower_is_better=False), "test_a_spoilt_prediction_is_worse"),
         (metric(tasks=("dreams",)), "test_the_spec_can_be_used"),
     ],
 )

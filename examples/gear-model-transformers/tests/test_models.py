@@ -115,7 +115,7 @@ class TestDepthAnything(DepthContract):
 
 class DetectorContract(FolderContract):
     spec = detect2d
-    extra: ClassVar[dict[str, Any]] = {"least_score": 0.0}
+    extra: ClassVar[dict[str, Any]] = {"score_threshold": 0.0}
 
     def test_boxes_are_the_familys_own(self) -> None:
         processor, said = self.theirs()
@@ -164,8 +164,8 @@ def test_a_network_whose_head_is_missing_is_refused(tmp_path: Path) -> None:
 def test_absurd_options_are_refused() -> None:
     with pytest.raises(FieldError, match="inverse_scale"):
         DepthConfig(inverse_scale=-1.0)
-    with pytest.raises(FieldError, match="least_score"):
-        DetectorConfig(least_score=2.0)
+    with pytest.raises(FieldError, match="score_threshold"):
+        DetectorConfig(score_threshold=2.0)
 
 
 def test_a_folder_with_code_of_its_own_never_runs_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -44,7 +44,7 @@ training step on a CPU.
 """
 
 
-def fasterrcnn_r50_fpn(least_score: float) -> nn.Module:
+def fasterrcnn_r50_fpn(score_threshold: float) -> nn.Module:
     """Faster R-CNN on ResNet-50 with a feature pyramid, as in the published weights: FrozenBatchNorm2d with eps 0,
     91 classes.
     """
@@ -53,12 +53,12 @@ def fasterrcnn_r50_fpn(least_score: float) -> nn.Module:
     from torchvision.models.detection._utils import overwrite_eps
 
     backbone = _official_backbone()
-    graph: nn.Module = FasterRCNN(backbone, OFFICIAL_CLASSES, box_score_thresh=least_score)
+    graph: nn.Module = FasterRCNN(backbone, OFFICIAL_CLASSES, box_score_thresh=score_threshold)
     overwrite_eps(graph, 0.0)
     return graph
 
 
-def retinanet_r50_fpn(least_score: float) -> nn.Module:
+def retinanet_r50_fpn(score_threshold: float) -> nn.Module:
     """RetinaNet on ResNet-50 with a feature pyramid, as in the published weights: FrozenBatchNorm2d with eps 0, 91
     classes.
     """
@@ -68,12 +68,12 @@ def retinanet_r50_fpn(least_score: float) -> nn.Module:
     from torchvision.ops.feature_pyramid_network import LastLevelP6P7
 
     backbone = _official_backbone(returned_layers=[2, 3, 4], extra_blocks=LastLevelP6P7(256, 256))
-    graph: nn.Module = RetinaNet(backbone, OFFICIAL_CLASSES, score_thresh=least_score)
+    graph: nn.Module = RetinaNet(backbone, OFFICIAL_CLASSES, score_thresh=score_threshold)
     overwrite_eps(graph, 0.0)
     return graph
 
 
-def retinanet_r18_fpn(classes: int, least_score: float) -> nn.Module:
+def retinanet_r18_fpn(classes: int, score_threshold: float) -> nn.Module:
     """RetinaNet on ResNet-18, all layers trainable, with narrow heads, group normalisation and small anchors
     (`reference_retinanet`).
     """
@@ -89,21 +89,21 @@ def retinanet_r18_fpn(classes: int, least_score: float) -> nn.Module:
         out_channels=CHANNELS,
         extra_blocks=LastLevelP6P7(CHANNELS, CHANNELS),
     )
-    return reference_retinanet(backbone, classes, least_score)
+    return reference_retinanet(backbone, classes, score_threshold)
 
 
-def retinanet_lite0_fpn(classes: int, least_score: float) -> nn.Module:
+def retinanet_lite0_fpn(classes: int, score_threshold: float) -> nn.Module:
     """RetinaNet on EfficientNet-Lite0, all layers trainable, with narrow heads, group normalisation and small
     anchors (`reference_retinanet`).
     """
-    graph = reference_retinanet(LitePyramid(), classes, least_score)
+    graph = reference_retinanet(LitePyramid(), classes, score_threshold)
     heads: Any = graph.head
     for head in (heads.classification_head, heads.regression_head):
         head.conv = head.conv[:LITE0_HEAD_DEPTH]
     return graph
 
 
-def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -> nn.Module:
+def reference_retinanet(backbone: nn.Module, classes: int, score_threshold: float) -> nn.Module:
     """torchvision's RetinaNet with narrower heads, group normalisation and smaller anchors.
 
     Anchors are small because the network receives pictures at about half their size: a person of 32 pixels height is
@@ -112,7 +112,7 @@ def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -
     Args:
         backbone: trunk with a feature pyramid.
         classes: number of classes, background included.
-        least_score: smallest score of a detection that is reported.
+        score_threshold: smallest score of a detection that is reported.
     """
     torchvision_import.need()
     from torchvision.models.detection import RetinaNet
@@ -125,7 +125,7 @@ def reference_retinanet(backbone: nn.Module, classes: int, least_score: float) -
         CHANNELS, anchors.num_anchors_per_location()[0], classes, norm_layer=partial(nn.GroupNorm, GROUPS)
     )
     graph: nn.Module = RetinaNet(
-        backbone, classes, anchor_generator=anchors, head=head, score_thresh=least_score, detections_per_img=100
+        backbone, classes, anchor_generator=anchors, head=head, score_thresh=score_threshold, detections_per_img=100
     )
     return graph
 

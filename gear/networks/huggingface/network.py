@@ -257,7 +257,7 @@ class FolderDetector(FolderNetwork):
             return {"set_loss": self.said(outputs["seen"], labels=labels).loss}
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
-        """Detections of COCO classes whose score is at least `least_score`, highest score first."""
+        """Detections of COCO classes whose score is at least `score_threshold`, highest score first."""
         scale = torch.tensor([size_px[1], size_px[0]] * 2, device=self.device)
         answers = []
         for logits, boxes in zip(outputs[LOGITS], outputs[BOXES], strict=True):
@@ -273,7 +273,7 @@ class FolderDetector(FolderNetwork):
                     edges[places // scores.shape[1]].tolist(),
                     strict=True,
                 )
-                if index in self._categories and score >= self.options.least_score and score > 0
+                if index in self._categories and score >= self.options.score_threshold and score > 0
             ]
             answers.append(tuple(found))
         return answers

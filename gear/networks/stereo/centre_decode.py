@@ -31,13 +31,13 @@ class Peaks:
 
     Attributes:
         most: largest number of detections in a picture.
-        least_score: smallest score that is reported.
+        score_threshold: smallest score that is reported.
         same_overlap: IoU of the 2D boxes above which two detections are the same object, if their depths agree as well.
         same_depth: largest relative difference of the depths of two detections of the same object.
     """
 
     most: int = 50
-    least_score: float = 0.02
+    score_threshold: float = 0.02
     same_overlap: float = 0.6
     same_depth: float = 0.15
 
@@ -67,7 +67,7 @@ def decode(
     found = []
     for batch in range(len(heat)):
         best, cells = chance[batch].reshape(-1).topk(count)
-        cells = cells[best >= peaks.least_score]
+        cells = cells[best >= peaks.score_threshold]
         rows, columns = cells // chance.shape[2], cells % chance.shape[2]
         maps = {name: _plain(tensor[batch, :, rows, columns].T) for name, tensor in outputs.items()}
         chosen = [kinds[index] for index in kind[batch, rows, columns].tolist()]

@@ -74,7 +74,7 @@ class StereoCentreNetwork(Network):
         """The detections of each picture, as KITTI labels with scores."""
         ratio = self._ratio(size_px)
         cell_px = (STRIDE * ratio[0], STRIDE * ratio[1])
-        peaks = Peaks(least_score=self.options.least_score)
+        peaks = Peaks(score_threshold=self.options.score_threshold)
         return decode(outputs, KINDS, self.options.calibration(size_px), cell_px, peaks)
 
     def taps(self) -> Mapping[str, nn.Module]:

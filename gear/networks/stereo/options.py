@@ -54,12 +54,12 @@ class StereoCentreOptions(StereoOptions):
             pyramid and the heads have multiples of it.
         input_scale: factor by which pictures are resized before the network. null takes the factor with which the
             weights were trained, or 0.5 if they state none.
-        least_score: smallest score, 0..1, of a detection that is reported.
+        score_threshold: smallest score, 0..1, of a detection that is reported.
     """
 
     width: int = 32
     input_scale: float | None = None
-    least_score: float = 0.02
+    score_threshold: float = 0.02
 
     def __post_init__(self) -> None:
         StereoOptions.__post_init__(self)
@@ -67,8 +67,8 @@ class StereoCentreOptions(StereoOptions):
             raise FieldError("width", f"must be at least 1, got {self.width}")
         if self.input_scale is not None and not 0.05 <= self.input_scale <= 2:
             raise FieldError("input_scale", f"must be 0.05 to 2, got {self.input_scale:g}")
-        if not 0 <= self.least_score <= 1:
-            raise FieldError("least_score", f"must be 0 to 1, got {self.least_score:g}")
+        if not 0 <= self.score_threshold <= 1:
+            raise FieldError("score_threshold", f"must be 0 to 1, got {self.score_threshold:g}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +79,7 @@ class StereoRcnnOptions(StereoOptions):
         short_side_px: the pictures are enlarged until their shorter side has this many pixels.
         considered: number of best-scored anchors from which proposals are made; twice as many in training.
         proposals: number of box pairs for the second stage.
-        least_score: smallest score, 0..1, of a detection that is reported.
+        score_threshold: smallest score, 0..1, of a detection that is reported.
         aligns: whether depth is refined by dense photometric alignment. If not, it follows from the boxes and the
             keypoint.
         aligned_bias_px: value added to every aligned disparity. The authors add 0.5; by geometry it should be 0.
@@ -88,7 +88,7 @@ class StereoRcnnOptions(StereoOptions):
     short_side_px: int = 600
     considered: int = 6000
     proposals: int = 300
-    least_score: float = 0.05
+    score_threshold: float = 0.05
     aligns: bool = True
     aligned_bias_px: float = 0.0
 
@@ -98,5 +98,5 @@ class StereoRcnnOptions(StereoOptions):
             raise FieldError("short_side_px", f"must be 32 to 4096, got {self.short_side_px}")
         if not 1 <= self.proposals <= self.considered:
             raise FieldError("proposals", f"must be 1 to the {self.considered} considered, got {self.proposals}")
-        if not 0 <= self.least_score <= 1:
-            raise FieldError("least_score", f"must be 0 to 1, got {self.least_score:g}")
+        if not 0 <= self.score_threshold <= 1:
+            raise FieldError("score_threshold", f"must be 0 to 1, got {self.score_threshold:g}")

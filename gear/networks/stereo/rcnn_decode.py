@@ -33,7 +33,7 @@ class FoundCar:
 
 
 def decode_cars(
-    said: Mapping[str, Tensor], scale: float, size_px: tuple[int, int], least_score: float
+    said: Mapping[str, Tensor], scale: float, size_px: tuple[int, int], score_threshold: float
 ) -> list[FoundCar]:
     """Converts the raw outputs for one picture to detected cars, highest score first.
 
@@ -41,11 +41,11 @@ def decode_cars(
         said: outputs of the network for one picture, without the batch dimension.
         scale: factor from the original pictures to the network's input.
         size_px: height and width of the network's input.
-        least_score: smallest score that is reported.
+        score_threshold: smallest score that is reported.
     """
     scores = said["class_logits"].softmax(dim=1)[:, 1]
     is_pair = (said["rois_left"][:, 2:] > said["rois_left"][:, :2]).all(dim=1)
-    chosen = ((scores > least_score) & is_pair).nonzero()[:, 0]
+    chosen = ((scores > score_threshold) & is_pair).nonzero()[:, 0]
     scores = scores[chosen]
     codes = said["box_codes"][chosen, 1]
     codes = codes * codes.new_tensor(BOX_DEVIATION)

@@ -108,7 +108,7 @@ class StereoRcnnNetwork(Network):
         found = []
         for i in range(len(outputs["rois_left"])):
             said = {name: tensor[i].float().cpu() for name, tensor in outputs.items()}
-            cars = decode_cars(said, scale, self._input_size(size_px), self.options.least_score)
+            cars = decode_cars(said, scale, self._input_size(size_px), self.options.score_threshold)
             labels = [place_car(car, calibration, pair, self.options.aligned_bias_px) for car in cars]
             found.append(tuple(label for label in labels if label is not None))
         return found

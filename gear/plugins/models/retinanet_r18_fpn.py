@@ -43,7 +43,7 @@ def build_r18(options: ReferenceDetectorOptions) -> RetinaNetDetector:
     from gear.networks.weights import build_graph
 
     return RetinaNetDetector(
-        build_graph(lambda: retinanet_r18_fpn(len(CATEGORIES), options.least_score), options, R18),
+        build_graph(lambda: retinanet_r18_fpn(len(CATEGORIES), options.score_threshold), options, R18),
         options,
         sizing=Sizing(inner_px=scaled(scale_of(options, R18)), smooth=True),
         categories=CATEGORIES,
@@ -59,7 +59,7 @@ def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
     from gear.networks.weights import build_graph
 
     return LiteRetinaNetDetector(
-        build_graph(lambda: retinanet_lite0_fpn(len(CATEGORIES), options.least_score), options, LITE0),
+        build_graph(lambda: retinanet_lite0_fpn(len(CATEGORIES), options.score_threshold), options, LITE0),
         options,
         sizing=Sizing(inner_px=scaled(scale_of(options, LITE0)), smooth=True, mean=MEAN, std=STD),
         categories=CATEGORIES,

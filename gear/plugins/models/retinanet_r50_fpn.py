@@ -24,7 +24,7 @@ def build(options: OfficialDetectorOptions) -> RetinaNetDetector:
     from gear.networks.weights import build_graph
 
     return RetinaNetDetector(
-        build_graph(lambda: retinanet_r50_fpn(options.least_score), options, NAME),
+        build_graph(lambda: retinanet_r50_fpn(options.score_threshold), options, NAME),
         options,
         sizing=Sizing(inner_px=fitted(options.min_size_px, options.max_size_px)),
         categories=OFFICIAL_CATEGORIES,

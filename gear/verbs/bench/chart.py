@@ -45,7 +45,7 @@ def chart(task: TaskResult, form: Literal["svg", "pdf", "png"]) -> bytes:
     axis.set_yticks([at for at, _ in ticks], [name for _, name in ticks], fontsize=8)
     axis.invert_yaxis()
     assert task.metric is not None
-    better = "less" if task.metric.less_is_better else "more"
+    better = "lower" if task.metric.lower_is_better else "higher"
     axis.set_xlabel(f"{task.metric.title} ({better} is better)", fontsize=8)
     axis.tick_params(axis="x", labelsize=8)
     axis.grid(axis="x", alpha=0.3)

@@ -43,18 +43,18 @@ class Metric:
     Attributes:
         report: name of the metric report that contains it; `task` is the task's own evaluator.
         name: name of the metric in the report.
-        less_is_better: whether smaller values are better, as for errors.
+        lower_is_better: whether smaller values are better, as for errors.
     """
 
     report: str
     name: str
-    less_is_better: bool = False
+    lower_is_better: bool = False
 
     @classmethod
-    def of(cls, metric: str, *, less_is_better: bool) -> Metric:
+    def of(cls, metric: str, *, lower_is_better: bool) -> Metric:
         """Parses the name of a metric, such as `miou`, or with its report, such as `reference.car_bev_moderate_r40`."""
         report, dot, name = metric.rpartition(".")
-        return cls(report=report if dot else TASK, name=name, less_is_better=less_is_better)
+        return cls(report=report if dot else TASK, name=name, lower_is_better=lower_is_better)
 
     @property
     def title(self) -> str:
@@ -209,7 +209,7 @@ class BenchReport:
 def _task_json(task: TaskResult, out: Path) -> Json:
     metric = task.metric
     return {
-        "metric": None if metric is None else {"name": metric.title, "less_is_better": metric.less_is_better},
+        "metric": None if metric is None else {"name": metric.title, "lower_is_better": metric.lower_is_better},
         "results": [_result_json(task, one, out) for one in task.results],
     }
 

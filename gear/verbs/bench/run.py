@@ -254,7 +254,7 @@ def _report(plan: Plan, root: Path, evaluations: dict[str, EvaluateReport]) -> B
     tasks = []
     for contest in plan.contests:
         spec = contest.task
-        metric = Metric.of(spec.metric, less_is_better=spec.less_is_better) if spec.metric else None
+        metric = Metric.of(spec.metric, lower_is_better=spec.lower_is_better) if spec.metric else None
         results = [_result(match, metric, evaluations[str(match.out)], plan) for match in plan.matches(contest)]
         tasks.append(TaskResult(name=contest.name, metric=metric, results=tuple(results)))
     notes = [note for task in tasks for one in task.results for note in one.evaluation.facts.get("notes", [])]

@@ -34,7 +34,7 @@ def title(task: TaskResult) -> str:
     """Returns the title of a task's table: task, main metric, and whether higher or lower values are better."""
     if task.metric is None:
         return task.name
-    return f"{task.name}: {task.metric.title} ({'less' if task.metric.less_is_better else 'more'} is better)"
+    return f"{task.name}: {task.metric.title} ({'lower' if task.metric.lower_is_better else 'higher'} is better)"
 
 
 def legend() -> str:

@@ -95,4 +95,4 @@ def rank(metrics: Mapping[str, float], spec: TaskSpec[Any]) -> tuple[float, floa
     value = metrics.get(spec.metric, math.nan)
     if value != value:
         return (-math.inf, loss)
-    return (-value if spec.less_is_better else value, loss)
+    return (-value if spec.lower_is_better else value, loss)

@@ -307,7 +307,7 @@ def test_training_learns() -> None:
         assert sum(model(batch, samples).values()).item() < history[0]
 
 
-@pytest.mark.parametrize("options", [{"input_scale": 0.0}, {"input_scale": 5.0}, {"least_score": 1.5}])
+@pytest.mark.parametrize("options", [{"input_scale": 0.0}, {"input_scale": 5.0}, {"score_threshold": 1.5}])
 def test_options_that_make_no_sense(options: dict[str, float]) -> None:
     with pytest.raises(FieldError):
         retinanet_r18.config(**options)

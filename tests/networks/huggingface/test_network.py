@@ -84,7 +84,7 @@ class TestDepthAnything(FolderContract):
 class TestYolos(FolderContract):
     spec = detect2d
     network = yolos
-    extra: ClassVar[dict[str, Any]] = {"least_score": 0.0}
+    extra: ClassVar[dict[str, Any]] = {"score_threshold": 0.0}
     task_options = SMALL
 
 
@@ -92,7 +92,7 @@ class TestRtDetr(FolderContract):
     spec = detect2d
     network = rt_detr
     processor: ClassVar[dict[str, Any]] = {"size": {"height": 64, "width": 64}, "do_normalize": False}
-    extra: ClassVar[dict[str, Any]] = {"least_score": 0.0}
+    extra: ClassVar[dict[str, Any]] = {"score_threshold": 0.0}
     task_options = SMALL
 
 

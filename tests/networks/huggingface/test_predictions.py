@@ -133,7 +133,7 @@ def test_boxes_are_those_of_the_processor(
 ) -> None:
     folder = saved(lively(make), tmp_path, **processor)
     least = 0.05
-    model: Any = detect2d.build(DetectorFolderOptions(folder=str(folder), device="cpu", least_score=least))
+    model: Any = detect2d.build(DetectorFolderOptions(folder=str(folder), device="cpu", score_threshold=least))
     assert model.unmatched == ("unicorn",)
     own, said = theirs(folder, "ObjectDetection", size)
     # Those of two families take a hundred rows, whatever the number of queries, unless they are told.

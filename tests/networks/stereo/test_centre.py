@@ -122,7 +122,7 @@ def test_decoding_gives_back_what_the_maps_say() -> None:
         outputs[name][0, :, row, column] = torch.tensor(values)
     outputs["heat"][0, KINDS.index("Car"), row, column] = 2.0
     outputs["heat"][0, [i for i in range(len(KINDS)) if KINDS[i] != "Car"], row, column] = -9.0
-    (label,) = decode(outputs, KINDS, calibration, (STRIDE, STRIDE), Peaks(least_score=0.1))[0]
+    (label,) = decode(outputs, KINDS, calibration, (STRIDE, STRIDE), Peaks(score_threshold=0.1))[0]
     u, v = (column + 0.5) * STRIDE - 0.5, (row + 0.5) * STRIDE - 0.5
     middle = calibration.intrinsics.unproject([u + 3, v - 2], np.array(depth_m))
     assert label.type == "Car" and label.occluded == 0
@@ -184,7 +184,7 @@ def test_one_object_is_reported_once() -> None:
         outputs |= {"disparity_spread": torch.full((1, 1, 24, 64), -4.0), "heat": torch.full((1, 6, 24, 64), -9.0)}
         outputs["heat"][0, 0, 12, 30], outputs["heat"][0, 0, 12, 32] = 3.0, 2.0
         outputs["disparity_px"][0, 0, 12, 32] *= factor
-        found = decode(outputs, KINDS, calibration, (STRIDE, STRIDE), Peaks(least_score=0.1))[0]
+        found = decode(outputs, KINDS, calibration, (STRIDE, STRIDE), Peaks(score_threshold=0.1))[0]
         assert len(found) == expected
         assert [label.score for label in found] == sorted((label.score for label in found), reverse=True)
 

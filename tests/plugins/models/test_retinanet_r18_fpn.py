@@ -7,7 +7,7 @@ from gear.testing.model_contract import ModelContract
 from gear.values.labels import LABELS
 from tests.networks.detector_samples import SMALL
 
-OPTIONS: dict[str, Any] = {"weights": "none", "device": "cpu", "least_score": 0.01}
+OPTIONS: dict[str, Any] = {"weights": "none", "device": "cpu", "score_threshold": 0.01}
 
 
 class TestRetinaNetR18(ModelContract):

@@ -105,7 +105,7 @@ def _check_files(out: Path, report: BenchReport) -> None:
         lines = list(csv.DictReader(file))
     assert len(lines) == sum(3 * len(one.evaluation.pools) for one in report.tasks[0].results)
     assert {line["scene"] for line in lines} == {"all", "tiny-board", "tiny-double"}
-    assert (out / "table.txt").read_text().startswith("semseg: miou (more is better)\n")
+    assert (out / "table.txt").read_text().startswith("semseg: miou (higher is better)\n")
     page = (out / "report.html").read_text()
     against = "change and AUROC: of a patch against a random one, and of a random one against none"
     assert all(against in shown for shown in (page, (out / "table.txt").read_text()))

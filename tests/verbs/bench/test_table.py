@@ -14,13 +14,13 @@ def task(metric: Metric | None) -> Any:
 
 
 def test_the_title_says_which_direction_is_better() -> None:
-    assert table.title(task(Metric.of("rmse_m", less_is_better=True))) == "depth: rmse_m (less is better)"
-    assert table.title(task(Metric.of("miou", less_is_better=False))) == "depth: miou (more is better)"
+    assert table.title(task(Metric.of("rmse_m", lower_is_better=True))) == "depth: rmse_m (lower is better)"
+    assert table.title(task(Metric.of("miou", lower_is_better=False))) == "depth: miou (higher is better)"
     assert table.title(task(None)) == "depth"
 
 
 def test_the_metric_names_its_column_and_empty_columns_are_left_out() -> None:
-    one = task(Metric.of("miou", less_is_better=False))
+    one = task(Metric.of("miou", lower_is_better=False))
     assert table.head(one)[3] == "miou"
     assert table.head(task(None))[3] == ""
     assert table.columns(one) == [[]]

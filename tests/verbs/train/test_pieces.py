@@ -72,14 +72,14 @@ def test_biases_do_not_decay_and_frozen_weights_are_left_out() -> None:
 @dataclass(frozen=True)
 class Goal:
     metric: str = "d1"
-    less_is_better: bool = False
+    lower_is_better: bool = False
 
 
 def test_checkpoints_are_ranked_by_the_tasks_metric_and_then_by_the_loss() -> None:
     def ranked(goal: Any, **metrics: float) -> tuple[float, float]:
         return rank(metrics, goal)
 
-    more, less = Goal(), Goal(less_is_better=True)
+    more, less = Goal(), Goal(lower_is_better=True)
     assert ranked(more, d1=0.9, loss=9) > ranked(more, d1=0.8, loss=1)
     assert ranked(less, d1=0.8, loss=9) > ranked(less, d1=0.9, loss=1)
     assert ranked(more, d1=0.5, loss=1) > ranked(more, d1=0.5, loss=2)

@@ -42,14 +42,14 @@ class DetectorConfig(LabelledConfig):
     """Options of a detector.
 
     Attributes:
-        least_score: smallest score, 0..1, of a detection that is reported.
+        score_threshold: smallest score, 0..1, of a detection that is reported.
     """
 
-    least_score: float = 0.05
+    score_threshold: float = 0.05
 
     def __post_init__(self) -> None:
-        if not 0 <= self.least_score <= 1:
-            raise FieldError("least_score", f"must be 0 to 1, got {self.least_score:g}")
+        if not 0 <= self.score_threshold <= 1:
+            raise FieldError("score_threshold", f"must be 0 to 1, got {self.score_threshold:g}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,14 +18,14 @@ class Detector(FolderModel):
 
     def __init__(self, config: DetectorConfig) -> None:
         super().__init__(config, "AutoModelForObjectDetection")
-        self.least_score = config.least_score
+        self.score_threshold = config.score_threshold
         known = {name: number for number, name in CATEGORY_NAMES.items()}
         self.category_ids = numbers_of_classes(self.network, known, config)
 
     def outputs(self, pictures: Tensor) -> Mapping[str, Tensor]:
         """`logits` and `pred_boxes`, one row for each of N object queries."""
-        said = self.network(**self.seen(pictures))
-        return {"logits": said.logits, "pred_boxes": said.pred_boxes}
+        raw = self.network(**self.seen(pictures))
+        return {"logits": raw.logits, "pred_boxes": raw.pred_boxes}
 
     def losses(self, pictures: Tensor, targets: Sequence[Any]) -> Mapping[str, Tensor]:
         """The network's own set loss against the objects of classes that it has."""
@@ -47,9 +47,9 @@ class Detector(FolderModel):
         picture.
         """
         height, width = picture.shape[2:]
-        said = self.network(**self.seen(picture))
+        raw = self.network(**self.seen(picture))
         sizes = torch.tensor([[height, width]], device=picture.device)
-        (found,) = self.processor.post_process_object_detection(said, threshold=self.least_score, target_sizes=sizes)
+        (found,) = self.processor.post_process_object_detection(raw, threshold=self.score_threshold, target_sizes=sizes)
         corners = found["boxes"].clamp(min=0).minimum(torch.tensor([width, height] * 2, device=picture.device))
         detections = [
             Detection(category_id=self.category_ids[index], box_px=(box[0], box[1], box[2], box[3]), score=score)
