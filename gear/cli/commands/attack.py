@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 EXAMPLE = """examples:
   gear collect --task semseg --scene billboard01 --split train --probes --out data/b01
   gear attack --model ddrnet23_slim --data data/b01 --out patches/b01
-  gear attack --model ddrnet23_slim --data data/b01 --set target=sky --set attacked=road --out patches/road_to_sky
+  gear attack --model ddrnet23_slim --data data/b01 --set target=sky --set source_class=road --out patches/road_to_sky
   gear attack --model ddrnet23_slim_depth --attack carla_gear --steps 5100 --data data/depth --out patches/paper
   gear attack --model ddrnet23_slim --attack square --queries 5000 --data data/b01 --out patches/black-box
   gear attack --model ddrnet23_slim --data data/b01 --data data/b02 --data data/b01-sunset --out patches/universal

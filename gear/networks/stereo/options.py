@@ -77,26 +77,26 @@ class StereoRcnnOptions(StereoOptions):
 
     Attributes:
         short_side_px: the pictures are enlarged until their shorter side has this many pixels.
-        considered: number of best-scored anchors from which proposals are made; twice as many in training.
+        pre_nms_top_n: number of best-scored anchors from which proposals are made; twice as many in training.
         proposals: number of box pairs for the second stage.
         score_threshold: smallest score, 0..1, of a detection that is reported.
-        aligns: whether depth is refined by dense photometric alignment. If not, it follows from the boxes and the
+        refine_depth: whether depth is refined by dense photometric alignment. If not, it follows from the boxes and the
             keypoint.
         aligned_bias_px: value added to every aligned disparity. The authors add 0.5; by geometry it should be 0.
     """
 
     short_side_px: int = 600
-    considered: int = 6000
+    pre_nms_top_n: int = 6000
     proposals: int = 300
     score_threshold: float = 0.05
-    aligns: bool = True
+    refine_depth: bool = True
     aligned_bias_px: float = 0.0
 
     def __post_init__(self) -> None:
         StereoOptions.__post_init__(self)
         if not 32 <= self.short_side_px <= 4096:
             raise FieldError("short_side_px", f"must be 32 to 4096, got {self.short_side_px}")
-        if not 1 <= self.proposals <= self.considered:
-            raise FieldError("proposals", f"must be 1 to the {self.considered} considered, got {self.proposals}")
+        if not 1 <= self.proposals <= self.pre_nms_top_n:
+            raise FieldError("proposals", f"must be 1 to pre_nms_top_n ({self.pre_nms_top_n}), got {self.proposals}")
         if not 0 <= self.score_threshold <= 1:
             raise FieldError("score_threshold", f"must be 0 to 1, got {self.score_threshold:g}")

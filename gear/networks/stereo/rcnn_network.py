@@ -85,7 +85,7 @@ class StereoRcnnNetwork(Network):
             views = {name: view.to(self.device) for name, view in as_batch([sample], self._views).items()}
             with torch.inference_mode():
                 outputs = self(views)
-                pair = self._compared(views) if self.options.aligns else None
+                pair = self._compared(views) if self.options.refine_depth else None
                 found += self._placed(outputs, sample[LEFT].shape[:2], pair)
         return found
 
@@ -149,8 +149,8 @@ class StereoRcnnNetwork(Network):
     def _proposed(
         self, chances: Tensor, codes: Tensor, places: Tensor, size: tuple[int, int], most: int
     ) -> tuple[Tensor, Tensor]:
-        considered = self.options.considered * (2 if self.training else 1)
-        return propose(chances[0].float(), codes[0].float(), places, size, considered=considered, most=most)
+        pre_nms_top_n = self.options.pre_nms_top_n * (2 if self.training else 1)
+        return propose(chances[0].float(), codes[0].float(), places, size, pre_nms_top_n=pre_nms_top_n, most=most)
 
     def _draws(self, count: int) -> list[torch.Generator]:
         """A random generator for each picture of a batch."""

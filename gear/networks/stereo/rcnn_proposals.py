@@ -12,7 +12,7 @@ SAME_OVERLAP = 0.7
 
 
 def propose(
-    chances: Tensor, codes: Tensor, anchors: Tensor, size_px: tuple[int, int], *, considered: int, most: int
+    chances: Tensor, codes: Tensor, anchors: Tensor, size_px: tuple[int, int], *, pre_nms_top_n: int, most: int
 ) -> tuple[Tensor, Tensor]:
     """Selects the best box pairs of one picture by non-maximum suppression; a pair is kept if both its left and
     its right box are kept.
@@ -24,14 +24,14 @@ def propose(
         codes: (A, 6) codes of the anchors' box pairs.
         anchors: (A, 4) anchors in pixels of the network's input.
         size_px: height and width of the network's input.
-        considered: number of anchors with the highest probability from which pairs are selected.
+        pre_nms_top_n: number of anchors with the highest probability from which pairs are selected.
         most: largest number of pairs.
 
     Returns:
         (R, 4) left and (R, 4) right boxes, R <= most, best first.
     """
     with torch.no_grad():
-        order = chances.argsort(descending=True, stable=True)[:considered]
+        order = chances.argsort(descending=True, stable=True)[:pre_nms_top_n]
         left, right = (clip(decode(part, anchors[order]), size_px) for part in left_and_right(codes[order]))
         scores = chances[order]
         in_both = torch.ones(len(order), dtype=torch.bool, device=order.device)

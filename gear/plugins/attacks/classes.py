@@ -11,28 +11,29 @@ from gear.values.errors import FieldError, GearError
 LABEL_IDS: Mapping[str, int] = {label.name: label.id for label in LABELS if label.is_evaluated}
 
 
-def check_classes(attacked: str, target: str) -> None:
-    """Checks the options `attacked` and `target` of a targeted attack on semantic segmentation.
+def check_classes(source_class: str, target: str) -> None:
+    """Checks the options `source_class` and `target` of a targeted attack on semantic segmentation.
 
-    Each option is empty or the name of a class that Cityscapes evaluates, and `attacked` is allowed only with `target`.
+    Each option is empty or the name of a class that Cityscapes evaluates, and `source_class` is allowed only with
+    `target`.
 
     Raises:
         FieldError: an option is wrong; the message names it.
     """
-    for name, value in (("attacked", attacked), ("target", target)):
+    for name, value in (("source_class", source_class), ("target", target)):
         if value and value not in LABEL_IDS:
             raise FieldError(name, f"must be one of {', '.join(LABEL_IDS)}, got {value!r}")
-    if attacked and not target:
-        raise FieldError("target", "must say what the attacked class is to become")
+    if source_class and not target:
+        raise FieldError("target", "must name the class into which source_class is turned")
 
 
-def check_seen(attacked: str, dataset: Sequence[Any]) -> None:
+def check_seen(source_class: str, dataset: Sequence[Any]) -> None:
     """Checks that the ground truth of at least one sample contains the attacked class; an empty name passes.
 
     Raises:
         GearError: no sample contains the class, so there is nothing to attack.
     """
-    if attacked and not any(bool((sample.label_ids == LABEL_IDS[attacked]).any()) for sample in dataset):
+    if source_class and not any(bool((sample.label_ids == LABEL_IDS[source_class]).any()) for sample in dataset):
         raise GearError(
-            f"option attacked: none of the {len(dataset)} pictures shows {attacked}; name a class that is seen"
+            f"option source_class: none of the {len(dataset)} pictures shows {source_class}; name a class that they show"
         )

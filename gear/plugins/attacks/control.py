@@ -27,17 +27,18 @@ class ControlConfig:
 
     Attributes:
         kind: `noise` draws every value uniformly; `solid` is one colour; `matched` is noise with the mean colour, the
-            covariance of colours and the power spectrum of the patches in `like`.
-        height_px, width_px: size of every patch, pixels; `matched` takes the size of the patches in `like`.
+            covariance of colours and the power spectrum of the patches in `reference_patches`.
+        height_px, width_px: size of every patch, pixels; `matched` takes the size of the patches in
+            `reference_patches`.
         rgb: colour for `solid`, sRGB in 0..1.
-        like: folder of the patches that `matched` imitates, written by `gear attack`.
+        reference_patches: folder of the patches that `matched` imitates, written by `gear attack`.
     """
 
     kind: Literal["noise", "solid", "matched"] = "noise"
     height_px: int = 150
     width_px: int = 300
     rgb: tuple[float, float, float] = (0.5, 0.5, 0.5)
-    like: str = ""
+    reference_patches: str = ""
 
     def __post_init__(self) -> None:
         for name in ("height_px", "width_px"):
@@ -45,8 +46,8 @@ class ControlConfig:
                 raise FieldError(name, f"must be 2 to 4096, got {getattr(self, name)}")
         if not all(0 <= value <= 1 for value in self.rgb):
             raise FieldError("rgb", f"must be three numbers of 0 to 1, got {self.rgb}")
-        if (self.kind == "matched") != bool(self.like):
-            raise FieldError("like", "must name a patch folder for kind=matched, and only there")
+        if (self.kind == "matched") != bool(self.reference_patches):
+            raise FieldError("reference_patches", "must name a patch folder for kind=matched, and only there")
 
 
 class Control:
@@ -56,14 +57,16 @@ class Control:
         self._config = config
 
     def read_sha256(self) -> str | None:
-        """The SHA-256 hash of the unrounded patches in the folder `like`; None if the option is not used.
+        """The SHA-256 hash of the unrounded patches in the folder `reference_patches`; None if the option is not used.
 
         Raises:
             GearError: the folder has no file with unrounded patches.
         """
-        if not self._config.like:
+        if not self._config.reference_patches:
             return None
-        return hashlib.sha256(b"".join(patch.tobytes() for patch in read_exact(Path(self._config.like)))).hexdigest()
+        return hashlib.sha256(
+            b"".join(patch.tobytes() for patch in read_exact(Path(self._config.reference_patches)))
+        ).hexdigest()
 
     def optimise(
         self,
@@ -78,14 +81,17 @@ class Control:
         """Makes one patch for each patch surface of the scene; the model and the budget are not used.
 
         Raises:
-            GearError: the folder `like` has fewer patches than the scene has surfaces, or no unrounded patches.
+            GearError: the folder `reference_patches` has fewer patches than the scene has surfaces, or no unrounded
+                patches.
         """
         config, count = self._config, len(dataset[0].record.surfaces)
         size = (config.height_px, config.width_px, 3)
         if config.kind == "matched":
-            originals = read_exact(Path(config.like))
+            originals = read_exact(Path(config.reference_patches))
             if len(originals) < count:
-                raise GearError(f"{config.like}: has {len(originals)} patches; the scene has {count} surfaces")
+                raise GearError(
+                    f"{config.reference_patches}: has {len(originals)} patches; the scene has {count} surfaces"
+                )
             made = [matched(original, rng) for original in originals[:count]]
         elif config.kind == "solid":
             made = [np.broadcast_to(np.asarray(config.rgb), size) for _ in range(count)]

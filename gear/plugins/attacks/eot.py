@@ -37,14 +37,14 @@ class EotConfig(Settings):
 
     Attributes:
         share: width of a pasted patch before scaling, as a share of the picture's width.
-        least_scale, most_scale: range of the random factor on that width.
+        min_scale, max_scale: range of the random factor on that width.
         shift: largest shift of a patch from its regular position along each axis, as a share of the patch's size. The
             regular position of a single patch is the middle of the picture.
     """
 
     share: float = 0.15
-    least_scale: float = 0.8
-    most_scale: float = 1.2
+    min_scale: float = 0.8
+    max_scale: float = 1.2
     shift: float = 0.5
     appearance: EotAppearance = field(default_factory=EotAppearance)
 
@@ -52,8 +52,8 @@ class EotConfig(Settings):
         Settings.__post_init__(self)
         if not 0.01 <= self.share <= 1:
             raise FieldError("share", f"must be 0.01 to 1, got {self.share:g}")
-        if not 0 < self.least_scale <= self.most_scale <= 10:
-            raise FieldError("least_scale", f"must be above 0 and at most most_scale, got {self.least_scale:g}")
+        if not 0 < self.min_scale <= self.max_scale <= 10:
+            raise FieldError("min_scale", f"must be above 0 and at most max_scale, got {self.min_scale:g}")
 
 
 class Eot:
@@ -84,7 +84,7 @@ class Eot:
             seed=seed,
             aspect=config.height_px / config.width_px,
             share=config.share,
-            scales=(config.least_scale, config.most_scale),
+            scales=(config.min_scale, config.max_scale),
             shift=config.shift,
         )
         problem = Problem(model=model, dataset=scenes, compositor=scenes, settings=config)

@@ -51,8 +51,8 @@ class Rp2Config(TextureSettings):
         norm_weight: weight of the perturbation's 2-norm.
         printability_weight: weight of the non-printability score, a mean over pixels.
         smoothness_weight: weight of the smoothness term, a mean over pixels.
-        attacked, target: for semantic segmentation: Cityscapes classes. Pixels of `attacked` (all pixels if empty) are
-            pushed to `target`. If `target` is empty, the attack is untargeted.
+        source_class, target: for semantic segmentation: Cityscapes classes. Pixels of `source_class` (all pixels if
+            empty) are pushed to `target`. If `target` is empty, the attack is untargeted.
     """
 
     height_px: int = 32
@@ -63,7 +63,7 @@ class Rp2Config(TextureSettings):
     smoothness_weight: float = 1e-3
     learning_rate: float | tuple[float, float, float] = 0.25
     decay: bool = False
-    attacked: str = ""
+    source_class: str = ""
     target: str = ""
     appearance: Rp2Appearance = field(default_factory=Rp2Appearance)
 
@@ -71,7 +71,7 @@ class Rp2Config(TextureSettings):
         TextureSettings.__post_init__(self)
         if not 0 <= self.base <= 1:
             raise FieldError("base", f"must be 0 to 1, got {self.base:g}")
-        check_classes(self.attacked, self.target)
+        check_classes(self.source_class, self.target)
 
 
 class Rp2:
@@ -95,7 +95,7 @@ class Rp2:
 
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
         objective = self.objective(dataset[0])
-        check_seen(self._config.attacked, dataset)
+        check_seen(self._config.source_class, dataset)
 
         def harm(_: Tensor, seen: Seen) -> Mapping[str, Tensor]:
             return self._harm(problem.model, objective, seen)
@@ -106,18 +106,18 @@ class Rp2:
         """The objective for a sample: towards the class `target` if the option is set, otherwise untargeted.
 
         Raises:
-            GearError: `target` or `attacked` is set, but the sample has no semantic labels.
+            GearError: `target` or `source_class` is set, but the sample has no semantic labels.
         """
         from gear.plugins.attacks.optimisation.objectives import SemsegObjective, default_objective, kind_of
 
         config = self._config
         if kind_of(sample) != "semseg":
-            for name in ("target", "attacked"):
+            for name in ("target", "source_class"):
                 if getattr(config, name):
                     whose = "semantic segmentation; these are other samples"
                     raise GearError(f"option {name} of the attack is for {whose}")
         elif config.target:
-            return SemsegObjective(attacked=LABEL_IDS.get(config.attacked), target=LABEL_IDS[config.target])
+            return SemsegObjective(source_class=LABEL_IDS.get(config.source_class), target=LABEL_IDS[config.target])
         return default_objective(sample)
 
     def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from gear.contracts.attacks import Objective
 
 CATEGORY_IDS = {name: number for number, name in CATEGORY_NAMES.items()}
-APPEARS = "person"
+APPEAR_CLASS = "person"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,12 +38,12 @@ class SceneSpecificConfig(Settings):
         gamma: for semantic segmentation: weight 0 to 1 of the pixels that are still classified correctly; below 0 their
             current share of all pixels. For depth: weight of the pixels whose error is below half a metre; below 0
             stands for 0.8.
-        attacked, target: for semantic segmentation: Cityscapes classes. Pixels of `attacked` (all pixels if empty) are
-            pushed to `target`. If `target` is empty, the attack is untargeted.
+        source_class, target: for semantic segmentation: Cityscapes classes. Pixels of `source_class` (all pixels if
+            empty) are pushed to `target`. If `target` is empty, the attack is untargeted.
         direction: for depth: `any` error, or depth that is `farther` or `nearer`.
         goal: `harm` for any harm; `vanish` makes all objects vanish (detectors and stereo networks); `appear` makes an
             object appear on the patch (2D detection).
-        appears: COCO category of the object that appears.
+        appear_class: COCO category of the object that appears.
         losses: for detectors and stereo networks: sign of each loss by name, `+` to maximise, `-` to minimise, 0 to
             ignore, such as `bbox_regression=-`. Losses without a sign are maximised. With a `goal` other than `harm`
             all losses are minimised, and a loss can only be ignored.
@@ -51,22 +51,24 @@ class SceneSpecificConfig(Settings):
 
     learning_rate: float | tuple[float, float, float] | None = None
     gamma: float = -1.0
-    attacked: str = ""
+    source_class: str = ""
     target: str = ""
     direction: Literal["any", "farther", "nearer"] = "any"
     goal: Literal["harm", "vanish", "appear"] = "harm"
-    appears: str = APPEARS
+    appear_class: str = APPEAR_CLASS
     losses: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         Settings.__post_init__(self)
         if self.gamma > 1:
             raise FieldError("gamma", f"must be 0 to 1, or below 0, got {self.gamma:g}")
-        check_classes(self.attacked, self.target)
-        if self.appears not in CATEGORY_IDS:
-            raise FieldError("appears", f"must be a COCO category such as person or car, got {self.appears!r}")
-        if self.appears != APPEARS and self.goal != "appear":
-            raise FieldError("appears", "must come with goal=appear, which makes it appear")
+        check_classes(self.source_class, self.target)
+        if self.appear_class not in CATEGORY_IDS:
+            raise FieldError(
+                "appear_class", f"must be a COCO category such as person or car, got {self.appear_class!r}"
+            )
+        if self.appear_class != APPEAR_CLASS and self.goal != "appear":
+            raise FieldError("appear_class", "must come with goal=appear, which makes it appear")
         for name, sign in self.losses.items():
             if sign not in SIGNS:
                 raise FieldError(f"losses.{name}", f"must be one of {', '.join(SIGNS)}, got {sign!r}")
@@ -98,7 +100,7 @@ class SceneSpecific:
         from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
 
         objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
-        check_seen(self._config.attacked, dataset)
+        check_seen(self._config.source_class, dataset)
         self._check_losses(model, dataset[0])
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
         return optimise_textures(
@@ -126,7 +128,7 @@ class SceneSpecific:
         if kind == "semseg":
             return SemsegObjective(
                 gamma="dynamic" if config.gamma < 0 else config.gamma,
-                attacked=LABEL_IDS.get(config.attacked),
+                source_class=LABEL_IDS.get(config.source_class),
                 target=LABEL_IDS.get(config.target),
             )
         if kind == "depth":
@@ -139,7 +141,7 @@ class SceneSpecific:
         config = self._config
         for name, is_set, wanted, whose in (
             ("target", config.target, ("semseg",), "semantic segmentation"),
-            ("attacked", config.attacked, ("semseg",), "semantic segmentation"),
+            ("source_class", config.source_class, ("semseg",), "semantic segmentation"),
             ("gamma", config.gamma >= 0, ("semseg", "depth"), "semantic segmentation and depth"),
             ("direction", config.direction != "any", ("depth",), "depth"),
             ("goal", config.goal != "harm", ("losses",), "detectors and stereo networks"),
@@ -173,7 +175,7 @@ class SceneSpecific:
         for name, sign in config.losses.items():
             if sign != "0":
                 raise GearError(f"option losses.{name}: goal={config.goal} makes losses small; 0 leaves one out")
-        category_id = CATEGORY_IDS[config.appears] if config.goal == "appear" else 0
+        category_id = CATEGORY_IDS[config.appear_class] if config.goal == "appear" else 0
         return DetectionGoal(goal=config.goal, category_id=category_id, left_out=frozenset(config.losses))
 
 

@@ -21,7 +21,7 @@ SCALES, CROPS_PX = (0.1, 100.0), (16, 8192)
 MOST_RATE = 1e6
 """Largest allowed learning rate, because optimisers fail at rates that float32 cannot represent."""
 
-SHARES = ("warm_up", "final_rate", "validation_share")
+SHARES = ("warmup_fraction", "final_lr_fraction", "validation_share")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,8 +74,8 @@ class TrainConfig(Recipe):
             with reference weights, which loads the weights whose keys and shapes match.
         picture_scale: factor by which pictures are resized in training and validation; null is 1, or, with a time
             budget on a CPU, a factor that leaves time for enough steps.
-        warm_up: share of the training during which the learning rate rises.
-        final_rate: learning rate at the end, as a share of the peak.
+        warmup_fraction: share of the training during which the learning rate rises.
+        final_lr_fraction: learning rate at the end, as a share of the peak.
         ema: decay of the exponential moving average of the weights, which is validated and saved; 0 for no averaging.
         validation_share: share of the training data that is held out for validation if no validation data are given.
         validation_samples: largest number of samples of a validation, spread evenly over the data.
@@ -94,8 +94,8 @@ class TrainConfig(Recipe):
     device: Literal["auto", "cpu", "cuda"] = "auto"
     init: str = ""
     picture_scale: float | None = None
-    warm_up: float = 0.03
-    final_rate: float = 0.01
+    warmup_fraction: float = 0.03
+    final_lr_fraction: float = 0.01
     ema: float = 0.998
     validation_share: float = 0.08
     validation_samples: int = 48

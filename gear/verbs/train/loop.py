@@ -183,7 +183,7 @@ class Training:
 
     def _step(self, batch: Batch) -> None:
         progress, config = self.progress, self._config
-        factor = rate_share(self.share, warm_up=config.warm_up, final=config.final_rate)
+        factor = rate_share(self.share, warmup_fraction=config.warmup_fraction, final=config.final_lr_fraction)
         for group in self._optimiser.param_groups:
             group["lr"] = config.learning_rate * factor
         views = {name: picture.contiguous(memory_format=self._memory) for name, picture in batch.views.items()}

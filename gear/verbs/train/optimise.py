@@ -26,19 +26,19 @@ def optimiser_of(module: nn.Module, config: TrainConfig) -> torch.optim.Optimize
     return torch.optim.AdamW(groups, lr=config.learning_rate)
 
 
-def rate_share(progress: float, *, warm_up: float, final: float) -> float:
+def rate_share(progress: float, *, warmup_fraction: float, final: float) -> float:
     """Returns the learning rate as a share of its peak: a linear rise, then half a cosine.
 
     The cosine is eq. 5 of Loshchilov and Hutter, "SGDR", 2017, without restarts.
 
     Args:
         progress: share of the training that is finished, 0..1.
-        warm_up: share of the training during which the rate rises.
+        warmup_fraction: share of the training during which the rate rises.
         final: learning rate at the end, as a share of the peak.
     """
-    if progress < warm_up:
-        return final + (1 - final) * progress / warm_up
-    fallen = min(1.0, (progress - warm_up) / (1 - warm_up))
+    if progress < warmup_fraction:
+        return final + (1 - final) * progress / warmup_fraction
+    fallen = min(1.0, (progress - warmup_fraction) / (1 - warmup_fraction))
     return final + (1 - final) * (1 + math.cos(math.pi * fallen)) / 2
 
 

@@ -41,7 +41,7 @@ TINY = StereoRcnnShape(blocks=(1, 1, 1, 1), width=8, pyramid=16, proposals=16, h
 
 
 def tiny() -> StereoRcnnNetwork:
-    options = StereoRcnnOptions(weights="none", device="cpu", short_side_px=96, considered=200, proposals=12)
+    options = StereoRcnnOptions(weights="none", device="cpu", short_side_px=96, pre_nms_top_n=200, proposals=12)
     return StereoRcnnNetwork(options, TINY)
 
 
@@ -137,9 +137,9 @@ def test_proposals_must_survive_on_both_sides() -> None:
     places = torch.tensor([[10.0, 10, 49, 49], [10.0, 10, 49, 49], [100.0, 10, 139, 49]])
     codes = torch.zeros(3, 6)
     codes[1, 0] = 2.0
-    left, right = propose(torch.tensor([0.9, 0.8, 0.7]), codes, places, (64, 200), considered=3, most=3)
+    left, right = propose(torch.tensor([0.9, 0.8, 0.7]), codes, places, (64, 200), pre_nms_top_n=3, most=3)
     assert left.tolist() == [[10, 10, 50, 50], [100, 10, 140, 50]] and torch.equal(left, right)
-    limited, _ = propose(torch.tensor([0.9, 0.8, 0.95]), codes, places, (64, 200), considered=3, most=1)
+    limited, _ = propose(torch.tensor([0.9, 0.8, 0.95]), codes, places, (64, 200), pre_nms_top_n=3, most=1)
     assert limited.tolist() == [[100, 10, 140, 50]]
 
 
@@ -249,7 +249,7 @@ def test_pictures_are_enlarged_as_bgr_less_the_mean() -> None:
     assert shown[0, :, 5, 5].tolist() == pytest.approx([-102.9801, -115.9465, 255 - 122.7717], abs=1e-3)
 
 
-@pytest.mark.parametrize("options", [{"short_side_px": 8}, {"proposals": 0}, {"proposals": 10, "considered": 5}])
+@pytest.mark.parametrize("options", [{"short_side_px": 8}, {"proposals": 0}, {"proposals": 10, "pre_nms_top_n": 5}])
 def test_options_are_checked(options: dict[str, int]) -> None:
     with pytest.raises(FieldError):
         StereoRcnnOptions(**options)  # type: ignore[arg-type]

@@ -11,22 +11,22 @@ from gear.plugins.attacks.classes import LABEL_IDS, check_classes, check_seen
 from gear.values.errors import FieldError, GearError
 
 
-@pytest.mark.parametrize(("attacked", "target"), [("", ""), ("", "road"), ("car", "road")])
-def test_evaluated_classes_are_accepted(attacked: str, target: str) -> None:
-    check_classes(attacked, target)
+@pytest.mark.parametrize(("source_class", "target"), [("", ""), ("", "road"), ("car", "road")])
+def test_evaluated_classes_are_accepted(source_class: str, target: str) -> None:
+    check_classes(source_class, target)
 
 
 @pytest.mark.parametrize(
-    ("attacked", "target", "message"),
+    ("source_class", "target", "message"),
     [
         ("", "tarmac", "target: must be one of road, sidewalk"),
-        ("ego vehicle", "road", "attacked: must be one of"),
-        ("car", "", "target: must say what the attacked class is to become"),
+        ("ego vehicle", "road", "source_class: must be one of"),
+        ("car", "", "target: must name the class into which source_class is turned"),
     ],
 )
-def test_other_combinations_are_refused(attacked: str, target: str, message: str) -> None:
+def test_other_combinations_are_refused(source_class: str, target: str, message: str) -> None:
     with pytest.raises(FieldError, match=message):
-        check_classes(attacked, target)
+        check_classes(source_class, target)
 
 
 def test_the_attacked_class_must_occur() -> None:

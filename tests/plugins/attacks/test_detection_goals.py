@@ -62,10 +62,10 @@ def test_everything_vanishes() -> None:
 
 
 def test_goals_are_options_of_the_scene_specific_attack() -> None:
-    chosen = SceneSpecific(SceneSpecificConfig(goal="appear", appears="car")).objective(sample())
+    chosen = SceneSpecific(SceneSpecificConfig(goal="appear", appear_class="car")).objective(sample())
     assert chosen == DetectionGoal(goal="appear", category_id=3)
     with pytest.raises(FieldError, match="COCO"):
-        SceneSpecificConfig(goal="appear", appears="unicorn")
+        SceneSpecificConfig(goal="appear", appear_class="unicorn")
     stereo = type("Stereo", (), {"images": {}, "objects": ()})()
     with pytest.raises(GearError, match="2D detection"):
         SceneSpecific(SceneSpecificConfig(goal="appear")).objective(stereo)

@@ -278,7 +278,7 @@ def test_matched_noise_is_like_the_patch_and_not_the_patch(tmp_path: Path) -> No
     assert abs(np.corrcoef(noise[..., 0].ravel(), patch[..., 0].ravel())[0, 1]) < 0.9
     save_file({"patch_0": patch.astype(np.float32)}, tmp_path / "patch.safetensors")
     contract = AttackContract()
-    (made,) = control.build(ControlConfig(kind="matched", like=str(tmp_path))).optimise(
+    (made,) = control.build(ControlConfig(kind="matched", reference_patches=str(tmp_path))).optimise(
         contract.model(), contract.dataset(), TinyCompositor(contract.dataset()), budget=Budget(steps=1), rng=rng
     )
     assert made.rgb.shape == (32, 64, 3)
@@ -288,13 +288,13 @@ def test_matched_noise_is_like_the_patch_and_not_the_patch(tmp_path: Path) -> No
     "make",
     [
         lambda: EotConfig(share=0.0),
-        lambda: EotConfig(least_scale=2.0),
+        lambda: EotConfig(min_scale=2.0),
         lambda: NesConfig(pairs=0),
         lambda: NesConfig(spread=0.0),
         lambda: SquareConfig(area=0.0),
         lambda: Rp2Config(base=2.0),
         lambda: Rp2Config(target="rode"),
-        lambda: Rp2Config(attacked="car"),
+        lambda: Rp2Config(source_class="car"),
         lambda: ThysConfig(batch=0),
         lambda: ControlConfig(kind="matched"),
         lambda: ControlConfig(rgb=(0.0, 0.0, 2.0)),
@@ -322,7 +322,7 @@ def test_classes_are_for_segmentation() -> None:
         task = "depth"
 
     (sample, *_) = Depth().dataset()
-    for options in ({"target": "road"}, {"attacked": "car", "target": "road"}):
+    for options in ({"target": "road"}, {"source_class": "car", "target": "road"}):
         with pytest.raises(GearError, match="of the attack is for semantic segmentation"):
             Rp2(Rp2Config(**options)).objective(sample)
 

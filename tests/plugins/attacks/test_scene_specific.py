@@ -133,7 +133,7 @@ def test_names_of_losses_are_those_of_the_model(monkeypatch: pytest.MonkeyPatch)
 def test_a_class_becomes_another() -> None:
     class Contract(AttackContract):
         spec = scene_specific
-        options: ClassVar[Mapping[str, Any]] = {**SMALL, "attacked": "building", "target": "road"}
+        options: ClassVar[Mapping[str, Any]] = {**SMALL, "source_class": "building", "target": "road"}
 
     contract = Contract()
     model, dataset = contract.model(), contract.dataset()
@@ -155,9 +155,9 @@ def test_a_class_becomes_another() -> None:
         ({"learning_rate": 0.0}, "learning_rate"),
         ({"gamma": 1.5}, "gamma"),
         ({"target": "rode"}, "target"),
-        ({"attacked": "car"}, "target"),
-        ({"appears": "car"}, "appears"),
-        ({"appears": "car", "goal": "vanish"}, "appears"),
+        ({"source_class": "car"}, "target"),
+        ({"appear_class": "car"}, "appear_class"),
+        ({"appear_class": "car", "goal": "vanish"}, "appear_class"),
         ({"losses": {"bbox_regression": "x"}}, "losses.bbox_regression"),
     ],
 )

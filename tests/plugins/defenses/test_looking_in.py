@@ -131,7 +131,7 @@ def test_zmask_covers_the_patch_and_spares_the_street() -> None:
 
 
 def test_zmask_leaves_alone_what_it_is_not_sure_of() -> None:
-    model, defense, state = fitted(only_if_sure=True, false_alarms=0.08)
+    model, defense, state = fitted(only_on_alarm=True, false_alarms=0.08)
     for picture, is_left_alone in ((street(80), True), (noisy_patch(street(80), 1)[0], False)):
         cleaned = defense.apply({"left": picture}, model, state, derive_rng(SEED, "apply")).views["left"]
         assert np.array_equal(cleaned, picture) == is_left_alone
@@ -142,7 +142,7 @@ def tensor(*pictures: UInt8Image) -> torch.Tensor:
 
 
 def test_what_zmask_is_not_sure_of_passes_in_a_batch_too() -> None:
-    model, defense, state = fitted(only_if_sure=True, false_alarms=0.08)
+    model, defense, state = fitted(only_on_alarm=True, false_alarms=0.08)
     shown = tensor(street(80), noisy_patch(street(80), 1)[0])
     cleaned = defense.forward_fitted({"left": shown}, model, state)["left"]
     assert torch.equal(cleaned[0], shown[0]) and not torch.equal(cleaned[1], shown[1])

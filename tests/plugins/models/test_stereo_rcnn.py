@@ -18,7 +18,7 @@ class TestStereoRcnn(ModelContract):
         "weights": "none",
         "device": "cpu",
         "short_side_px": 64,
-        "considered": 200,
+        "pre_nms_top_n": 200,
         "proposals": 12,
     }
 

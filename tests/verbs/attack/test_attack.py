@@ -404,7 +404,7 @@ def test_what_is_not_there_to_be_attacked_is_said(small: Small, install: Install
     facts: dict[str, Any] = {"model": "tiny_segmenter", "out": tmp_path / "x", "steps": 1}
     for name in ("scene_specific", "rp2"):
         with pytest.raises(GearError, match="none of the 2 pictures shows train; name a class that is seen"):
-            attack(small(), attack=name, settings=[*SMALL, "attacked=train", "target=road"], **facts)
+            attack(small(), attack=name, settings=[*SMALL, "source_class=train", "target=road"], **facts)
 
 
 def test_a_control_takes_no_steps(small: Small, install: Install, tmp_path: Path) -> None:
@@ -422,7 +422,7 @@ def test_a_control_is_like_what_is_there_now(small: Small, install: Install, tmp
         return attack(small(), model="tiny_segmenter", out=out, attack="control", settings=settings, **facts)
 
     made("like", "kind=solid", "rgb=[0.1,0.2,0.3]", *SMALL[:2])
-    matched = ("kind=matched", f"like={tmp_path / 'like'}")
+    matched = ("kind=matched", f"reference_patches={tmp_path / 'like'}")
     made("control", *matched)
     assert not made("control", *matched).made
     made("like", "kind=solid", "rgb=[0.9,0.9,0.9]", *SMALL[:2], force=True)

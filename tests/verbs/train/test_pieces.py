@@ -31,11 +31,11 @@ CONFIG = read_node(TrainConfig, Mapping({}, Place("test")))
 
 
 def test_the_rate_rises_and_falls() -> None:
-    rates = [rate_share(p / 1000, warm_up=0.1, final=0.01) for p in range(1001)]
+    rates = [rate_share(p / 1000, warmup_fraction=0.1, final=0.01) for p in range(1001)]
     assert rates[0] == pytest.approx(0.01) and rates[100] == pytest.approx(1) and rates[-1] == pytest.approx(0.01)
     assert np.argmax(rates) == 100 and rates[550] == pytest.approx((1 + 0.01) / 2)
     assert all(np.diff(rates[:101]) > 0) and all(np.diff(rates[100:]) < 0)
-    assert rate_share(0.0, warm_up=0.0, final=0.01) == 1
+    assert rate_share(0.0, warmup_fraction=0.0, final=0.01) == 1
 
 
 def test_the_running_mean_follows_and_counts_are_the_newest() -> None:
@@ -104,7 +104,7 @@ def test_settings_go_before_flags_and_flags_before_the_recipe() -> None:
         "scales=[1, 1e9]",
         "crop_px=[64, 99999]",
         "learning_rate=0",
-        "warm_up=1",
+        "warmup_fraction=1",
         "precision=int8",
     ):
         with pytest.raises(ConfigError, match=setting.split("=")[0]):

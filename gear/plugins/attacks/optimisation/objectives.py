@@ -75,12 +75,12 @@ class SemsegObjective:
     Attributes:
         gamma: weight of the term over Y; the term over N has the weight 1 - gamma. `dynamic` takes the current share of
             correctly classified pixels.
-        attacked, target: label ids. Pixels of the class `attacked` (of all classes if None) are pushed to the class
-            `target`. If `target` is None, the attack is untargeted.
+        source_class, target: label ids. Pixels of the class `source_class` (of all classes if None) are pushed to the
+            class `target`. If `target` is None, the attack is untargeted.
     """
 
     gamma: float | Literal["dynamic"] = "dynamic"
-    attacked: int | None = None
+    source_class: int | None = None
     target: int | None = None
     _right: CleanOutputs = field(default_factory=CleanOutputs, init=False, repr=False, compare=False)
 
@@ -141,8 +141,8 @@ class SemsegObjective:
         assert self.target is not None
         classes = logits.shape[1]
         wanted = class_of(self.target, classes)
-        if self.attacked is not None:
-            counts = counts & (labels == class_of(self.attacked, classes))
+        if self.source_class is not None:
+            counts = counts & (labels == class_of(self.source_class, classes))
         loss = functional.cross_entropy(logits, torch.full_like(labels, wanted), reduction="none")
         return {"target": Term(value=-_mean(loss, counts))}
 

@@ -107,7 +107,7 @@ class ZMask:
         block = learn(examples, self._settings.steps, rng)
         scores = [
             max(block.score(*self._seen(model, look, layers, statistics)) for look in looks(sample))
-            for sample in spread(clean, self._settings.learning_pictures)
+            for sample in spread(clean, self._settings.max_patched_pictures)
         ]
         level = alarm_level(scores, self._settings.false_alarms)
         report = _fit_report(fit_of(block, examples), len(examples), len(scores), self._settings.false_alarms, level)
@@ -125,8 +125,8 @@ class ZMask:
             masks[look.camera] = cv2.resize(
                 state.block.mask(shallow, deep).numpy(), size, interpolation=cv2.INTER_NEAREST_EXACT
             )
-        is_sure = score > COVERED_FROM or not self._settings.only_if_sure
-        cleaned = {name: _covered(picture, masks[name], is_sure) for name, picture in views.items()}
+        is_alarm = score > COVERED_FROM or not self._settings.only_on_alarm
+        cleaned = {name: _covered(picture, masks[name], is_alarm) for name, picture in views.items()}
         return DefenseResult(views=cleaned, mask=masks, score=score)
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
@@ -165,10 +165,10 @@ class ZMask:
             masks[look.camera] = mask[:, 0].to(masks[look.camera])
             covers[look.camera] = ((mask > COVERED_FROM).float() + mask - mask.detach()).to(covers[look.camera])
         score = torch.stack(scores).amax(dim=0)
-        is_sure = (score.detach() > COVERED_FROM) | (not self._settings.only_if_sure)
+        is_alarm = (score.detach() > COVERED_FROM) | (not self._settings.only_on_alarm)
         cleaned = {}
         for name, pictures in views.items():
-            cover = covers[name] * is_sure.to(pictures)[:, None, None, None]
+            cover = covers[name] * is_alarm.to(pictures)[:, None, None, None]
             cleaned[name] = pictures * (1 - cover) + self._fill.to(pictures) * cover
         return DefendedBatch(views=cleaned, masks=masks, scores=score)
 
@@ -178,7 +178,7 @@ class ZMask:
 
     def _statistics(self, clean: Sequence[Views], model: Model, layers: Layers) -> dict[str, ChannelStatistics]:
         each: dict[str, list[ChannelStatistics]] = {name: [] for name in layers.all()}
-        for sample in spread(clean, self._settings.statistics_pictures):
+        for sample in spread(clean, self._settings.max_clean_pictures):
             look = looks(sample)[0]
             grid = self._grid(*look.views[look.camera].shape[:2])
             for name, features in feature_maps(model, look.views, layers.all()).items():
@@ -194,7 +194,7 @@ class ZMask:
         statistics: Mapping[str, ChannelStatistics],
     ) -> Iterator[Example]:
         """Yields training examples: the heat maps of each picture in which a patch is visible, with the true mask."""
-        for number in spread(range(len(patched)), self._settings.learning_pictures):
+        for number in spread(range(len(patched)), self._settings.max_patched_pictures):
             without, look = looks(clean[number])[0], looks(patched[number])[0]
             area = patch_area(without.views[look.camera], look.views[look.camera], number)
             if area.any():

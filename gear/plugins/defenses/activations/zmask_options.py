@@ -18,10 +18,10 @@ class ZMaskConfig(AlarmConfig):
             first and the last map.
         rows: number of rows of the grid on which activations are compared.
         shallow_kernels, deep_kernels: rows of the pooling windows, large windows first; windows are twice as wide.
-        statistics_pictures: largest number of clean pictures from which statistics are computed.
-        learning_pictures: largest number of pictures with patches to which the fusion block is fitted.
+        max_clean_pictures: largest number of clean pictures from which statistics are computed.
+        max_patched_pictures: largest number of pictures with patches to which the fusion block is fitted.
         steps: number of training steps; the authors train for 250 passes over 100 pictures, 15 per step.
-        only_if_sure: whether pictures with a score of at most 0.5 are left unchanged.
+        only_on_alarm: whether pictures with a score of at most 0.5 are left unchanged.
     """
 
     shallow: tuple[str, ...] = ()
@@ -29,14 +29,14 @@ class ZMaskConfig(AlarmConfig):
     rows: int = 150
     shallow_kernels: tuple[int, ...] = (64, 32, 16, 8)
     deep_kernels: tuple[int, ...] = (64, 32)
-    statistics_pictures: int = 500
-    learning_pictures: int = 50
+    max_clean_pictures: int = 500
+    max_patched_pictures: int = 50
     steps: int = 1750
-    only_if_sure: bool = False
+    only_on_alarm: bool = False
 
     def __post_init__(self) -> None:
         AlarmConfig.__post_init__(self)
-        for name in ("rows", "statistics_pictures", "learning_pictures", "steps"):
+        for name in ("rows", "max_clean_pictures", "max_patched_pictures", "steps"):
             if getattr(self, name) < 1:
                 raise FieldError(name, f"must be at least 1, got {getattr(self, name)}")
         for name in ("shallow_kernels", "deep_kernels"):

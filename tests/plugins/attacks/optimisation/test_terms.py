@@ -135,14 +135,14 @@ def test_a_patch_is_judged_by_the_pixels_that_were_right_without_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("attacked", "values"),
+    ("source_class", "values"),
     [(None, ((2.0, False), (2.0, False), (3.0, True), (3.0, True))), (CAR, ((2.0, False), (3.0, True)))],
 )
 def test_a_target_is_what_pixels_of_the_attacked_class_are_pushed_to(
-    attacked: int | None, values: tuple[tuple[float, bool], ...]
+    source_class: int | None, values: tuple[tuple[float, bool], ...]
 ) -> None:
     sample, logits = segmented()
-    objective = SemsegObjective(attacked=attacked, target=CAR)
+    objective = SemsegObjective(source_class=source_class, target=CAR)
     (term,) = objective.terms(Says({"logits": logits}), VIEWS, [sample], [0]).values()
     assert float(term.value) == pytest.approx(-np.mean([cost(m, is_right=r) for m, r in values]))
     assert term.weight == 1.0

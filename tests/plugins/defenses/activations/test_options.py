@@ -24,8 +24,8 @@ def test_a_share_of_false_alarms_lies_between_0_and_1(config: Any, share: float)
     [
         ({"rows": 0}, "rows: must be at least 1, got 0"),
         ({"steps": 0}, "steps: must be at least 1"),
-        ({"statistics_pictures": 0}, "statistics_pictures: must be at least 1"),
-        ({"learning_pictures": 0}, "learning_pictures: must be at least 1"),
+        ({"max_clean_pictures": 0}, "max_clean_pictures: must be at least 1"),
+        ({"max_patched_pictures": 0}, "max_patched_pictures: must be at least 1"),
         ({"shallow_kernels": ()}, "shallow_kernels: must be one or more numbers from 1 to rows"),
         ({"deep_kernels": (0, 2)}, "deep_kernels: must be"),
         ({"rows": 10}, r"shallow_kernels: must be one or more numbers from 1 to rows \(10\)"),
