@@ -35,5 +35,5 @@ def check_seen(source_class: str, dataset: Sequence[Any]) -> None:
     """
     if source_class and not any(bool((sample.label_ids == LABEL_IDS[source_class]).any()) for sample in dataset):
         raise GearError(
-            f"option source_class: none of the {len(dataset)} pictures shows {source_class}; name a class that they show"
+            f"option source_class: none of the {len(dataset)} pictures show {source_class}; name another class"
         )

@@ -403,7 +403,7 @@ def test_validation_is_by_the_attacks_own_objective(small: Small, install: Insta
 def test_what_is_not_there_to_be_attacked_is_said(small: Small, install: Install, tmp_path: Path) -> None:
     facts: dict[str, Any] = {"model": "tiny_segmenter", "out": tmp_path / "x", "steps": 1}
     for name in ("scene_specific", "rp2"):
-        with pytest.raises(GearError, match="none of the 2 pictures shows train; name a class that is seen"):
+        with pytest.raises(GearError, match="none of the 2 pictures show train; name another class"):
             attack(small(), attack=name, settings=[*SMALL, "source_class=train", "target=road"], **facts)
 
 
