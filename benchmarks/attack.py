@@ -54,20 +54,20 @@ def main() -> None:
 
     def seen(step: int) -> Seen:
         textures = optimiser.textures.clone().requires_grad_(True)
-        indexes = batch_of(step, len(scenes.samples), args.batch, optimiser.seed)
-        return problem.seen(textures, indexes, step, optimiser.seed)
+        indices = batch_of(step, len(scenes.samples), args.batch, optimiser.seed)
+        return problem.seen(textures, indices, step, optimiser.seed)
 
     def attack_step(step: int) -> int:
         textures = optimiser.textures.clone().requires_grad_(True)
-        indexes = batch_of(step, len(scenes.samples), args.batch, optimiser.seed)
-        direction, values = ascend(textures, problem.seen(textures, indexes, step, optimiser.seed))
+        indices = batch_of(step, len(scenes.samples), args.batch, optimiser.seed)
+        direction, values = ascend(textures, problem.seen(textures, indices, step, optimiser.seed))
         optimiser.step(direction, 1.0)
         return len(values)
 
     def bare_step(batch: Seen) -> int:
         views = {name: picture.detach().requires_grad_(True) for name, picture in batch.views.items()}
         outputs = model.forward(views) if args.task in ("semseg", "depth") else model.forward(views, batch.samples)
-        terms = objective.terms(model, batch.views, batch.samples, batch.indexes) if not counts else {}
+        terms = objective.terms(model, batch.views, batch.samples, batch.indices) if not counts else {}
         counts.append(counts[0] if counts else len(terms))
         for number in range(counts[0]):
             total = torch.stack([value.float().mean() for value in outputs.values()]).sum()

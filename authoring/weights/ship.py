@@ -204,7 +204,7 @@ def _card(
         "## Limits",
         "",
         "Trained on rendered pictures of gear's towns alone. It knows their looks, weathers and cameras; on real",
-        "pictures, or on towns that look otherwise, nothing is promised.",
+        "pictures, or on towns with another appearance, the network may be much worse.",
         "",
     ]  # fmt: skip
     return "\n".join(lines)

@@ -149,7 +149,7 @@ class Objective(Protocol):
     """The quantity that an attack maximises, as one or several terms."""
 
     def terms(
-        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
         """Computes the terms of the objective for a batch, by name; the result is empty if nothing in the batch
         can still be harmed.
@@ -158,7 +158,7 @@ class Objective(Protocol):
             model: attacked network.
             views: (B, 3, H, W) pictures in 0..1 with the patch in them, by camera name.
             samples: the batch's samples; their own pictures are without the patch.
-            indexes: indices of the samples in the dataset, for objectives that cache values per sample.
+            indices: indices of the samples in the dataset, for objectives that cache values per sample.
         """
         ...
 
@@ -178,7 +178,7 @@ class HarmObjective(Protocol):
         """
         ...
 
-    def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
+    def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]) -> Tensor:
         """Scalar tensor that grows with the harm of the patch to a batch; the arguments are those of
         `Objective.terms`.
         """

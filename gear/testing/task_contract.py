@@ -81,10 +81,10 @@ class TaskContract:
         truths = tuple(from_json(type(old), new) for old, new in zip(sample.surfaces, surfaces, strict=True))
         return Sidecar(record=from_json(SceneRecord, record), surfaces=truths, facts=facts, files={})
 
-    def write(self, root: Path, indexes: Sequence[int] = (0, 1)) -> list[Sidecar]:
+    def write(self, root: Path, indices: Sequence[int] = (0, 1)) -> list[Sidecar]:
         """Writes a small split to disk as `gear collect` does, and returns the samples' metadata (sidecars)."""
         task, sidecars = self.task(), []
-        for index in indexes:
+        for index in indices:
             sample = self.sample(index)
             encoded = task.encode(sample, INFO)
             sidecars.append(self.sidecar(sample, encoded))
@@ -145,9 +145,9 @@ class TaskContract:
         """No file is outside of the dataset's root or in its folder `gear`, and no file is written twice."""
         task, sidecars = self.task(), self.write(tmp_path)
         samples = [set(task.encode(self.sample(index), INFO).files) for index in (0, 1)]
-        indexes = set(task.finalise(sidecars, INFO))
-        assert not samples[0] & samples[1] and not (samples[0] | samples[1]) & indexes
-        for name in samples[0] | samples[1] | indexes:
+        indices = set(task.finalise(sidecars, INFO))
+        assert not samples[0] & samples[1] and not (samples[0] | samples[1]) & indices
+        for name in samples[0] | samples[1] | indices:
             path = PurePosixPath(name)
             assert not path.is_absolute() and ".." not in path.parts and "\\" not in name and str(path) == name
             assert path.parts[0] != "gear", "the dataset room keeps its own files there"
@@ -269,14 +269,14 @@ class TaskContract:
         for picture in pictures.values():
             assert picture.dtype == np.uint8 and picture.ndim == 3 and picture.shape[2] == 3
 
-    def evaluate(self, indexes: Sequence[int], *, spoilt: bool = False) -> Mapping[str, float]:
+    def evaluate(self, indices: Sequence[int], *, spoilt: bool = False) -> Mapping[str, float]:
         """The metrics of synthetic samples with the ground truth as the prediction, unchanged or made clearly worse."""
-        result: Mapping[str, float] = self._gather(self.task().evaluator(), indexes, spoilt=spoilt).result()
+        result: Mapping[str, float] = self._gather(self.task().evaluator(), indices, spoilt=spoilt).result()
         return result
 
-    def _gather(self, evaluator: Any, indexes: Sequence[int], *, spoilt: bool = False) -> Any:
+    def _gather(self, evaluator: Any, indices: Sequence[int], *, spoilt: bool = False) -> Any:
         task = self.task()
-        for index in indexes:
+        for index in indices:
             sample = freeze(self.sample(index))
             prediction = freeze(task.as_prediction(sample))
             for _ in range(self.repeats):

@@ -32,10 +32,10 @@ class Ascent:
         side = self.config.side_px
         start = rng.uniform(0.4, 0.6, (len(dataset[0].record.surfaces), 3, side, 2 * side)).astype(np.float32)
         patches = torch.from_numpy(start)
-        indexes = range(len(dataset))
+        indices = range(len(dataset))
         for _ in range(budget.steps):
             patches.requires_grad_(True)
-            pictures = compositor.compose(list(patches), indexes, "left")
+            pictures = compositor.compose(list(patches), indices, "left")
             loss = torch.stack(list(model.forward({"left": pictures}, list(dataset)).values())).sum()
             (gradient,) = torch.autograd.grad(loss, patches)
             patches = (patches.detach() + 0.1 * gradient.sign()).clamp(0, 1)

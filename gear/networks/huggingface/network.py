@@ -149,7 +149,7 @@ class FolderSegmenter(FolderNetwork):
         """
         theirs = self.their_logits(self.seen(pictures)).float()
         nothing = torch.full_like(theirs[:, 0], UNKNOWN_LOGIT)
-        ours = [theirs[:, indexes].logsumexp(1) if indexes else nothing for indexes in self._indexes]
+        ours = [theirs[:, indices].logsumexp(1) if indices else nothing for indices in self._indexes]
         return {LOGITS: self.restored(torch.stack(ours, dim=1), pictures, "bilinear")}
 
     def their_logits(self, seen: Tensor) -> Tensor:
@@ -165,7 +165,7 @@ class FolderSegmenter(FolderNetwork):
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         """The loss by name: the mean cross-entropy over the pixels whose true class the network has."""
         ids = train_ids(targets, self.device)
-        known = torch.tensor([train_id for train_id, indexes in enumerate(self._indexes) if indexes])
+        known = torch.tensor([train_id for train_id, indices in enumerate(self._indexes) if indices])
         is_known = torch.isin(ids, known.to(self.device))
         each = functional.cross_entropy(outputs[LOGITS], ids.where(is_known, 0), reduction="none")
         return {"cross_entropy": (each * is_known).sum() / is_known.sum().clamp_min(1)}

@@ -37,7 +37,7 @@ class DetectionGoal:
     left_out: frozenset[str] = frozenset()
 
     def terms(
-        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
         """One term for each loss of the detector: the negative loss against the labels that it shall predict."""
         wanted = [self.rewritten(sample) for sample in samples]

@@ -73,10 +73,10 @@ class Nes:
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
         from gear.plugins.attacks.optimisation.loop import batch_of
         from gear.plugins.attacks.optimisation.objectives import default_objective
-        from gear.plugins.attacks.optimisation.queries import Oracle, as_patches
+        from gear.plugins.attacks.optimisation.queries import BlackBoxObjective, as_patches
 
         config, count = self._config, len(dataset[0].record.surfaces)
-        oracle = Oracle(model, dataset, compositor, default_objective(dataset[0]), budget)
+        objective = BlackBoxObjective(model, dataset, compositor, default_objective(dataset[0]), budget)
         rows, columns = -(-config.height_px // config.grid_px), -(-config.width_px // config.grid_px)
         saved = monitor.resume() if monitor is not None else None
         grid = rng.uniform(0, 1, (count, 3, rows, columns)).astype(np.float32)
@@ -84,27 +84,27 @@ class Nes:
         if saved is not None:
             check_saved(saved, {"grid": grid, "seed": np.array(0), "done": np.array(0)})
             grid, seed, done = saved["grid"].copy(), int(saved["seed"]), int(saved["done"])
-            oracle.restore(saved)
+            objective.restore(saved)
         while done < budget.steps:
             draws = derive_rng(seed, "draws", done)
-            indexes = batch_of(done, len(dataset), config.batch, seed)
+            indices = batch_of(done, len(dataset), config.batch, seed)
             slope, seen = np.zeros_like(grid), list[float]()
             for _ in range(config.pairs):
-                if oracle.left < oracle.cost(indexes) + oracle.cost(
+                if objective.left < objective.cost(indices) + objective.cost(
                     ()
                 ):  # outputs on clean pictures are queried only once
                     break
                 change = self._change(draws, grid.shape)
-                ahead = oracle.harm(self._spread_out(np.clip(grid + change, 0, 1)), indexes)
-                behind = oracle.harm(self._spread_out(np.clip(grid - change, 0, 1)), indexes)
+                ahead = objective.harm(self._spread_out(np.clip(grid + change, 0, 1)), indices)
+                behind = objective.harm(self._spread_out(np.clip(grid - change, 0, 1)), indices)
                 slope += (ahead - behind) * change
                 seen += [ahead, behind]
             if not seen:
                 break
             grid = np.clip(grid + config.step * np.sign(slope), 0, 1).astype(np.float32)
             done += 1
-            values = {"harm": float(np.mean(seen)), "queries_left": float(oracle.left)}
-            state = {"grid": grid, "seed": np.int64(seed), "done": np.int64(done), **oracle.state()}
+            values = {"harm": float(np.mean(seen)), "queries_left": float(objective.left)}
+            state = {"grid": grid, "seed": np.int64(seed), "done": np.int64(done), **objective.state()}
             made = partial(as_patches, self._spread_out(grid))
             if monitor is not None and monitor.step(done, values, made, partial(dict, state)):
                 break

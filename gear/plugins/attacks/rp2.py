@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from gear.contracts.attacks import Objective
-    from gear.plugins.attacks.optimisation.loop import Seen
+    from gear.plugins.attacks.optimisation.loop import PatchedBatch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +97,7 @@ class Rp2:
         objective = self.objective(dataset[0])
         check_seen(self._config.source_class, dataset)
 
-        def harm(_: Tensor, seen: Seen) -> Mapping[str, Tensor]:
+        def harm(_: Tensor, seen: PatchedBatch) -> Mapping[str, Tensor]:
             return self._harm(problem.model, objective, seen)
 
         return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
@@ -120,12 +120,12 @@ class Rp2:
             return SemsegObjective(source_class=LABEL_IDS.get(config.source_class), target=LABEL_IDS[config.target])
         return default_objective(sample)
 
-    def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:
+    def _harm(self, model: Model, objective: Objective, seen: PatchedBatch) -> Mapping[str, Tensor]:
         import torch
 
         from gear.plugins.attacks.optimisation.objectives import weighted
 
-        terms = weighted(objective, model, seen.views, seen.samples, seen.indexes)
+        terms = weighted(objective, model, seen.views, seen.samples, seen.indices)
         return {"harm": torch.stack(terms).sum()} if terms else {}
 
     def _penalties(self, textures: Tensor) -> Mapping[str, Tensor]:

@@ -70,39 +70,39 @@ class Square:
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
         from gear.plugins.attacks.optimisation.loop import batch_of
         from gear.plugins.attacks.optimisation.objectives import default_objective
-        from gear.plugins.attacks.optimisation.queries import Oracle, as_patches
+        from gear.plugins.attacks.optimisation.queries import BlackBoxObjective, as_patches
 
         config, count = self._config, len(dataset[0].record.surfaces)
-        oracle = Oracle(model, dataset, compositor, default_objective(dataset[0]), budget)
+        objective = BlackBoxObjective(model, dataset, compositor, default_objective(dataset[0]), budget)
         saved = monitor.resume() if monitor is not None else None
         textures = self._first(rng, count)
-        seed, done, best, whole = int(rng.integers(2**62)), 0, -math.inf, oracle.left
+        seed, done, best, whole = int(rng.integers(2**62)), 0, -math.inf, objective.left
         if saved is not None:
             number = np.array(0)
             check_saved(saved, {"textures": textures, "seed": number, "done": number, "best": np.array(0.0)})
             textures, seed, done = saved["textures"].copy(), int(saved["seed"]), int(saved["done"])
             best = float(saved["best"])
-            oracle.restore(saved)
-        turn = max(1, min(budget.steps, whole // oracle.cost(())) // config.turns)  # a step queries every model once
+            objective.restore(saved)
+        turn = max(1, min(budget.steps, whole // objective.cost(())) // config.turns)  # a step queries every model once
         while done < budget.steps:
-            indexes = batch_of(done // turn, len(dataset), config.batch, seed)
-            if oracle.left < oracle.cost(indexes):
+            indices = batch_of(done // turn, len(dataset), config.batch, seed)
+            if objective.left < objective.cost(indices):
                 break
             if done % turn == 0:
-                best = oracle.harm(textures, indexes)
-            if oracle.left >= oracle.cost(indexes):
-                tried = self._with_square(textures, derive_rng(seed, "square", done), 1 - oracle.left / whole)
-                harm = oracle.harm(tried, indexes)
+                best = objective.harm(textures, indices)
+            if objective.left >= objective.cost(indices):
+                tried = self._with_square(textures, derive_rng(seed, "square", done), 1 - objective.left / whole)
+                harm = objective.harm(tried, indices)
                 if harm > best:
                     textures, best = tried, harm
             done += 1
-            values = {"harm": best, "queries_left": float(oracle.left)}
+            values = {"harm": best, "queries_left": float(objective.left)}
             state = {
                 "textures": textures,
                 "seed": np.int64(seed),
                 "done": np.int64(done),
                 "best": np.float64(best),
-                **oracle.state(),
+                **objective.state(),
             }
             if monitor is not None and monitor.step(done, values, partial(as_patches, textures), partial(dict, state)):
                 break

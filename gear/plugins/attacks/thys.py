@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from gear.contracts.attacks import Objective, Term
-    from gear.plugins.attacks.optimisation.loop import Seen
+    from gear.plugins.attacks.optimisation.loop import PatchedBatch
 
 SCORES = ("objectness", "cls_logits")
 """Names of detectors' raw outputs (logits) from which scores are computed by a sigmoid."""
@@ -84,21 +84,21 @@ class Thys:
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
         objective = self.objective(dataset[0])
 
-        def harm(_: Tensor, seen: Seen) -> Mapping[str, Tensor]:
+        def harm(_: Tensor, seen: PatchedBatch) -> Mapping[str, Tensor]:
             return self._harm(problem.model, objective, seen)
 
         return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
 
     def objective(self, sample: Any) -> Objective:
         """The objective of the attack: it grows as the score of the most confident detection falls."""
-        return SurestObjective()
+        return MaxScoreObjective()
 
-    def _harm(self, model: Model, objective: Objective, seen: Seen) -> Mapping[str, Tensor]:
+    def _harm(self, model: Model, objective: Objective, seen: PatchedBatch) -> Mapping[str, Tensor]:
         import torch
 
         from gear.plugins.attacks.optimisation.objectives import weighted
 
-        harm = weighted(objective, model, seen.views, seen.samples, seen.indexes)
+        harm = weighted(objective, model, seen.views, seen.samples, seen.indices)
         return {"objectness": torch.stack(harm).sum()}
 
     def _penalties(self, textures: Tensor) -> Mapping[str, Tensor]:
@@ -118,19 +118,19 @@ class Thys:
         }
 
 
-class SurestObjective:
+class MaxScoreObjective:
     """An objective that grows as the score of the most confident detection in each picture falls."""
 
     def terms(
-        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
         """One term, `objectness`: the negative mean over the pictures of the highest detection score."""
         from gear.contracts.attacks import Term
 
-        return {"objectness": Term(value=-surest(model.forward(views)).mean())}
+        return {"objectness": Term(value=-max_score(model.forward(views)).mean())}
 
 
-def surest(outputs: Mapping[str, Tensor]) -> Tensor:
+def max_score(outputs: Mapping[str, Tensor]) -> Tensor:
     """The (B,) highest detection score in each picture, 0 to 1, from a detector's raw outputs.
 
     Raises:

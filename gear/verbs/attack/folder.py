@@ -41,7 +41,7 @@ NAME = re.compile(r"patch_\d+")
 BROKEN = "is gone, damaged or of other patches"
 
 TOLD: Any = {
-    "steps_done": int, "steps_per_s": float | None, "stopped": str, "masking": dict[str, float] | None,
+    "steps_done": int, "steps_per_s": float | None, "stopped": str, "gradient_check": dict[str, float] | None,
     "patches": dict[str, str],
 }  # fmt: skip
 """Types of the keys of `attack.json`, besides the inputs of the attack, that a later run reads."""
@@ -142,9 +142,9 @@ def _check_whole(root: Path, notes: Json) -> None:
     try:
         for key, kind in TOLD.items():
             from_json(kind, notes[key], key)
-        if notes["masking"] is not None:
-            for key in ("promised", "kept"):
-                from_json(float, notes["masking"][key], key)
+        if notes["gradient_check"] is not None:
+            for key in ("predicted_change", "measured_change"):
+                from_json(float, notes["gradient_check"][key], key)
         if notes.get("achieved") is not None:  # older folders have none
             from_json(dict[str, dict[str, float | None] | None], notes["achieved"], "achieved")
     except (KeyError, FieldError) as error:

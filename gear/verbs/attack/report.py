@@ -40,12 +40,12 @@ class AttackReport:
             lines.append(f"ended early: {self.facts['stopped']}")
         lines += self._achieved()
         if (
-            self.facts["masking"] is not None
-            and self.facts["masking"]["kept"] < 0.5 * self.facts["masking"]["promised"]
+            self.facts["gradient_check"] is not None
+            and self.facts["gradient_check"]["measured_change"] < 0.5 * self.facts["gradient_check"]["predicted_change"]
         ):
             lines.append(
                 "the objective follows its gradient only in part: gradients are masked, so a stronger attack may exist "
-                "(see masking in attack.json)"
+                "(see gradient_check in attack.json)"
             )
         lines.append(f"next: {self.next_command}")
         return "\n".join(lines)

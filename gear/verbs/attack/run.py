@@ -294,7 +294,9 @@ def _facts(job: Job, network: Model, plan: Json, made: _Made) -> Json:
     """Returns the content of `attack.json`."""
     recorder, done = made.recorder, made.steps_done
     seconds = recorder.clock()
-    promised, kept = (0.0, 0.0) if job.spec.is_control else made.seen.masking(network, made.objective, made.patches)
+    predicted, measured = (
+        (0.0, 0.0) if job.spec.is_control else made.seen.gradient_check(network, made.objective, made.patches)
+    )
     return {
         "gear": importlib.metadata.version("mujoco-gear"),
         "torch": str(torch.__version__),
@@ -305,7 +307,11 @@ def _facts(job: Job, network: Model, plan: Json, made: _Made) -> Json:
         "steps_per_s": round(done / seconds, 4) if done and seconds else None,
         "stopped": recorder.stopped,
         "gradient": _gradient_facts(recorder.curves.get("gradient", [])),
-        "masking": {"promised": promised, "kept": kept} if promised and np.isfinite([promised, kept]).all() else None,
+        "gradient_check": (
+            {"predicted_change": predicted, "measured_change": measured}
+            if predicted and np.isfinite([predicted, measured]).all()
+            else None
+        ),
         "patches": {patch.name: sha256(as_picture(patch).tobytes()) for patch in made.patches},
         "curves": {name: [plain(value) for value in curve] for name, curve in recorder.curves.items()},
         "achieved": None if job.spec.is_control else _achieved(job, network, made),

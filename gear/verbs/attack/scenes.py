@@ -16,7 +16,7 @@ from gear.contracts.attacks import Objective, Patch
 from gear.contracts.models import Model
 from gear.dataset.reading import Dataset
 from gear.plugins.attacks.optimisation.frozen_model import frozen
-from gear.plugins.attacks.optimisation.gradient_checks import promised_and_kept
+from gear.plugins.attacks.optimisation.gradient_checks import predicted_and_measured_change
 from gear.plugins.attacks.optimisation.model_group import Defended, members_of
 from gear.plugins.attacks.optimisation.objectives import counted, defense_terms
 from gear.readers import Kept, all_of
@@ -54,35 +54,37 @@ class Scenes:
         )
 
     def harm(
-        self, model: Model, objective: Objective, patches: Sequence[Patch], indexes: Sequence[int] | None = None
+        self, model: Model, objective: Objective, patches: Sequence[Patch], indices: Sequence[int] | None = None
     ) -> float:
-        """Returns the mean objective over the samples (or over those in `indexes`), with patches that are not
+        """Returns the mean objective over the samples (or over those in `indices`), with patches that are not
         randomly transformed.
         """
-        chosen = range(len(self.samples)) if indexes is None else indexes
+        chosen = range(len(self.samples)) if indices is None else indices
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         with torch.no_grad(), frozen(model):
             values = [float(self.value(model, objective, tensors, [index])) for index in chosen]
         return float(np.mean(values))
 
-    def value(self, model: Model, objective: Objective, patches: Sequence[Tensor], indexes: Sequence[int]) -> Tensor:
-        """Returns the mean objective over the samples in `indexes` as a differentiable scalar."""
-        samples = [self.samples[index] for index in indexes]
-        views = {view: self.compositor.compose(patches, indexes, view) for view in samples[0].images}
-        numbers = counted(objective, model, views, samples, indexes)
+    def value(self, model: Model, objective: Objective, patches: Sequence[Tensor], indices: Sequence[int]) -> Tensor:
+        """Returns the mean objective over the samples in `indices` as a differentiable scalar."""
+        samples = [self.samples[index] for index in indices]
+        views = {view: self.compositor.compose(patches, indices, view) for view in samples[0].images}
+        numbers = counted(objective, model, views, samples, indices)
         return torch.stack(numbers).sum() if numbers else torch.zeros(())
 
-    def masking(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> tuple[float, float]:
+    def gradient_check(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> tuple[float, float]:
         """Checks for masked gradients: takes a small step along the gradient of the objective with respect to the
         patches.
 
         Returns:
             The change of the objective that the gradient predicts, and the change that the step really causes.
         """
-        indexes = list(range(min(SHOWN, len(self.samples))))
+        indices = list(range(min(SHOWN, len(self.samples))))
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         with frozen(model):
-            return promised_and_kept(lambda changed: self.value(model, objective, changed, indexes), tensors)
+            return predicted_and_measured_change(
+                lambda changed: self.value(model, objective, changed, indices), tensors
+            )
 
     def check_adaptive(self, model: Model, surfaces: int, rng: np.random.Generator) -> None:
         """Checks that the pictures, scores and masks of the defenses have a gradient with respect to random

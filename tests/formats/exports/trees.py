@@ -39,7 +39,7 @@ def dataset(root: Path, task: str, splits: Sequence[str] = ("val",), **options: 
 
 
 def written(
-    root: Path, spec_: TaskSpec[Any], options_: Mapping[str, Any], indexes: tuple[int, ...] = (0, 1)
+    root: Path, spec_: TaskSpec[Any], options_: Mapping[str, Any], indices: tuple[int, ...] = (0, 1)
 ) -> ExportSplit:
     """A split whose files lie below `root`."""
 
@@ -47,8 +47,8 @@ def written(
         spec = spec_
         options = options_
 
-    sidecars = tuple(Writer().write(root, indexes))
-    paths = [sidecar_path(INFO.split, index) for index in indexes]
+    sidecars = tuple(Writer().write(root, indices))
+    paths = [sidecar_path(INFO.split, index) for index in indices]
     return ExportSplit(info=INFO, task=spec_.name, sidecars=sidecars, sidecar_paths=paths)
 
 

@@ -30,7 +30,7 @@ from gear.plugins.attacks.optimisation.regularisers import palette_srgb
 from gear.plugins.attacks.optimisation.upright_pasting import Upright
 from gear.plugins.attacks.rp2 import Rp2, Rp2Config, rp2
 from gear.plugins.attacks.square import SquareConfig, square
-from gear.plugins.attacks.thys import ThysConfig, surest, thys
+from gear.plugins.attacks.thys import ThysConfig, max_score, thys
 from gear.plugins.describe import options as described
 from gear.testing.attack_contract import AttackContract, Counted
 from gear.testing.tiny_compositor import TinyCompositor
@@ -134,7 +134,7 @@ def test_thys_hides_what_was_surest() -> None:
     def sure(patches: Any) -> float:
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         with torch.no_grad():
-            return float(surest(model.forward({"left": compositor.compose(tensors, [0, 1], "left")})).mean())
+            return float(max_score(model.forward({"left": compositor.compose(tensors, [0, 1], "left")})).mean())
 
     def run(steps: int) -> Any:
         attack = thys.build(ThysConfig(**SMALL))
@@ -157,7 +157,7 @@ def test_thys_is_judged_by_what_it_lowers() -> None:
     picture = torch.from_numpy(dataset[0].images["left"].copy()).permute(2, 0, 1)[None].float() / 255
     with torch.no_grad():
         (term,) = objective.terms(model, {"left": picture}, [dataset[0]], [0]).values()
-        assert float(term.value) == -float(surest(model.forward({"left": picture})).mean())
+        assert float(term.value) == -float(max_score(model.forward({"left": picture})).mean())
 
 
 def test_thys_weighs_its_penalties_as_published() -> None:
@@ -172,7 +172,7 @@ def test_thys_weighs_its_penalties_as_published() -> None:
 
 def test_thys_needs_a_detector() -> None:
     with pytest.raises(GearError, match="needs a detector"):
-        surest({"logits": torch.zeros(1, 2, 3, 3)})
+        max_score({"logits": torch.zeros(1, 2, 3, 3)})
 
 
 class Opaque(TinySegmenter):

@@ -61,7 +61,10 @@ def test_notes_that_somebody_changed_are_one_line(small: Small, install: Install
     path = out / "attack.json"
     notes = json.loads(path.read_text())
     changed: list[Any] = [{key: value for key, value in notes.items() if key != gone} for gone in folder.TOLD]
-    changed += [notes | {key: [None]} for key in folder.TOLD] + [notes | {"masking": {}}, notes | {"patches": None}]
+    changed += [notes | {key: [None]} for key in folder.TOLD] + [
+        notes | {"gradient_check": {}},
+        notes | {"patches": None},
+    ]
     (digest,) = notes["patches"].values()
     changed += [notes | {"patches": {"../patches/patch_0": digest}}]
     for text in (*map(json.dumps, changed), "[" * 200_000):
@@ -113,7 +116,9 @@ def test_a_patch_folder_is_whole(small: Small, install: Install, tmp_path: Path)
     assert notes["models"][0]["name"] == "tiny_segmenter" and len(notes["weights_sha256"]) == 64
     assert notes["steps_done"] == 4 and all(len(curve) == 4 for curve in notes["curves"].values())
     assert notes["gradient"]["least"] > 0 and notes["gradient"]["zero_steps"] == 0
-    assert notes["masking"]["kept"] == pytest.approx(notes["masking"]["promised"], rel=0.5)
+    assert notes["gradient_check"]["measured_change"] == pytest.approx(
+        notes["gradient_check"]["predicted_change"], rel=0.5
+    )
     assert cv2.imread(str(out / "figures" / "curves.png")).shape[0] > 100
     assert cv2.imread(str(out / "figures" / "samples.png")).shape == (2 * 160, 2 * 320, 3)
     assert not (out / CHECKPOINT).exists()
@@ -409,7 +414,7 @@ def test_what_is_not_there_to_be_attacked_is_said(small: Small, install: Install
 
 def test_a_control_takes_no_steps(small: Small, install: Install, tmp_path: Path) -> None:
     report = attack(small(), model="tiny_segmenter", out=tmp_path, attack="control", settings=SMALL[:2])
-    assert (report.facts["steps_done"], report.facts["steps_per_s"], report.facts["masking"]) == (0, None, None)
+    assert (report.facts["steps_done"], report.facts["steps_per_s"], report.facts["gradient_check"]) == (0, None, None)
     first, then = report.summary().splitlines()
     assert first == f"{tmp_path}: 1 patch after 0 steps"
     assert then == f"next: gear collect --task semseg --scene board --split test --town FILE --patch {tmp_path}"
@@ -445,9 +450,9 @@ def test_a_minus_is_no_list() -> None:
 def test_a_check_that_comes_to_no_number_is_none(
     small: Small, install: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found: tuple[float, float]
 ) -> None:
-    monkeypatch.setattr(Scenes, "masking", lambda *asked: found)
+    monkeypatch.setattr(Scenes, "gradient_check", lambda *asked: found)
     report = attack(small(), model="tiny_segmenter", out=tmp_path, steps=1, settings=SMALL)
-    assert report.facts["masking"] is None and (tmp_path / "attack.json").exists()
+    assert report.facts["gradient_check"] is None and (tmp_path / "attack.json").exists()
 
 
 def test_a_look_at_validation_samples_changes_no_check(small: Small, install: Install, tmp_path: Path) -> None:
@@ -456,7 +461,7 @@ def test_a_look_at_validation_samples_changes_no_check(small: Small, install: In
     plain = attack(train, model="tiny_depth", out=tmp_path / "a", steps=1, settings=SMALL)
     judged = attack(train, model="tiny_depth", out=tmp_path / "b", steps=1, settings=SMALL, val=val, every=1)
     assert not difference(plain.patches, judged.patches, "patches")
-    assert judged.facts["masking"] == plain.facts["masking"] is not None
+    assert judged.facts["gradient_check"] == plain.facts["gradient_check"] is not None
 
 
 class Failing(TinySegmenter):

@@ -164,7 +164,7 @@ def test_a_defense_without_gradients_is_looked_through_by_what_needs_none(
     plain = attack(small(), out=tmp_path / "plain", **facts)
     aware = attack(small(), out=tmp_path / "aware", defense="hard", **facts)
     assert aware.facts["defense"]["name"] == "hard" and aware.facts["queries"] == plain.facts["queries"]
-    assert aware.facts["masking"] is None, "there is no gradient to promise anything"
+    assert aware.facts["gradient_check"] is None, "there is no gradient to promise anything"
     assert not np.array_equal(plain.patches[0].rgb, aware.patches[0].rgb)
     with pytest.raises(GearError, match=r"'hard' declares no gradient.*--attack square"):
         attack(small(), model="tiny_segmenter", out=tmp_path / "white", steps=2, settings=SMALL[:2], defense="hard")

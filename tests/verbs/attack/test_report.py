@@ -15,7 +15,7 @@ FACTS: dict[str, Any] = {
     "steps_done": 30,
     "steps_per_s": 2.0,
     "stopped": "",
-    "masking": None,
+    "gradient_check": None,
     "task": "depth",
     "data": [{"scene": "town10/billboard01"}],
     "achieved": {"training": {"samples": 8, "random": 0.25, "patch": 1.5}, "validation": None},
@@ -36,11 +36,13 @@ def test_the_summary_has_steps_objectives_and_the_next_command() -> None:
 
 
 def test_what_is_unusual_is_added() -> None:
-    text = report(made=False, stopped="no improvement", masking={"kept": 0.1, "promised": 1.0}).summary()
+    text = report(
+        made=False, stopped="no improvement", gradient_check={"measured_change": 0.1, "predicted_change": 1.0}
+    ).summary()
     assert "(there already)" in text
     assert "ended early: no improvement" in text
     assert "gradients are masked" in text
-    assert "masked" not in report(masking={"kept": 0.9, "promised": 1.0}).summary()
+    assert "masked" not in report(gradient_check={"measured_change": 0.9, "predicted_change": 1.0}).summary()
 
 
 def test_the_next_command_asks_for_a_town_that_gear_does_not_have() -> None:

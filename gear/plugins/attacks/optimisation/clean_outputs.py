@@ -17,17 +17,17 @@ class CleanOutputs:
     def __init__(self) -> None:
         self._kept: dict[tuple[int, int], Tensor] = {}
 
-    def of(self, model: Model, samples: Sequence[Any], indexes: Sequence[int], ask: Callable[[Any], Tensor]) -> Tensor:
+    def of(self, model: Model, samples: Sequence[Any], indices: Sequence[int], ask: Callable[[Any], Tensor]) -> Tensor:
         """The cached values of a batch, (B, ...) in main memory; missing values are computed and stored.
 
         Args:
             model: network on whose outputs the values depend.
             samples: samples of the batch.
-            indexes: indices of the samples in the dataset.
+            indices: indices of the samples in the dataset.
             ask: function that computes the value of one sample; it runs without gradients.
         """
-        for sample, index in zip(samples, indexes, strict=True):
+        for sample, index in zip(samples, indices, strict=True):
             if (id(model), index) not in self._kept:
                 with torch.no_grad():
                     self._kept[id(model), index] = ask(sample).cpu()
-        return torch.stack([self._kept[id(model), index] for index in indexes])
+        return torch.stack([self._kept[id(model), index] for index in indices])

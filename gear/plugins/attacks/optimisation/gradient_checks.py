@@ -11,7 +11,9 @@ STEP = 0.02
 """Size of the test step: root mean square over the patch's values in 0..1, about five levels of 255."""
 
 
-def promised_and_kept(value: Callable[[Sequence[Tensor]], Tensor], patches: Sequence[Tensor]) -> tuple[float, float]:
+def predicted_and_measured_change(
+    value: Callable[[Sequence[Tensor]], Tensor], patches: Sequence[Tensor]
+) -> tuple[float, float]:
     """The change of an objective by a small step along its gradient, as predicted by the gradient and as measured.
 
     If the measured change is far below the predicted one, the gradient is masked: by a defense, by saturation, or by

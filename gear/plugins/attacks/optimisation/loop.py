@@ -116,43 +116,43 @@ class Problem:
             raise GearError("nothing to attack: the dataset has no sample with a patch surface")
         return count
 
-    def seen(self, textures: Tensor, indexes: Sequence[int], step: int, seed: int) -> Seen:
+    def compose_batch(self, textures: Tensor, indices: Sequence[int], step: int, seed: int) -> PatchedBatch:
         """A batch of samples with the textures composed into their pictures.
 
         Changes of the patch's appearance are drawn for each sample; they are the same in both views of a stereo pair.
 
         Args:
             textures: (S, 3, h, w) in 0..1, one texture for each surface.
-            indexes: indices of the samples in the dataset.
+            indices: indices of the samples in the dataset.
             step: number of the step, on which the random draws depend.
             seed: seed of the random draws.
         """
-        samples = [self.dataset[index] for index in indexes]
+        samples = [self.dataset[index] for index in indices]
         looks = []
-        for index in indexes:
+        for index in indices:
             rng = derive_rng(seed, "appearance", step, index)
             looks.append([vary(self.settings.appearance, texture, rng) for texture in textures])
         batches = [torch.stack(patches) for patches in zip(*looks, strict=True)]
-        views = {view: self.compositor.compose(batches, indexes, view) for view in samples[0].images}
-        return Seen(views=views, samples=samples, indexes=indexes)
+        views = {view: self.compositor.compose(batches, indices, view) for view in samples[0].images}
+        return PatchedBatch(views=views, samples=samples, indices=indices)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Seen:
+class PatchedBatch:
     """A batch of samples with pictures into which the textures were composed.
 
     Attributes:
         views: (B, 3, H, W) pictures in 0..1 by camera name, differentiable with respect to the textures.
         samples: the samples of the batch.
-        indexes: indices of the samples in the dataset.
+        indices: indices of the samples in the dataset.
     """
 
     views: Mapping[str, Tensor]
     samples: Sequence[Any]
-    indexes: Sequence[int]
+    indices: Sequence[int]
 
 
-Direction = Callable[[Tensor, Seen], tuple[Tensor, dict[str, float]]]
+Direction = Callable[[Tensor, PatchedBatch], tuple[Tensor, dict[str, float]]]
 """A function that computes an ascent direction.
 
 It takes (S, 3, h, w) textures that require gradients, and a batch of pictures with these textures. It returns the
@@ -193,11 +193,11 @@ def optimise_textures(
             done = optimiser.done
             if before is not None:
                 before(done)
-            indexes = batch_of(done, count, settings.batch, optimiser.seed)
+            indices = batch_of(done, count, settings.batch, optimiser.seed)
             textures = optimiser.textures.clone().requires_grad_(True)
-            direction, values = ascend(textures, problem.seen(textures, indexes, done, optimiser.seed))
+            direction, values = ascend(textures, problem.compose_batch(textures, indices, done, optimiser.seed))
             if not bool(direction.isfinite().all()):
-                raise not_finite(f"the gradient of step {done + 1}", indexes)
+                raise not_finite(f"the gradient of step {done + 1}", indices)
             optimiser.note_gradient(values.get("gradient"))
             if optimiser.steps_without * settings.batch >= 2 * count + settings.batch:
                 raise GearError(NO_GRADIENT)
@@ -236,11 +236,11 @@ def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -
     scaled to length 1 again. The gradients of the regularisers, scaled to the lengths in the settings, are subtracted.
     """
 
-    def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
+    def ascend(textures: Tensor, batch: PatchedBatch) -> tuple[Tensor, dict[str, float]]:
         terms = {
             prefix + name: term
             for prefix, member in members_of(problem.model).items()
-            for name, term in all_terms(objective, member, seen.views, seen.samples, seen.indexes).items()
+            for name, term in all_terms(objective, member, batch.views, batch.samples, batch.indices).items()
         }
         values = {name: float(term.value.detach()) for name, term in terms.items()}
         total = torch.zeros_like(textures)
@@ -266,7 +266,7 @@ REGULARISERS = {"smoothness": smoothness, "printability": non_printability}
 
 
 def one_gradient(
-    value: Callable[[Tensor, Seen], Mapping[str, Tensor]],
+    value: Callable[[Tensor, PatchedBatch], Mapping[str, Tensor]],
     penalties: Callable[[Tensor], Mapping[str, Tensor]] | None = None,
 ) -> Direction:
     """Makes the ascent direction of attacks with a single loss: the unscaled gradient of the sum of some scalars.
@@ -278,8 +278,8 @@ def one_gradient(
             patch, so they do not count as gradients of the objective.
     """
 
-    def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
-        parts = value(textures, seen)
+    def ascend(textures: Tensor, batch: PatchedBatch) -> tuple[Tensor, dict[str, float]]:
+        parts = value(textures, batch)
         others = {} if penalties is None else penalties(textures)
         values = {name: float(part.detach()) for name, part in {**parts, **others}.items()}
         gradient = torch.zeros_like(textures)

@@ -90,7 +90,7 @@ class SemsegObjective:
         return self.target is None and self.gamma != "dynamic"
 
     def terms(
-        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
         """The terms `correct` (over correctly classified pixels) and `wrong` (over misclassified pixels).
 
@@ -108,7 +108,7 @@ class SemsegObjective:
             gamma = self.gamma
         return _split(loss, {"correct": (right, gamma), "wrong": (wrong, 1 - gamma)})
 
-    def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
+    def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]) -> Tensor:
         """The harm as one number: the weighted sum of the terms.
 
         With a fixed `gamma`, the correctly classified pixels are those of the output on the picture without the patch.
@@ -116,7 +116,7 @@ class SemsegObjective:
         that becomes wrong leaves this set.
         """
         if not self.needs_clean_output:
-            terms = [one.weight * one.value for one in self.terms(model, views, samples, indexes).values()]
+            terms = [one.weight * one.value for one in self.terms(model, views, samples, indices).values()]
             return torch.stack(terms).sum() if terms else torch.zeros(())
         assert self.gamma != "dynamic"
         logits, labels, counts = self._outputs(model, views, samples)
@@ -125,7 +125,7 @@ class SemsegObjective:
             clean = _logits(model, as_batch([sample.images], list(views)))
             return _is_right(clean, train_labels([sample], clean.shape[1]).to(clean.device))[0]
 
-        right = counts & self._right.of(model, samples, indexes, rightly_said).to(logits.device)
+        right = counts & self._right.of(model, samples, indices, rightly_said).to(logits.device)
         loss = functional.cross_entropy(logits, labels, ignore_index=IGNORED_TRAIN_ID, reduction="none")
         return self.gamma * _mean(loss, right) + (1 - self.gamma) * _mean(loss, counts & ~right)
 
@@ -167,39 +167,39 @@ class DepthObjective:
         self._clean = CleanOutputs()
 
     def terms(
-        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
         """The terms `small` (errors up to `split_m`) and `large` (larger errors).
 
         With a direction there is a single term, named `farther` or `nearer`.
         """
-        depth_m, clean, free = self._outputs(model, views, samples, indexes)
+        depth_m, clean, free = self._outputs(model, views, samples, indices)
         if self._direction != "any":
             return {self._direction: Term(value=self._pushed(depth_m, clean, free))}
         error = functional.smooth_l1_loss(depth_m, clean, reduction="none")
         small = free & ((depth_m.detach() - clean).abs_() <= self._split_m)
         return _split(error, {"small": (small, self._gamma), "large": (free & ~small, 1 - self._gamma)})
 
-    def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]) -> Tensor:
+    def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]) -> Tensor:
         """The harm as one number: the mean error over all pixels, small and large errors together.
 
         A weighted sum of two means would fall when an error grows past `split_m`. One pixel with a large error would
         also count for more than all pixels with small errors.
         """
-        depth_m, clean, free = self._outputs(model, views, samples, indexes)
+        depth_m, clean, free = self._outputs(model, views, samples, indices)
         if self._direction != "any":
             return self._pushed(depth_m, clean, free)
         return _mean(functional.smooth_l1_loss(depth_m, clean, reduction="none"), free)
 
     def _outputs(
-        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> tuple[Tensor, Tensor, Tensor]:
         """(B, H, W) depth in metres with and without the patch, and the bool mask of pixels that show no patch."""
 
         def said(sample: Any) -> Tensor:
             return _output(model, as_batch([sample.images], list(views)), "depth_m")[0]
 
-        clean = self._clean.of(model, samples, indexes, said)
+        clean = self._clean.of(model, samples, indices, said)
         depth_m = _output(model, views, "depth_m")
         return depth_m, clean.to(depth_m.device, depth_m.dtype), outside(samples, next(iter(views)), depth_m.device)
 
@@ -221,7 +221,7 @@ class LossObjective:
     signs: Mapping[str, float]
 
     def terms(
-        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indexes: Sequence[int]
+        self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
         """One term for each loss of the model with a weight other than 0."""
         losses = model.forward(views, samples)
@@ -234,7 +234,7 @@ def counted(
     model: Model,
     views: Mapping[str, Tensor],
     samples: Sequence[Any],
-    indexes: Sequence[int],
+    indices: Sequence[int],
 ) -> list[Tensor]:
     """Scalars whose sum is the harm, by which attacks without gradients compare patches; over all members of a group.
 
@@ -242,12 +242,12 @@ def counted(
     against a member's defense are included.
     """
     if isinstance(objective, HarmObjective):
-        harms = [objective.harm(member, views, samples, indexes) for member in members_of(model).values()]
+        harms = [objective.harm(member, views, samples, indices) for member in members_of(model).values()]
         terms = [
             term for member in members_of(model).values() for term in defense_terms(member, views, samples).values()
         ]
         return harms + [term.weight * term.value for term in terms]
-    return weighted(objective, model, views, samples, indexes)
+    return weighted(objective, model, views, samples, indices)
 
 
 def weighted(
@@ -255,13 +255,13 @@ def weighted(
     model: Model,
     views: Mapping[str, Tensor],
     samples: Sequence[Any],
-    indexes: Sequence[int],
+    indices: Sequence[int],
 ) -> list[Tensor]:
     """The weighted terms of the objective over all members of a group, for attacks that maximise their sum."""
     return [
         term.weight * term.value
         for member in members_of(model).values()
-        for term in all_terms(objective, member, views, samples, indexes).values()
+        for term in all_terms(objective, member, views, samples, indices).values()
     ]
 
 
@@ -270,10 +270,10 @@ def all_terms(
     member: Model,
     views: Mapping[str, Tensor],
     samples: Sequence[Any],
-    indexes: Sequence[int],
+    indices: Sequence[int],
 ) -> dict[str, Term]:
     """The objective's terms for one model by name, and the terms against the model's defense if there is one."""
-    return {**objective.terms(member, views, samples, indexes), **defense_terms(member, views, samples)}
+    return {**objective.terms(member, views, samples, indices), **defense_terms(member, views, samples)}
 
 
 def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[Any]) -> dict[str, Term]:
@@ -294,9 +294,9 @@ def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[
     return terms
 
 
-def not_finite(what: str, indexes: Sequence[int]) -> GearError:
+def not_finite(what: str, indices: Sequence[int]) -> GearError:
     """Makes the error for a NaN or infinite value; the message names the samples for which the value was computed."""
-    which = f"sample{'s' * (len(indexes) > 1)} {', '.join(map(str, indexes))}"
+    which = f"sample{'s' * (len(indices) > 1)} {', '.join(map(str, indices))}"
     return GearError(
         f"{what} is NaN or infinite, because the model's output for {which} with the patch is; check its weights"
     )

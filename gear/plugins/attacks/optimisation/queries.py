@@ -23,7 +23,7 @@ Textures = npt.NDArray[np.float32]
 """Textures of all surfaces, (S, 3, h, w) in 0..1."""
 
 
-class Oracle:
+class BlackBoxObjective:
     """Computes the harm of textures and counts queries. One query is one forward pass of one model on a batch.
 
     Objectives that need the output on the picture without the patch (`needs_clean_output`) cost one more query for each
@@ -55,31 +55,31 @@ class Oracle:
         check_saved(state, {"left": np.array(0), "paid": np.zeros(np.size(state.get("paid", ())), np.int64)})
         self.left, self._seen = int(state["left"]), {int(index) for index in state["paid"]}
 
-    def cost(self, indexes: Sequence[int]) -> int:
+    def cost(self, indices: Sequence[int]) -> int:
         """The number of queries that one evaluation of the harm on these samples costs."""
         asks = isinstance(self._objective, HarmObjective) and self._objective.needs_clean_output
-        clean = len(set(indexes) - self._seen) if asks else 0
+        clean = len(set(indices) - self._seen) if asks else 0
         return len(members_of(self._model)) * (1 + clean)
 
-    def harm(self, textures: Textures, indexes: Sequence[int]) -> float:
+    def harm(self, textures: Textures, indices: Sequence[int]) -> float:
         """The harm of textures on some samples as one number, from forward passes without gradients.
 
         Raises:
             RuntimeError: fewer queries are left than the evaluation costs.
             GearError: the harm is not finite.
         """
-        cost = self.cost(indexes)
+        cost = self.cost(indices)
         if self.left < cost:
             raise RuntimeError("no queries left")
         self.left -= cost
-        self._seen.update(indexes)
+        self._seen.update(indices)
         patches = [torch.from_numpy(np.ascontiguousarray(texture)) for texture in textures]
-        samples = [self._dataset[index] for index in indexes]
+        samples = [self._dataset[index] for index in indices]
         with torch.no_grad():
-            views = {view: self._compositor.compose(patches, indexes, view) for view in samples[0].images}
-            harm = sum(map(float, counted(self._objective, self._model, views, samples, indexes)))
+            views = {view: self._compositor.compose(patches, indices, view) for view in samples[0].images}
+            harm = sum(map(float, counted(self._objective, self._model, views, samples, indices)))
         if not math.isfinite(harm):
-            raise not_finite("the objective", indexes)
+            raise not_finite("the objective", indices)
         return harm
 
 

@@ -114,7 +114,7 @@ def cell_auroc(heat: Tensor, truth: Tensor) -> float:
     return float((ranks[is_patch].sum() - inside * (inside - 1) / 2) / (inside * others))
 
 
-def telling_layers(heats: Mapping[str, Sequence[Tensor]], truths: Sequence[Tensor]) -> tuple[str, ...]:
+def select_layers(heats: Mapping[str, Sequence[Tensor]], truths: Sequence[Tensor]) -> tuple[str, ...]:
     """Selects the layers whose common heat map (largest value in each cell) separates patches from other cells best.
 
     The selection starts with the best single layer. The other layers follow in the order of their own AUROC; a layer is

@@ -14,13 +14,13 @@ from gear.contracts.defenses import DefendedBatch, DefenseResult, FitReport
 from gear.contracts.models import Model
 from gear.plugins.defenses.activations.feature_maps import deepest, feature_maps, tapped
 from gear.plugins.defenses.activations.z_scores import (
+    CleanStatistics,
     Moments,
-    Usual,
     alarm_level,
     false_alarm_interval,
     moments,
-    sureness,
-    sureness_tensor,
+    normalised_score,
+    normalised_score_tensor,
 )
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
@@ -34,18 +34,18 @@ other quarters, because pictures deviate less from their own statistics than new
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Learnt:
+class DetectorState:
     """The state of a detector after calibration with clean pictures.
 
     Attributes:
         layer: name of the tap (layer) whose feature map is read.
-        usual: mean and standard deviation of the features on clean pictures.
+        statistics: mean and standard deviation of the features on clean pictures.
         level: raw score above which the alarm is raised.
         report: figures on the calibration, for the user.
     """
 
     layer: str
-    usual: Usual
+    statistics: CleanStatistics
     level: float
     report: FitReport
 
@@ -76,7 +76,7 @@ class Detector:
 
     def fit(
         self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
-    ) -> Learnt:
+    ) -> DetectorState:
         """Calibrates the detector: statistics of features and the alarm level, from the clean pictures alone.
 
         Raises:
@@ -90,29 +90,29 @@ class Detector:
         parts = [moments(self._numbers(model, clean[i], layer) for i in fold) for fold in folds]
         scores = []
         for number, fold in enumerate(folds):
-            others = functools.reduce(Moments.merged, parts[:number] + parts[number + 1 :]).usual()
+            others = functools.reduce(Moments.merged, parts[:number] + parts[number + 1 :]).clean_statistics()
             scores += [self._raw(others, self._numbers(model, clean[i], layer)) for i in fold]
         level = alarm_level(scores, self._false_alarms)
         low, high = false_alarm_interval(len(scores), self._false_alarms)
         values = {"clean_pictures": len(scores), "level": level, "false_alarms_low": low, "false_alarms_high": high}
-        learnt = functools.reduce(Moments.merged, parts).usual()
-        return Learnt(layer=layer, usual=learnt, level=level, report=FitReport(values=values))
+        statistics = functools.reduce(Moments.merged, parts).clean_statistics()
+        return DetectorState(layer=layer, statistics=statistics, level=level, report=FitReport(values=values))
 
-    def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
+    def apply(self, views: Views, model: Model | None, state: DetectorState, rng: np.random.Generator) -> DefenseResult:
         """Returns the unchanged pictures of one sample and their score, 0.5 at the alarm level."""
         assert model is not None
-        raw = self._raw(state.usual, self._numbers(model, views, state.layer))
-        return DefenseResult(views=dict(views), score=sureness(raw, state.level))
+        raw = self._raw(state.statistics, self._numbers(model, views, state.layer))
+        return DefenseResult(views=dict(views), score=normalised_score(raw, state.level))
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """Returns the (B, 3, H, W) pictures unchanged."""
         return dict(views)
 
-    def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> DefendedBatch:
+    def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: DetectorState) -> DefendedBatch:
         """The unchanged (B, 3, H, W) pictures, and (B,) scores with gradients with respect to the pictures."""
         features = tapped(model, views, [state.layer])[state.layer]
-        raw = torch.stack([self._aggregate(state.usual.z_scores(self._compress(one))) for one in features])
-        return DefendedBatch(views=dict(views), scores=sureness_tensor(raw, state.level))
+        raw = torch.stack([self._aggregate(state.statistics.z_scores(self._compress(one))) for one in features])
+        return DefendedBatch(views=dict(views), scores=normalised_score_tensor(raw, state.level))
 
     def wrap(self, model: Model) -> Model:
         """Returns the model unchanged, because the detector only reads feature maps."""
@@ -121,5 +121,5 @@ class Detector:
     def _numbers(self, model: Model, views: Views, layer: str) -> Tensor:
         return self._compress(feature_maps(model, views, [layer])[layer])
 
-    def _raw(self, learnt: Usual, numbers: Tensor) -> float:
-        return float(self._aggregate(learnt.z_scores(numbers)))
+    def _raw(self, statistics: CleanStatistics, numbers: Tensor) -> float:
+        return float(self._aggregate(statistics.z_scores(numbers)))

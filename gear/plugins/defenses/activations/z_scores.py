@@ -22,7 +22,7 @@ has deviation 0, and its smallest change would outweigh all other features.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Usual:
+class CleanStatistics:
     """Mean and standard deviation of each feature on clean pictures (without patch).
 
     Attributes:
@@ -75,7 +75,7 @@ class Moments:
         squares = self.squares + other.squares + change * change * (self.count * other.count / count)
         return Moments(count=count, mean=mean, squares=squares)
 
-    def usual(self) -> Usual:
+    def clean_statistics(self) -> CleanStatistics:
         """Mean and standard deviation of each feature.
 
         Raises:
@@ -83,7 +83,7 @@ class Moments:
         """
         if self.count < 2:
             raise GearError(f"a calibration needs at least two pictures to say what is usual, got {self.count}")
-        return Usual(mean=self.mean, deviation=(self.squares / (self.count - 1)).sqrt())
+        return CleanStatistics(mean=self.mean, deviation=(self.squares / (self.count - 1)).sqrt())
 
 
 NO_MOMENTS = Moments(count=0, mean=torch.zeros(()), squares=torch.zeros(()))
@@ -102,13 +102,13 @@ def moments(samples: Iterable[Tensor]) -> Moments:
     return total
 
 
-def usual(samples: Iterable[Tensor]) -> Usual:
+def clean_statistics(samples: Iterable[Tensor]) -> CleanStatistics:
     """Mean and standard deviation of each feature over tensors of one shape, computed in one pass.
 
     Raises:
         GearError: there are fewer than two tensors, or their shapes differ.
     """
-    return moments(samples).usual()
+    return moments(samples).clean_statistics()
 
 
 def alarm_level(clean: Sequence[float], false_alarms: float) -> float:
@@ -149,13 +149,13 @@ def _rank(count: int, false_alarms: float) -> int:
     return math.ceil(round((count + 1) * (1 - false_alarms), 9))
 
 
-def sureness(raw: float, level: float) -> float:
+def normalised_score(raw: float, level: float) -> float:
     """Converts a raw score of 0 or more to a score in 0..1: raw / (raw + level), which is 0.5 at the alarm level."""
     if not math.isfinite(raw):
         return 1.0
     return raw / (raw + max(level, LEAST_LEVEL))
 
 
-def sureness_tensor(raw: Tensor, level: float) -> Tensor:
+def normalised_score_tensor(raw: Tensor, level: float) -> Tensor:
     """Converts (B,) raw scores of 0 or more to scores in 0..1: raw / (raw + level), with gradients."""
     return raw / (raw + max(level, LEAST_LEVEL))

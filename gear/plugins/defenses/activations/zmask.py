@@ -26,11 +26,16 @@ from gear.plugins.defenses.activations.over_activation import (
     mean_of,
     pooled_sizes,
     refined,
-    telling_layers,
+    select_layers,
 )
 from gear.plugins.defenses.activations.twin_masks import patch_area
-from gear.plugins.defenses.activations.z_scores import alarm_level, false_alarm_interval, sureness, sureness_tensor
-from gear.plugins.defenses.activations.zmask_layers import Layers, Look, Views, layers_of, looks
+from gear.plugins.defenses.activations.z_scores import (
+    alarm_level,
+    false_alarm_interval,
+    normalised_score,
+    normalised_score_tensor,
+)
+from gear.plugins.defenses.activations.zmask_layers import Layers, NetworkInput, Views, layers_of, network_inputs
 from gear.plugins.defenses.activations.zmask_options import ZMaskConfig
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
@@ -48,7 +53,7 @@ published. For networks with another normalisation it is a grey near the middle,
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Learnt:
+class ZMaskState:
     """The state of Z-Mask after calibration.
 
     Attributes:
@@ -82,7 +87,7 @@ class ZMask:
 
     def fit(
         self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
-    ) -> Learnt:
+    ) -> ZMaskState:
         """Computes statistics from clean pictures, and fits the fusion block to the same scenes with patches.
 
         Raises:
@@ -106,23 +111,26 @@ class ZMask:
             raise GearError("no patch is seen in the patched calibration data: Z-Mask has nothing to learn from")
         block = learn(examples, self._settings.steps, rng)
         scores = [
-            max(block.score(*self._seen(model, look, layers, statistics)) for look in looks(sample))
+            max(
+                block.score(*self._heat_maps(model, net_input, layers, statistics))
+                for net_input in network_inputs(sample)
+            )
             for sample in spread(clean, self._settings.max_patched_pictures)
         ]
         level = alarm_level(scores, self._settings.false_alarms)
         report = _fit_report(fit_of(block, examples), len(examples), len(scores), self._settings.false_alarms, level)
-        return Learnt(layers=layers, statistics=statistics, block=block, level=level, report=report)
+        return ZMaskState(layers=layers, statistics=statistics, block=block, level=level, report=report)
 
-    def apply(self, views: Views, model: Model | None, state: Learnt, rng: np.random.Generator) -> DefenseResult:
+    def apply(self, views: Views, model: Model | None, state: ZMaskState, rng: np.random.Generator) -> DefenseResult:
         """Covers regions of a sample's pictures that over-activate the network; the score is the cameras' maximum."""
         assert model is not None
         masks = {name: np.zeros(picture.shape[:2], np.float32) for name, picture in views.items()}
         score = 0.0
-        for look in looks(views):
-            shallow, deep = self._seen(model, look, state.layers, state.statistics)
-            score = max(score, sureness(state.block.score(shallow, deep), state.level))
-            size = masks[look.camera].shape[::-1]
-            masks[look.camera] = cv2.resize(
+        for net_input in network_inputs(views):
+            shallow, deep = self._heat_maps(model, net_input, state.layers, state.statistics)
+            score = max(score, normalised_score(state.block.score(shallow, deep), state.level))
+            size = masks[net_input.camera].shape[::-1]
+            masks[net_input.camera] = cv2.resize(
                 state.block.mask(shallow, deep).numpy(), size, interpolation=cv2.INTER_NEAREST_EXACT
             )
         is_alarm = score > COVERED_FROM or not self._settings.only_on_alarm
@@ -137,11 +145,11 @@ class ZMask:
         """
         raise ValueError("Z-Mask looks into the model: it has `forward_fitted`")
 
-    def forward_fitted(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> Mapping[str, Tensor]:
+    def forward_fitted(self, views: Mapping[str, Tensor], model: Model, state: ZMaskState) -> Mapping[str, Tensor]:
         """Cleans (B, 3, H, W) pictures by camera name; masks and scores of `defend_batch` are left out."""
         return self.defend_batch(views, model, state).views
 
-    def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: Learnt) -> DefendedBatch:
+    def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: ZMaskState) -> DefendedBatch:
         """Cleans (B, 3, H, W) pictures by camera name as `apply` does, and returns masks and scores with gradients.
 
         The gradient of the covered pictures is that of the mask before rounding.
@@ -149,21 +157,23 @@ class ZMask:
         covers = {name: torch.zeros_like(pictures[:, :1]) for name, pictures in views.items()}
         masks = {name: pictures.new_zeros(pictures[:, 0].shape) for name, pictures in views.items()}
         scores: list[Tensor] = []
-        for look in looks(views):
-            maps = tapped(model, look.views, state.layers.all())
-            size = look.views[look.camera].shape[2:]
+        for net_input in network_inputs(views):
+            maps = tapped(model, net_input.views, state.layers.all())
+            size = net_input.views[net_input.camera].shape[2:]
             grid = self._grid(*size)
             soft, raw = [], []
-            for number in range(len(look.views[look.camera])):
+            for number in range(len(net_input.views[net_input.camera])):
                 own = {name: features[number] for name, features in maps.items()}
                 heats = self._heats(own, grid, state.layers, state.statistics)
-                heats = _flipped(heats) if look.is_mirrored else heats
+                heats = _flipped(heats) if net_input.is_mirrored else heats
                 raw.append(state.block.score_tensor(*heats))
                 soft.append(state.block.mask(*heats))
-            scores.append(sureness_tensor(torch.stack(raw), state.level))
+            scores.append(normalised_score_tensor(torch.stack(raw), state.level))
             mask = functional.interpolate(torch.stack(soft)[:, None], size=size, mode="nearest-exact")
-            masks[look.camera] = mask[:, 0].to(masks[look.camera])
-            covers[look.camera] = ((mask > COVERED_FROM).float() + mask - mask.detach()).to(covers[look.camera])
+            masks[net_input.camera] = mask[:, 0].to(masks[net_input.camera])
+            covers[net_input.camera] = ((mask > COVERED_FROM).float() + mask - mask.detach()).to(
+                covers[net_input.camera]
+            )
         score = torch.stack(scores).amax(dim=0)
         is_alarm = (score.detach() > COVERED_FROM) | (not self._settings.only_on_alarm)
         cleaned = {}
@@ -179,9 +189,9 @@ class ZMask:
     def _statistics(self, clean: Sequence[Views], model: Model, layers: Layers) -> dict[str, ChannelStatistics]:
         each: dict[str, list[ChannelStatistics]] = {name: [] for name in layers.all()}
         for sample in spread(clean, self._settings.max_clean_pictures):
-            look = looks(sample)[0]
-            grid = self._grid(*look.views[look.camera].shape[:2])
-            for name, features in feature_maps(model, look.views, layers.all()).items():
+            net_input = network_inputs(sample)[0]
+            grid = self._grid(*net_input.views[net_input.camera].shape[:2])
+            for name, features in feature_maps(model, net_input.views, layers.all()).items():
                 each[name].append(channel_statistics(features, grid))
         return {name: mean_of(many) for name, many in each.items()}
 
@@ -195,10 +205,10 @@ class ZMask:
     ) -> Iterator[Example]:
         """Yields training examples: the heat maps of each picture in which a patch is visible, with the true mask."""
         for number in spread(range(len(patched)), self._settings.max_patched_pictures):
-            without, look = looks(clean[number])[0], looks(patched[number])[0]
-            area = patch_area(without.views[look.camera], look.views[look.camera], number)
+            without, net_input = network_inputs(clean[number])[0], network_inputs(patched[number])[0]
+            area = patch_area(without.views[net_input.camera], net_input.views[net_input.camera], number)
             if area.any():
-                shallow, deep = self._seen(model, look, layers, statistics)
+                shallow, deep = self._heat_maps(model, net_input, layers, statistics)
                 truth = _truth(area, (shallow.shape[0], shallow.shape[1]))
                 yield Example(shallow=shallow, deep=deep, truth=truth)
 
@@ -209,13 +219,17 @@ class ZMask:
         """
         return self._settings.rows, max(1, round(self._settings.rows * width / height))
 
-    def _seen(
-        self, model: Model, look: Look[UInt8Image], layers: Layers, statistics: Mapping[str, ChannelStatistics]
+    def _heat_maps(
+        self,
+        model: Model,
+        net_input: NetworkInput[UInt8Image],
+        layers: Layers,
+        statistics: Mapping[str, ChannelStatistics],
     ) -> tuple[Tensor, Tensor]:
         """The shallow and the deep heat map of one network input, mirrored back if the input is mirrored."""
-        grid = self._grid(*look.views[look.camera].shape[:2])
-        heats = self._heats(feature_maps(model, look.views, layers.all()), grid, layers, statistics)
-        return _flipped(heats) if look.is_mirrored else heats
+        grid = self._grid(*net_input.views[net_input.camera].shape[:2])
+        heats = self._heats(feature_maps(model, net_input.views, layers.all()), grid, layers, statistics)
+        return _flipped(heats) if net_input.is_mirrored else heats
 
     def _heats(
         self,
@@ -269,14 +283,19 @@ class ZMask:
         heats: dict[str, dict[str, list[Tensor]]] = {"shallow": {}, "deep": {}}
         truths = []
         for number in spread(range(len(patched)), LAYER_PICTURES):
-            without, look = looks(clean[number])[0], looks(patched[number])[0]
-            grid = self._grid(*look.views[look.camera].shape[:2])
-            truths.append(_truth(patch_area(without.views[look.camera], look.views[look.camera], number), grid))
-            maps = feature_maps(model, look.views, every.all())
+            without, net_input = network_inputs(clean[number])[0], network_inputs(patched[number])[0]
+            grid = self._grid(*net_input.views[net_input.camera].shape[:2])
+            truths.append(
+                _truth(
+                    patch_area(without.views[net_input.camera], net_input.views[net_input.camera], number),
+                    grid,
+                )
+            )
+            maps = feature_maps(model, net_input.views, every.all())
             for kind, by_name in self._layer_heats(maps, grid, every, statistics).items():
                 for name, heat in by_name.items():
                     heats[kind].setdefault(name, []).append(heat)
-        chosen = {kind: telling_layers(by_name, truths) for kind, by_name in heats.items()}
+        chosen = {kind: select_layers(by_name, truths) for kind, by_name in heats.items()}
         return Layers(
             shallow=self._settings.shallow or chosen["shallow"] or layers.shallow,
             deep=self._settings.deep or chosen["deep"] or layers.deep,

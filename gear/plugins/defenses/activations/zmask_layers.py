@@ -57,13 +57,13 @@ def layers_of(model: Model, shallow: Sequence[str], deep: Sequence[str]) -> Laye
     names = tuple(model.taps())
     if not names:
         raise GearError("Z-Mask reads feature maps, but the model has no taps")
-    usual = next((known for known in KNOWN if set(known.all()) <= set(names)), None)
-    usual = usual or Layers(shallow=names[:1], deep=tuple(dict.fromkeys((names[0], names[-1]))))
-    return Layers(shallow=tuple(shallow) or usual.shallow, deep=tuple(deep) or usual.deep)
+    default = next((known for known in KNOWN if set(known.all()) <= set(names)), None)
+    default = default or Layers(shallow=names[:1], deep=tuple(dict.fromkeys((names[0], names[-1]))))
+    return Layers(shallow=tuple(shallow) or default.shallow, deep=tuple(deep) or default.deep)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Look(Generic[Shown]):
+class NetworkInput(Generic[Shown]):
     """One input of the network, made from the pictures of a sample or of a batch.
 
     Attributes:
@@ -77,7 +77,7 @@ class Look(Generic[Shown]):
     is_mirrored: bool
 
 
-def looks(views: Mapping[str, Shown]) -> tuple[Look[Shown], ...]:
+def network_inputs(views: Mapping[str, Shown]) -> tuple[NetworkInput[Shown], ...]:
     """Builds the network inputs in which Z-Mask searches each camera's picture for patches.
 
     Args:
@@ -89,11 +89,11 @@ def looks(views: Mapping[str, Shown]) -> tuple[Look[Shown], ...]:
         only the first camera is described.
     """
     first = LEFT if LEFT in views else next(iter(views))
-    plain = Look(camera=first, views=views, is_mirrored=False)
+    plain = NetworkInput(camera=first, views=views, is_mirrored=False)
     if set(views) != {LEFT, RIGHT}:
         return (plain,)
     swapped = {one: _mirrored(views[other]) for one, other in ((LEFT, RIGHT), (RIGHT, LEFT))}
-    return (plain, Look(camera=RIGHT, views=swapped, is_mirrored=True))
+    return (plain, NetworkInput(camera=RIGHT, views=swapped, is_mirrored=True))
 
 
 def _mirrored(picture: Shown) -> Shown:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from gear.plugins.attacks.optimisation.gradient_checks import promised_and_kept
+from gear.plugins.attacks.optimisation.gradient_checks import predicted_and_measured_change
 
 
 @pytest.mark.parametrize("saturated", [0.0, 0.5, 0.95])
@@ -15,8 +15,8 @@ def test_what_is_linear_keeps_its_promise(saturated: float) -> None:
     patch = torch.rand(3, 20, 40, generator=generator)
     patch = torch.where(torch.rand(patch.shape, generator=generator) < saturated, patch.round(), patch)
     weight = torch.randn(patch.shape, generator=generator) * torch.randn(patch.shape, generator=generator).mul(2).exp()
-    promised, kept = promised_and_kept(lambda patches: (patches[0].double() * weight).sum(), [patch])
-    assert promised > 0 and kept == pytest.approx(promised, rel=1e-3)
+    predicted, measured = predicted_and_measured_change(lambda patches: (patches[0].double() * weight).sum(), [patch])
+    assert predicted > 0 and measured == pytest.approx(predicted, rel=1e-3)
 
 
 def test_what_hides_its_gradient_keeps_little() -> None:
@@ -26,5 +26,5 @@ def test_what_hides_its_gradient_keeps_little() -> None:
         """Flat, but with a slope to see."""
         return patches[0].sum() - (patches[0].sum() - 7.0).detach()
 
-    promised, kept = promised_and_kept(hidden, [patch])  # type: ignore[arg-type]
-    assert promised > 0 and kept == pytest.approx(0.0, abs=1e-3 * promised)
+    predicted, measured = predicted_and_measured_change(hidden, [patch])  # type: ignore[arg-type]
+    assert predicted > 0 and measured == pytest.approx(0.0, abs=1e-3 * predicted)

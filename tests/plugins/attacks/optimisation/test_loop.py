@@ -17,8 +17,8 @@ from gear.plugins.attacks.optimisation.appearance import vary
 from gear.plugins.attacks.optimisation.loop import (
     ARRAYS,
     Direction,
+    PatchedBatch,
     Problem,
-    Seen,
     TextureOptimiser,
     batch_of,
     one_gradient,
@@ -100,7 +100,7 @@ def test_what_was_felt_before_it_was_cut_off_counts() -> None:
     def ascend_at(steps_with_gradient: set[int]) -> Direction:
         count = iter(range(100))
 
-        def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
+        def ascend(textures: Tensor, batch: PatchedBatch) -> tuple[Tensor, dict[str, float]]:
             has_gradient = next(count) in steps_with_gradient
             return torch.full_like(textures, float(has_gradient)), {"gradient": float(has_gradient)}
 
@@ -159,7 +159,7 @@ class Slopes:
 
     slopes: Mapping[str, tuple[Tensor, float]]
 
-    def terms(self, model: Any, views: Mapping[str, Tensor], samples: Any, indexes: Any) -> Mapping[str, Term]:
+    def terms(self, model: Any, views: Mapping[str, Tensor], samples: Any, indices: Any) -> Mapping[str, Term]:
         return {n: Term(value=(views["left"] * slope).sum(), weight=w) for n, (slope, w) in self.slopes.items()}
 
 
@@ -172,9 +172,9 @@ def test_every_term_has_a_say_of_its_weight_however_long_its_gradient(per_term: 
     contract = Contract()
     dataset = contract.dataset()
     problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=settings)
-    seen = Seen(views={"left": textures}, samples=[], indexes=[])
+    batch = PatchedBatch(views={"left": textures}, samples=[], indices=[])
     direction, values = unit_gradients(problem, Slopes({"a": (long, 0.3), "b": (short, -0.7)}), settings)(
-        textures, seen
+        textures, batch
     )
     scales = (long.norm(), short.norm()) if per_term else (1.0, 1.0)
     total = 0.3 * long / scales[0] - 0.7 * short / scales[1]
@@ -186,20 +186,20 @@ def test_every_term_has_a_say_of_its_weight_however_long_its_gradient(per_term: 
 def test_penalties_are_taken_along_but_are_no_gradient_of_the_objective() -> None:
     slope, other = torch.rand(1, 3, 12, 24), torch.rand(1, 3, 12, 24)
     textures = torch.rand(1, 3, 12, 24, requires_grad=True)
-    seen = Seen(views={}, samples=[], indexes=[])
+    batch = PatchedBatch(views={}, samples=[], indices=[])
 
-    def harm(patches: Tensor, _: Seen) -> dict[str, Tensor]:
+    def harm(patches: Tensor, _: PatchedBatch) -> dict[str, Tensor]:
         return {"harm": (patches * slope).sum(), "more": 2 * (patches * slope).sum()}
 
     def penalties(patches: Tensor) -> dict[str, Tensor]:
         return {"penalty": -(patches * other).sum()}
 
-    direction, values = one_gradient(harm, penalties)(textures, seen)
+    direction, values = one_gradient(harm, penalties)(textures, batch)
     torch.testing.assert_close(direction, 3 * slope - other)
     assert values["gradient"] == pytest.approx(float((3 * slope).norm()), rel=1e-5)
     assert set(values) == {"harm", "more", "penalty", "gradient"}
-    torch.testing.assert_close(one_gradient(harm)(textures, seen)[0], 3 * slope)
-    direction, values = one_gradient(lambda *_: {}, penalties)(textures, seen)
+    torch.testing.assert_close(one_gradient(harm)(textures, batch)[0], 3 * slope)
+    direction, values = one_gradient(lambda *_: {}, penalties)(textures, batch)
     torch.testing.assert_close(direction, -other)
     assert "gradient" not in values
 
@@ -281,7 +281,7 @@ def test_a_gradient_that_is_no_number_ends_it_there(value: float) -> None:
     problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=SETTINGS)
     monitor = RecordingMonitor()
 
-    def ascend(textures: Tensor, seen: Seen) -> tuple[Tensor, dict[str, float]]:
+    def ascend(textures: Tensor, batch: PatchedBatch) -> tuple[Tensor, dict[str, float]]:
         slope = torch.ones_like(textures)
         slope[0, 0, 0, 0] = value if len(monitor.states) == 2 else 1.0
         return slope, {"gradient": float(slope.norm())}

@@ -9,7 +9,7 @@ import pytest
 
 from gear.contracts.attacks import Budget, Term
 from gear.plugins.attacks.optimisation.objectives import DepthObjective, SemsegObjective
-from gear.plugins.attacks.optimisation.queries import Oracle
+from gear.plugins.attacks.optimisation.queries import BlackBoxObjective
 from gear.plugins.attacks.scene_specific import scene_specific
 from gear.testing.attack_contract import AttackContract
 from gear.testing.tiny_compositor import TinyCompositor
@@ -28,9 +28,11 @@ class OnDepth(AttackContract):
 TEXTURES = np.full((1, 3, 4, 8), 0.5, np.float32)
 
 
-def oracle_of(contract: AttackContract, objective: Any, queries: int | None = 50) -> tuple[Any, Oracle]:
+def oracle_of(contract: AttackContract, objective: Any, queries: int | None = 50) -> tuple[Any, BlackBoxObjective]:
     model, dataset = contract.model(), contract.dataset()
-    return model, Oracle(model, dataset, TinyCompositor(dataset), objective, Budget(steps=1, queries=queries))
+    return model, BlackBoxObjective(
+        model, dataset, TinyCompositor(dataset), objective, Budget(steps=1, queries=queries)
+    )
 
 
 @pytest.mark.parametrize(
@@ -45,17 +47,17 @@ def oracle_of(contract: AttackContract, objective: Any, queries: int | None = 50
 )
 def test_every_pass_is_paid_for(contract: type[AttackContract], objective: Any, costs: list[int]) -> None:
     model, oracle = oracle_of(contract(), objective)
-    for indexes, cost in zip(([0], [0, 1], [1, 0]), costs, strict=True):
+    for indices, cost in zip(([0], [0, 1], [1, 0]), costs, strict=True):
         before, passes = oracle.left, model.passes
-        assert oracle.cost(indexes) == cost
-        assert np.isfinite(oracle.harm(TEXTURES, indexes))
+        assert oracle.cost(indices) == cost
+        assert np.isfinite(oracle.harm(TEXTURES, indices))
         assert before - oracle.left == model.passes - passes == cost
 
 
 class HalfOfIt:
     """Somebody else's objective, which does not say whether it asks for clean answers."""
 
-    def terms(self, model: Any, views: Any, samples: Any, indexes: Any) -> dict[str, Term]:
+    def terms(self, model: Any, views: Any, samples: Any, indices: Any) -> dict[str, Term]:
         return {"half": Term(value=model.forward(views)["logits"].mean() / 2)}
 
 
@@ -68,7 +70,7 @@ def test_objectives_of_others_ask_for_nothing_but_the_question() -> None:
 class Unsaid:
     """An objective of a network that says nothing."""
 
-    def terms(self, model: Any, views: Any, samples: Any, indexes: Any) -> dict[str, Term]:
+    def terms(self, model: Any, views: Any, samples: Any, indices: Any) -> dict[str, Term]:
         return {"unsaid": Term(value=model.forward(views)["logits"].mean() * float("nan"))}
 
 

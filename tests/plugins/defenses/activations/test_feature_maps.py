@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from gear.plugins.defenses.activations.feature_maps import deepest, feature_maps, spread, tapped
 from gear.plugins.defenses.activations.twin_masks import patch_area
-from gear.plugins.defenses.activations.zmask_layers import layers_of, looks
+from gear.plugins.defenses.activations.zmask_layers import layers_of, network_inputs
 from gear.testing.defense_contract import noisy_patch, street_picture
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter
 from gear.values.errors import GearError
@@ -92,11 +92,11 @@ def test_samples_are_spread_over_all_of_them() -> None:
 
 def test_a_mirror_makes_the_right_picture_a_left_one() -> None:
     views = pair()
-    plain, mirrored = looks(views)
+    plain, mirrored = network_inputs(views)
     assert (plain.camera, plain.is_mirrored, mirrored.camera, mirrored.is_mirrored) == ("left", False, "right", True)
     assert np.array_equal(mirrored.views["left"][:, ::-1], views["right"])
     assert np.array_equal(mirrored.views["right"][:, ::-1], views["left"])
-    assert [look.camera for look in looks({"left": views["left"]})] == ["left"]
+    assert [one.camera for one in network_inputs({"left": views["left"]})] == ["left"]
 
 
 def test_networks_of_the_paper_get_the_paper_s_layers() -> None:

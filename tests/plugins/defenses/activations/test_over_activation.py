@@ -15,7 +15,7 @@ from gear.plugins.defenses.activations.over_activation import (
     on_grid,
     pooled_sizes,
     refined,
-    telling_layers,
+    select_layers,
 )
 
 ROWS, COLUMNS = 30, 60
@@ -118,5 +118,5 @@ def test_a_layer_that_hides_the_patch_is_left_out() -> None:
     upper[0, :4], lower[1, :4] = 1, 1
     drowning[0, :], drowning[2:, :4] = 9, 9
     maps = {"drowning": [drowning], "upper": [upper], "lower": [lower]}
-    assert set(telling_layers(maps, [truth])) == {"upper", "lower"}
-    assert telling_layers({"one": [upper]}, [torch.zeros(4, 8)]) == ()
+    assert set(select_layers(maps, [truth])) == {"upper", "lower"}
+    assert select_layers({"one": [upper]}, [torch.zeros(4, 8)]) == ()
