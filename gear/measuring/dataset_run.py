@@ -17,7 +17,7 @@ from typing import Any
 from gear.dataset.reading import Dataset
 from gear.measuring.guarded_model import GuardedModel
 from gear.measuring.parallel_batches import lanes
-from gear.measuring.scoring import Note, Scorer
+from gear.measuring.scoring import SampleResult, Scorer
 from gear.readers import TorchDataset, read_ahead
 from gear.values.errors import DatasetError
 
@@ -30,12 +30,12 @@ class Row:
     """The result of a model on one dataset.
 
     Attributes:
-        notes: stored result of every sample, in the order of the samples.
+        results: stored result of every sample, in the order of the samples.
         made: number of samples that this run predicted; an earlier run predicted all other samples.
         damaged: one error per stored prediction that could not be read and was predicted again.
     """
 
-    notes: list[Note]
+    results: list[SampleResult]
     made: int
     damaged: tuple[DatasetError, ...]
 
@@ -56,25 +56,25 @@ def evaluate_row(
     items = TorchDataset(dataset)
     with ThreadPoolExecutor(workers) as scorers:
         desk = _BoundedQueue(scorers, 2 * batch + workers, done)
-        notes, damaged = _taken_up(scorer, desk)
+        results, damaged = _taken_up(scorer, desk)
         every = [range(begin, min(begin + batch, len(dataset))) for begin in range(0, len(dataset), batch)]
-        blocks = [block for block in every if not notes.keys() >= set(block)]
-        made = len(dataset) - len(notes)
+        blocks = [block for block in every if not results.keys() >= set(block)]
+        made = len(dataset) - len(results)
         count = min(guarded.lanes, len(every))
         if count > 1:
-            scored = _in_lanes(items, scorer, guarded, blocks, notes.keys(), count, desk)
+            scored = _in_lanes(items, scorer, guarded, blocks, results.keys(), count, desk)
         else:
             scored = {}
             with contextlib.closing(read_ahead(items, blocks, workers=workers)) as reading:
-                for found in reading:
-                    answers = guarded.predict([item.sample.images for item in found], [item.index for item in found])
-                    for item, answer in zip(found, answers, strict=True):
-                        if item.index not in notes:
-                            scored[item.index] = desk.submit(scorer.first, item.index, item.sample, answer)
+                for read in reading:
+                    predictions = guarded.predict([item.sample.images for item in read], [item.index for item in read])
+                    for item, prediction in zip(read, predictions, strict=True):
+                        if item.index not in results:
+                            scored[item.index] = desk.submit(scorer.score_new, item.index, item.sample, prediction)
                     desk.check()
-        notes |= {index: future.result() for index, future in scored.items()}
+        results |= {index: future.result() for index, future in scored.items()}
     desk.check()  # looked at again now that every callback has ended: that of the last sample may fail too
-    return Row(notes=[notes[index] for index in range(len(dataset))], made=made, damaged=tuple(damaged))
+    return Row(results=[results[index] for index in range(len(dataset))], made=made, damaged=tuple(damaged))
 
 
 def _in_lanes(
@@ -85,22 +85,22 @@ def _in_lanes(
     finished: Set[int],
     count: int,
     desk: _BoundedQueue,
-) -> dict[int, Future[Note]]:
+) -> dict[int, Future[SampleResult]]:
     """Processes several batches in parallel, each in one thread up to the writing of its files."""
 
-    def worked_out(indices: Sequence[int]) -> dict[int, Future[Note]]:
-        found = [items[index] for index in indices]
-        answers = guarded.predict([item.sample.images for item in found], indices)
+    def worked_out(indices: Sequence[int]) -> dict[int, Future[SampleResult]]:
+        read = [items[index] for index in indices]
+        predictions = guarded.predict([item.sample.images for item in read], indices)
         return {
-            item.index: desk.submit(scorer.write, scorer.measured(item.index, item.sample, answer))
-            for item, answer in zip(found, answers, strict=True)
+            item.index: desk.submit(scorer.write, scorer.score(item.index, item.sample, prediction))
+            for item, prediction in zip(read, predictions, strict=True)
             if item.index not in finished
         }
 
-    written: dict[int, Future[Note]] = {}
+    written: dict[int, Future[SampleResult]] = {}
     with lanes(count) as submit:
         coming = deque(blocks)
-        played: deque[Future[dict[int, Future[Note]]]] = deque()
+        played: deque[Future[dict[int, Future[SampleResult]]]] = deque()
         while coming or played:
             while coming and len(played) <= count:
                 played.append(submit(worked_out, coming.popleft()))
@@ -138,7 +138,7 @@ class _BoundedQueue:
         self._waiting.release()
         error = None if done.cancelled() else done.exception()
         try:
-            if not done.cancelled() and error is None and isinstance(done.result(), Note):
+            if not done.cancelled() and error is None and isinstance(done.result(), SampleResult):
                 with self._reporting:
                     self._done()
         except BaseException as problem:  # futures keep what is raised here to themselves
@@ -147,18 +147,18 @@ class _BoundedQueue:
             self._failed.append(error)
 
 
-def _taken_up(scorer: Scorer, desk: _BoundedQueue) -> tuple[dict[int, Note], list[DatasetError]]:
+def _taken_up(scorer: Scorer, desk: _BoundedQueue) -> tuple[dict[int, SampleResult], list[DatasetError]]:
     """The samples that an earlier run finished, and one line for each stored prediction that cannot be read."""
-    futures: dict[int, Future[Note | DatasetError]] = {}
-    for index in sorted(scorer.kept()):
-        futures[index] = desk.submit(scorer.again, index)
+    futures: dict[int, Future[SampleResult | DatasetError]] = {}
+    for index in sorted(scorer.finished()):
+        futures[index] = desk.submit(scorer.rescore_stored, index)
         desk.check()
-    notes: dict[int, Note] = {}
+    results: dict[int, SampleResult] = {}
     damaged: list[DatasetError] = []
     for index, future in futures.items():
-        found = future.result()
-        if isinstance(found, Note):
-            notes[index] = found
+        read = future.result()
+        if isinstance(read, SampleResult):
+            results[index] = read
         else:
-            damaged.append(found)
-    return notes, damaged
+            damaged.append(read)
+    return results, damaged

@@ -38,7 +38,7 @@ and some slower.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Answer:
+class TimedPrediction:
     """The prediction for one sample, with the defense's outputs and the computing time.
 
     Attributes:
@@ -142,7 +142,7 @@ class GuardedModel:
         pixels = sum(camera.width_px * camera.height_px for camera in cameras)
         return max(1, min(MOST_TOGETHER, SMALL_PX // max(pixels, 1)))
 
-    def predict(self, pictures: Sequence[Views], indices: Sequence[int]) -> list[Answer]:
+    def predict(self, pictures: Sequence[Views], indices: Sequence[int]) -> list[TimedPrediction]:
         """Applies the defense to a batch of samples and predicts from its output.
 
         Args:
@@ -176,7 +176,7 @@ class GuardedModel:
             beside += 1 + self._count(-1)
         each_s = (time.perf_counter() - begun) / len(indices) / (beside / 2)
         return [
-            Answer(
+            TimedPrediction(
                 prediction=prediction,
                 model_s=each_s,
                 defense_s=defense_s,

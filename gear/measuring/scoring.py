@@ -1,6 +1,6 @@
 """Computes the metrics of predictions and stores the results, one sample after another.
 
-The last file of a sample is its note, a JSON file that marks the sample as finished.
+The last file of a sample is its stored result, a JSON file that marks the sample as finished.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from gear.dataset.files import explained, inside, sha256, write_whole
 from gear.dataset.json_text import dump_json
 from gear.dataset.output_checks import check_encoded
 from gear.dataset.reading import Dataset
-from gear.measuring.guarded_model import Answer, plugin_error
+from gear.measuring.guarded_model import TimedPrediction, plugin_error
 from gear.measuring.metric_json import known_json
 from gear.measuring.object_report import OBJECTS, ObjectEvaluator
 from gear.measuring.patch_area import MASK_METRICS, mask_metrics, patch_masks, widened
@@ -29,7 +29,7 @@ from gear.measuring.reports import OUTSIDE_PATCH, Report, reports_of
 from gear.measuring.statistics import AnyEvaluator
 from gear.plugins.catalogue import PluginEntry
 from gear.plugins.manager import DISTRIBUTION
-from gear.plugins.stored_evaluations import DEFENDED, PREDICTIONS, check_files, read_note
+from gear.plugins.stored_evaluations import DEFENDED, PREDICTIONS, check_files, read_result
 from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, GearError
 from gear.values.frames import UInt8Image
@@ -41,7 +41,7 @@ DEFENDED_WIDTH_PX, DEFENDED_QUALITY = 640, 85
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Note:
+class SampleResult:
     """The stored result of one finished sample.
 
     Attributes:
@@ -67,7 +67,7 @@ class Note:
     defended: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> Json:
-        """The content of the note's file, which is written next to the predictions."""
+        """The result as JSON, which is written next to the predictions."""
         return {
             "index": self.index,
             "metrics": {name: known_json(one) for name, one in self.metrics.items()},
@@ -88,15 +88,15 @@ class Note:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Unwritten:
+class UnsavedResult:
     """The result of one sample whose files are not written yet.
 
     Attributes:
-        note: the sample's note, a JSON file that marks it as finished.
+        result: the stored result of the sample.
         files: bytes of the files, by path relative to the dataset's folder in the evaluation.
     """
 
-    note: Note
+    result: SampleResult
     files: Mapping[str, bytes]
 
 
@@ -118,53 +118,53 @@ class Scorer:
         self._keeper = self._task if isinstance(self._task, KeepsPredictions) else None
         self.reports: dict[str, Report] = reports_of(reports, dataset)
 
-    def kept(self) -> set[int]:
+    def finished(self) -> set[int]:
         """The indices of the samples that an earlier run finished; they are not predicted again."""
         folder = inside(self._root, f"{self._folder}/samples")
         if self._keeper is None or not folder.is_dir():
             return set()
         return {int(p.stem) for p in folder.glob("*.json") if p.stem.isdecimal() and int(p.stem) < len(self._dataset)}
 
-    def measured(self, index: int, sample: Sample, answer: Answer) -> Unwritten:
+    def score(self, index: int, sample: Sample, timed: TimedPrediction) -> UnsavedResult:
         """Computes the metrics of a prediction and encodes it as files, which are not written yet."""
         with self._blamed(index):
-            metrics, parts = self._measure(sample, answer.prediction)
+            metrics, parts = self._measure(sample, timed.prediction)
             encoded = self._keeper and check_encoded(
-                self._keeper.encode_prediction(sample, answer.prediction, self._dataset.plan.info), "encode_prediction"
+                self._keeper.encode_prediction(sample, timed.prediction, self._dataset.plan.info), "encode_prediction"
             )
         files = encoded.files if encoded else {}
-        defended = {} if answer.defended is None else defended_files(index, answer.defended)
-        note = Note(
+        defended = {} if timed.defended is None else defended_files(index, timed.defended)
+        result = SampleResult(
             index=index,
             metrics=metrics,
             parts=parts,
-            cost={"model_s": answer.model_s, "defense_s": answer.defense_s},
-            score=answer.score,
-            mask=None if answer.mask is None else mask_metrics(sample, answer.mask),
+            cost={"model_s": timed.model_s, "defense_s": timed.defense_s},
+            score=timed.score,
+            mask=None if timed.mask is None else mask_metrics(sample, timed.mask),
             facts=encoded.facts if encoded else None,
             sha256={name: sha256(data) for name, data in files.items()},
             defended={name: sha256(data) for name, data in defended.items()},
         )
         predicted = {f"{PREDICTIONS}/{name}": data for name, data in files.items()}
-        return Unwritten(note=note, files=predicted | defended)
+        return UnsavedResult(result=result, files=predicted | defended)
 
-    def write(self, unwritten: Unwritten) -> Note:
-        """Writes the files of a prediction and, last, the note that marks the sample as finished."""
-        note = unwritten.note
-        for relative, data in unwritten.files.items():
+    def write(self, unsaved: UnsavedResult) -> SampleResult:
+        """Writes the files of a prediction and, last, the stored result, which marks the sample as finished."""
+        result = unsaved.result
+        for relative, data in unsaved.files.items():
             write_whole(self._root, f"{self._folder}/{relative}", data)
-        write_whole(self._root, f"{self._folder}/samples/{note.index:06d}.json", dump_json(note.as_json()))
-        return note
+        write_whole(self._root, f"{self._folder}/samples/{result.index:06d}.json", dump_json(result.as_json()))
+        return result
 
-    def first(self, index: int, sample: Sample, answer: Answer) -> Note:
+    def score_new(self, index: int, sample: Sample, timed: TimedPrediction) -> SampleResult:
         """Computes the metrics of a new prediction and writes its files."""
-        return self.write(self.measured(index, sample, answer))
+        return self.write(self.score(index, sample, timed))
 
-    def again(self, index: int) -> Note | DatasetError:
+    def rescore_stored(self, index: int) -> SampleResult | DatasetError:
         """Reads the stored prediction of an earlier run and computes its metrics.
 
         Returns:
-            The sample's result, or the error if its note or its files cannot be read.
+            The sample's result, or the error if its stored result or its files cannot be read.
 
         Raises:
             DatasetError: the sample itself cannot be read.
@@ -174,7 +174,7 @@ class Scorer:
         sample = self._dataset[index]
         folder = inside(self._root, f"{self._folder}/{PREDICTIONS}")
         try:
-            there = _checked_note(path)
+            there = _checked_result(path)
             check_files(folder, there["sha256"])
             check_files(inside(self._root, self._folder), there[DEFENDED])
             with explained(path):
@@ -184,7 +184,7 @@ class Scorer:
             return DatasetError(error.path, error.problem.partition(";")[0])
         except (ValueError, KeyError, TypeError) as error:
             return DatasetError(path, f"cannot be read again ({one_line(error)})")
-        return Note(
+        return SampleResult(
             index=index,
             metrics=metrics,
             parts=parts,
@@ -196,11 +196,11 @@ class Scorer:
             defended=there[DEFENDED],
         )
 
-    def finish(self, notes: list[Note]) -> None:
+    def finish(self, results: list[SampleResult]) -> None:
         """Writes the result files that cover the whole split, for tasks whose format has such files."""
         if self._keeper is None:
             return
-        rows = [(self._dataset.sidecar(note.index).record, note.facts) for note in notes]
+        rows = [(self._dataset.sidecar(result.index).record, result.facts) for result in results]
         for relative, data in self._keeper.finalise_predictions(rows, self._dataset.plan.info).items():
             write_whole(self._root, f"{self._folder}/{PREDICTIONS}/{relative}", data)
 
@@ -236,16 +236,16 @@ class Scorer:
             raise
 
 
-def _checked_note(path: Path) -> dict[str, Any]:
-    """The note of a sample, as JSON with checked types and the metrics of masks that gear computes.
+def _checked_result(path: Path) -> dict[str, Any]:
+    """The stored result of a sample, as JSON with checked types and the metrics of masks that gear computes.
 
     Raises:
-        DatasetError: the file is not a note that gear wrote.
+        DatasetError: the file is not a result that gear wrote.
     """
-    note = read_note(path)
-    if note["mask"] is not None and note["mask"].keys() != set(MASK_METRICS):
-        raise DatasetError(path, "is no note of a sample (mask: has other metrics)")
-    return note
+    stored = read_result(path)
+    if stored["mask"] is not None and stored["mask"].keys() != set(MASK_METRICS):
+        raise DatasetError(path, "is not the stored result of a sample (mask: has other metrics)")
+    return stored
 
 
 def defended_files(index: int, views: Mapping[str, UInt8Image]) -> dict[str, bytes]:

@@ -54,7 +54,7 @@ class EvaluatedDataset:
         metrics: metrics of the task by name, for each sample in the order of the samples; None if undefined.
         changes: by the name of a twin's folder, the changes of objects against that twin, by index of the
             sample.
-        note: JSON of the dataset (patch, keys), as `results.json` has it.
+        stored: JSON of the dataset (patch, keys), as `results.json` has it.
     """
 
     name: str
@@ -62,13 +62,13 @@ class EvaluatedDataset:
     root: Path
     metrics: tuple[Mapping[str, float | None], ...]
     changes: Mapping[str, Mapping[int, list[ObjectChange]]]
-    note: Json
+    stored: Json
 
     def is_of(self, dataset: Dataset[Any]) -> bool:
         """Whether this part was computed on a dataset; the dataset may have moved since."""
         plan = dataset.plan
         wanted = (plan.content_key, plan.twin_key, plan.info.patch_label)
-        return wanted == tuple(self.note.get(key) for key in ("content_key", "twin_key", "patch"))
+        return wanted == tuple(self.stored.get(key) for key in ("content_key", "twin_key", "patch"))
 
     def prediction(self, dataset: Dataset[Any], sample: Sample) -> Any:
         """Reads the stored prediction of a sample.
@@ -81,11 +81,11 @@ class EvaluatedDataset:
             raise DatasetError(self.root, "the task stores no predictions")
         index = sample.record.index
         path = inside(self.root, f"{self.name}/samples/{index:06d}.json")
-        note = read_note(path)
+        stored = read_result(path)
         folder = inside(self.root, f"{self.name}/{PREDICTIONS}")
-        check_files(folder, note["sha256"])
+        check_files(folder, stored["sha256"])
         with explained(path):
-            return task.decode_prediction(folder, sample, note["facts"], dataset.plan.info)
+            return task.decode_prediction(folder, sample, stored["facts"], dataset.plan.info)
 
     def defended(self, index: int) -> dict[str, UInt8Image]:
         """Reads the stored pictures that the defense returned for a sample, by camera; possibly smaller than the
@@ -94,8 +94,8 @@ class EvaluatedDataset:
         Raises:
             DatasetError: a picture is missing or damaged.
         """
-        note = load_json(inside(self.root, f"{self.name}/samples/{index:06d}.json"))
-        return read_defended(inside(self.root, self.name), note if isinstance(note, dict) else {})
+        stored = load_json(inside(self.root, f"{self.name}/samples/{index:06d}.json"))
+        return read_defended(inside(self.root, self.name), stored if isinstance(stored, dict) else {})
 
 
 def open_evaluation(root: str | Path) -> tuple[EvaluatedDataset, ...]:
@@ -152,13 +152,13 @@ def _parts(root: Path, found: dict[str, Any]) -> tuple[EvaluatedDataset, ...]:
                 root=root,
                 metrics=metrics,
                 changes=changes.get(name, {}),
-                note=from_json(dict[str, Any], row["dataset"], "dataset"),
+                stored=from_json(dict[str, Any], row["dataset"], "dataset"),
             )
         )
     return tuple(parts)
 
 
-def read_note(path: Path) -> dict[str, Any]:
+def read_result(path: Path) -> dict[str, Any]:
     """Reads the note of a sample, a JSON file, and checks its keys and types.
 
     Raises:
@@ -166,12 +166,12 @@ def read_note(path: Path) -> dict[str, Any]:
     """
     there = load_json(path)
     if not isinstance(there, dict) or not there.keys() >= KEPT.keys():
-        raise DatasetError(path, "is no note of a sample")
+        raise DatasetError(path, "is not the stored result of a sample")
     try:
-        note: dict[str, Any] = {name: from_json(kind, there[name], name) for name, kind in KEPT.items()}
-        return note | {DEFENDED: from_json(dict[str, str], there.get(DEFENDED, {}), DEFENDED)}
+        stored: dict[str, Any] = {name: from_json(kind, there[name], name) for name, kind in KEPT.items()}
+        return stored | {DEFENDED: from_json(dict[str, str], there.get(DEFENDED, {}), DEFENDED)}
     except FieldError as error:
-        raise DatasetError(path, f"is no note of a sample ({error})") from error
+        raise DatasetError(path, f"is not the stored result of a sample ({error})") from error
 
 
 def check_files(folder: Path, hashes: Mapping[str, str]) -> None:
@@ -189,12 +189,12 @@ def check_files(folder: Path, hashes: Mapping[str, str]) -> None:
             raise DatasetError(inside(folder, name), "is not what was written")
 
 
-def read_defended(folder: Path, note: Mapping[str, Any]) -> dict[str, UInt8Image]:
+def read_defended(folder: Path, stored: Mapping[str, Any]) -> dict[str, UInt8Image]:
     """Reads the defended pictures of a sample.
 
     Args:
         folder: folder of the dataset in the evaluation.
-        note: the sample's note; its key `defended` has the hashes of the files by path.
+        stored: the sample's note; its key `defended` has the hashes of the files by path.
 
     Returns:
         (H, W, 3) uint8 RGB by camera.
@@ -202,7 +202,7 @@ def read_defended(folder: Path, note: Mapping[str, Any]) -> dict[str, UInt8Image
     Raises:
         DatasetError: a picture is missing or damaged.
     """
-    hashes = from_json(dict[str, str], note.get(DEFENDED, {}), DEFENDED)
+    hashes = from_json(dict[str, str], stored.get(DEFENDED, {}), DEFENDED)
     check_files(folder, hashes)
     pictures = {}
     for name in hashes:

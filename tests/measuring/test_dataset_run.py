@@ -8,11 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from gear.measuring.dataset_run import _BoundedQueue
-from gear.measuring.scoring import Note
+from gear.measuring.scoring import SampleResult
 
 
-def note(index: int) -> Note:
-    return Note(index=index, metrics={}, parts={}, cost={}, score=None, mask=None, facts={}, sha256={})
+def note(index: int) -> SampleResult:
+    return SampleResult(index=index, metrics={}, parts={}, cost={}, score=None, mask=None, facts={}, sha256={})
 
 
 def test_finished_samples_are_counted_and_other_results_are_not() -> None:
@@ -27,7 +27,7 @@ def test_finished_samples_are_counted_and_other_results_are_not() -> None:
 
 
 def test_the_first_failure_is_raised() -> None:
-    def fail(index: int) -> Note:
+    def fail(index: int) -> SampleResult:
         raise ValueError(f"sample {index}")
 
     with ThreadPoolExecutor(1) as pool:
@@ -52,7 +52,7 @@ def test_a_failing_callback_is_not_lost() -> None:
 def test_no_more_jobs_wait_than_allowed() -> None:
     may_go, second_submitted = threading.Event(), threading.Event()
 
-    def wait(index: int) -> Note:
+    def wait(index: int) -> SampleResult:
         may_go.wait(10)
         return note(index)
 

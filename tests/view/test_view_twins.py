@@ -122,7 +122,7 @@ def test_damaged_predictions_are_named_and_the_rest_is_shown(twins: Any, tmp_pat
     next(copy.glob("*-none-*/samples/000002.json")).write_text("{}")
     report = write_view(twins.none, tmp_path / "page.html", evaluations=[copy])
     assert [(number, text.partition(":")[2]) for number, text in report.problems] == [
-        (1, " is not what was written"), (2, " is no note of a sample"),
+        (1, " is not what was written"), (2, " is not the stored result of a sample"),
     ]  # fmt: skip
     page = Blocks(tmp_path / "page.html")
     there = [[picture is not None for picture in sample["pictures"]] for sample in page.index["samples"]]

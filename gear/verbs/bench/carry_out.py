@@ -12,7 +12,7 @@ from gear.values.progress import Callbacks, Warn
 from gear.verbs.attack.run import attack
 from gear.verbs.bench.plan import Step, Verb
 from gear.verbs.collect.run import collect
-from gear.verbs.evaluate.run import OtherLessonsError, evaluate
+from gear.verbs.evaluate.run import CalibrationChangedError, evaluate
 
 VERBS: dict[Verb, Callable[..., Any]] = {"collect": collect, "attack": attack, "evaluate": evaluate}
 
@@ -48,7 +48,7 @@ def _result(step: Step, root: Path, arguments: Mapping[str, Any], on_warning: Wa
     except OutdatedError as error:
         on_warning(f"{again} {error.problem}")
         return verb(**arguments, force=True)
-    except OtherLessonsError as error:
+    except CalibrationChangedError as error:
         on_warning(f"{again} {error.problem.partition(';')[0]}")
         remove_tree(root, Path(error.path).relative_to(root).as_posix())
         return verb(**arguments)

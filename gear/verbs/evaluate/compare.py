@@ -12,7 +12,7 @@ import numpy as np
 from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.dataset.reading import Dataset, scenes_of
 from gear.measuring.intervals import Values, leave_one_out
-from gear.measuring.scoring import Note, Scorer
+from gear.measuring.scoring import SampleResult, Scorer
 from gear.measuring.statistics import (
     Metrics,
     auroc,
@@ -22,7 +22,7 @@ from gear.measuring.statistics import (
     gather,
     paired_p,
 )
-from gear.verbs.evaluate.report import ALARMS, Difference, Estimate, ObjectChanges, PairedTest, RowReport, Together
+from gear.verbs.evaluate.report import ALARMS, CombinedRow, Difference, Estimate, ObjectChanges, PairedTest, RowReport
 from gear.verbs.evaluate.twin_objects import object_changes
 
 ALARM = 0.5
@@ -33,14 +33,14 @@ Street = tuple[str, int, int]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Measured:
+class EvaluatedDataset:
     """One dataset with the stored scores of its samples.
 
     Attributes:
         name: name of the dataset's folder in the evaluation.
         dataset: the dataset.
         scorer: the metrics, which are computed from the scores of the samples.
-        notes: stored scores of the samples, in order.
+        results: stored scores of the samples, in order.
         streets: the scene content that each sample shows, independently of weather and patch; samples of one street are
             not statistically independent.
         made: number of samples predicted in this run.
@@ -51,7 +51,7 @@ class Measured:
     name: str
     dataset: Dataset[Any]
     scorer: Scorer
-    notes: list[Note]
+    results: list[SampleResult]
     streets: list[Street]
     made: int
     damaged: tuple[str, ...]
@@ -59,10 +59,10 @@ class Measured:
 
     def gathered(self, report: str, count: int | None = None) -> Metrics:
         """Returns the metrics of one report over the first `count` samples, or over all samples by default."""
-        notes = self.notes[:count]
-        key = (report, len(notes))
+        results = self.results[:count]
+        key = (report, len(results))
         if key not in self.known:
-            parts = [note.parts[report] for note in notes]
+            parts = [note.parts[report] for note in results]
             metric = self.scorer.reports[report]
             checked = partial(metric.checked, method="result")
             draws = leave_one_out(self.streets[:count])
@@ -84,9 +84,9 @@ def streets_of(dataset: Dataset[Any]) -> list[Street]:
     return [(*scenes_of(dataset), number) for number in range(len(dataset))]
 
 
-def row_report(row: Measured) -> RowReport:
+def row_report(row: EvaluatedDataset) -> RowReport:
     """Returns the results of one dataset: metrics with intervals, times, and the scores of single samples."""
-    notes = row.notes
+    results = row.results
     plan = row.dataset.plan
     return RowReport(
         name=row.name,
@@ -100,31 +100,31 @@ def row_report(row: Measured) -> RowReport:
             "content_key": plan.content_key,
             "twin_key": plan.twin_key,
         },
-        samples=len(notes),
+        samples=len(results),
         made=row.made,
         damaged=row.damaged,
         metrics=metrics_of(row),
-        cost=mean_cost(notes),
-        defense=mask_means(notes, has_patch=plan.info.patch_label != NO_PATCH),
+        cost=mean_cost(results),
+        defense=mask_means(results, has_patch=plan.info.patch_label != NO_PATCH),
         per_sample=[
-            {k: v for k, v in note.as_json().items() if k not in {"facts", "objects", "defended"}} for note in notes
+            {k: v for k, v in note.as_json().items() if k not in {"facts", "objects", "defended"}} for note in results
         ],
     )
 
 
-def mean_cost(notes: Sequence[Note]) -> dict[str, float]:
+def mean_cost(results: Sequence[SampleResult]) -> dict[str, float]:
     """Returns the mean seconds per sample of the model (`model_s`) and of the defense (`defense_s`)."""
-    return {key: float(np.mean([note.cost[key] for note in notes])) for key in ("model_s", "defense_s")}
+    return {key: float(np.mean([note.cost[key] for note in results])) for key in ("model_s", "defense_s")}
 
 
-def mask_means(notes: Sequence[Note], *, has_patch: bool) -> dict[str, float]:
+def mask_means(results: Sequence[SampleResult], *, has_patch: bool) -> dict[str, float]:
     """Returns the mean metrics of a defense's masks, and the share of pictures that raise its alarm.
 
     Metrics of masks are left out if the defense returns no masks, and the alarm if it returns no scores. Without a
     patch, the only metric of masks is `mask_area`, the share of the picture that is masked by mistake.
     """
-    masks = [note.mask for note in notes if note.mask is not None]
-    scores = [note.score for note in notes if note.score is not None]
+    masks = [note.mask for note in results if note.mask is not None]
+    scores = [note.score for note in results if note.score is not None]
     alarms = {ALARMS: float(np.mean(np.array(scores) > ALARM))} if scores else {}
     keys = [key for key in (masks[0] if masks else {}) if key == "mask_area" or has_patch]
     return {key: _known_mean([mask[key] for mask in masks]) for key in keys} | alarms
@@ -144,26 +144,26 @@ def drive_note(dataset: Dataset[Any]) -> str | None:
     )
 
 
-def together(rows: Sequence[Measured]) -> Iterable[Together]:
+def together(rows: Sequence[EvaluatedDataset]) -> Iterable[CombinedRow]:
     """Combines datasets of several scenes or weathers that have patches with the same label, and yields one result
     per label.
     """
-    labelled: dict[str, list[Measured]] = {}
+    labelled: dict[str, list[EvaluatedDataset]] = {}
     for row in rows:
         labelled.setdefault(row.patch, []).append(row)
     for patch, members in labelled.items():
         first = members[0]
         if len(members) > 1 and all(row.dataset.plan.options == first.dataset.plan.options for row in members):
             one = as_one(patch, members)
-            yield Together(
+            yield CombinedRow(
                 patch=patch,
                 rows=tuple(row.name for row in members),
-                samples=len(one.notes),
+                samples=len(one.results),
                 metrics=metrics_of(one),
             )
 
 
-def metrics_of(row: Measured) -> dict[str, dict[str, Estimate]]:
+def metrics_of(row: EvaluatedDataset) -> dict[str, dict[str, Estimate]]:
     """Returns the metrics over all samples with their 95 % intervals, by report and name."""
     metrics = {}
     for report in row.scorer.reports:
@@ -175,14 +175,14 @@ def metrics_of(row: Measured) -> dict[str, dict[str, Estimate]]:
     return metrics
 
 
-def as_one(name: str, members: Sequence[Measured]) -> Measured:
+def as_one(name: str, members: Sequence[EvaluatedDataset]) -> EvaluatedDataset:
     """Combines several datasets into one with the given name; its other properties are those of the first dataset."""
-    notes = [note for row in members for note in row.notes]
+    results = [note for row in members for note in row.results]
     streets = [street for row in members for street in row.streets]
-    return replace(members[0], name=name, notes=notes, streets=streets, known={})
+    return replace(members[0], name=name, results=results, streets=streets, known={})
 
 
-def compared(rows: Sequence[Measured], seed: int) -> Iterable[Difference]:
+def compared(rows: Sequence[EvaluatedDataset], seed: int) -> Iterable[Difference]:
     """Yields the difference between every dataset with a patch and its twins, the same samples without a patch and
     with a random patch.
     """
@@ -193,7 +193,7 @@ def compared(rows: Sequence[Measured], seed: int) -> Iterable[Difference]:
                     yield difference(row, other, seed)
 
 
-def difference(row: Measured, other: Measured, seed: int) -> Difference:
+def difference(row: EvaluatedDataset, other: EvaluatedDataset, seed: int) -> Difference:
     """Computes the metrics of a dataset minus those of its twin, over the samples that both have.
 
     Args:
@@ -201,8 +201,8 @@ def difference(row: Measured, other: Measured, seed: int) -> Difference:
         other: its twin: the same samples with another patch.
         seed: seed of the permutation tests.
     """
-    count = min(len(row.notes), len(other.notes))
-    here, there, streets = row.notes[:count], other.notes[:count], row.streets[:count]
+    count = min(len(row.results), len(other.results))
+    here, there, streets = row.results[:count], other.results[:count], row.streets[:count]
     return Difference(
         row=row.name,
         against=other.name,
@@ -215,9 +215,11 @@ def difference(row: Measured, other: Measured, seed: int) -> Difference:
     )
 
 
-def _objects(here: list[Note], there: list[Note], streets: list[Street], seed: int) -> ObjectChanges | None:
+def _objects(
+    here: list[SampleResult], there: list[SampleResult], streets: list[Street], seed: int
+) -> ObjectChanges | None:
     """Returns how the detections of each object differ between twins; None for tasks without objects."""
-    now, twin = ([note.outcomes for note in notes if note.outcomes is not None] for notes in (here, there))
+    now, twin = ([note.outcomes for note in results if note.outcomes is not None] for results in (here, there))
     return object_changes([note.index for note in here], now, twin, streets, seed) if now else None
 
 
@@ -231,13 +233,13 @@ def _paired(one: Metrics, other: Metrics) -> dict[str, Estimate]:
 
 
 def _tested(
-    here: list[Note], there: list[Note], streets: list[Street], report: str, seed: int
+    here: list[SampleResult], there: list[SampleResult], streets: list[Street], report: str, seed: int
 ) -> dict[str, PairedTest]:
     """Returns a paired test for every metric of the report that is defined for single samples."""
     names = list(dict.fromkeys(name for note in here for name in note.metrics[report]))
     ours, theirs = (
-        np.array([[note.metrics[report].get(name, np.nan) for name in names] for note in notes], np.float64)
-        for notes in (here, there)
+        np.array([[note.metrics[report].get(name, np.nan) for name in names] for note in results], np.float64)
+        for results in (here, there)
     )
     differences = _finite(ours) - _finite(theirs)
     found = paired_p(clustered(differences, streets), seed)
@@ -247,7 +249,7 @@ def _tested(
     }
 
 
-def _auroc(here: list[Note], there: list[Note], streets: list[Street]) -> Estimate | None:
+def _auroc(here: list[SampleResult], there: list[SampleResult], streets: list[Street]) -> Estimate | None:
     high = [note.score for note in here if note.score is not None]
     low = [note.score for note in there if note.score is not None]
     if len(high) != len(here) or len(low) != len(there):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.values.errors import GearError
-from gear.verbs.evaluate.compare import Measured, as_one, difference, mask_means, mean_cost, metrics_of
+from gear.verbs.evaluate.compare import EvaluatedDataset, as_one, difference, mask_means, mean_cost, metrics_of
 from gear.verbs.evaluate.report import Difference, Pool
 
 Pools = Mapping[str, Sequence[str | Path]]
@@ -38,7 +38,7 @@ def check_pools(pools: Pools, roots: Iterable[Path]) -> None:
                 raise GearError(f"pool {name!r} holds {root}, of which several splits are among the data; evaluate one")
 
 
-def pooled(rows: Sequence[Measured], pools: Pools, seed: int) -> Iterable[Pool]:
+def pooled(rows: Sequence[EvaluatedDataset], pools: Pools, seed: int) -> Iterable[Pool]:
     """Yields the results of each pool of datasets, with the differences to the pools `none` and `random` if these
     show the same scenes.
     """
@@ -51,10 +51,10 @@ def pooled(rows: Sequence[Measured], pools: Pools, seed: int) -> Iterable[Pool]:
         yield Pool(
             name=name,
             rows=tuple(row.name for row in members),
-            samples=len(one.notes),
+            samples=len(one.results),
             metrics=metrics_of(one),
-            cost=mean_cost(one.notes),
-            defense=mask_means(one.notes, has_patch=name != NO_PATCH),
+            cost=mean_cost(one.results),
+            defense=mask_means(one.results, has_patch=name != NO_PATCH),
             differences=tuple(
                 _counted(difference(one, wholes[other], seed))
                 for other in others
@@ -70,5 +70,5 @@ def _counted(one: Difference) -> Difference:
     return one if one.objects is None else replace(one, objects=replace(one.objects, changes=()))
 
 
-def _keys(members: Sequence[Measured]) -> list[tuple[str, int]]:
-    return [(row.dataset.plan.twin_key, len(row.notes)) for row in members]
+def _keys(members: Sequence[EvaluatedDataset]) -> list[tuple[str, int]]:
+    return [(row.dataset.plan.twin_key, len(row.results)) for row in members]

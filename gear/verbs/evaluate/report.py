@@ -88,7 +88,7 @@ class RowReport:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Together:
+class CombinedRow:
     """Several datasets with patches of the same label, evaluated as one.
 
     Attributes:
@@ -303,7 +303,7 @@ class EvaluateReport:
     out: Path
     facts: Json
     rows: tuple[RowReport, ...]
-    together: tuple[Together, ...]
+    together: tuple[CombinedRow, ...]
     differences: tuple[Difference, ...]
     pools: tuple[Pool, ...] = ()
 

@@ -22,16 +22,16 @@ from gear.dataset.reading import Dataset
 from gear.dataset.store import check_output
 from gear.measuring.guard import Guard, open_guard
 from gear.measuring.guarded_model import GuardedModel
-from gear.measuring.notes import grouped
 from gear.measuring.open_datasets import opened, row_names
 from gear.measuring.plugin_selection import chosen_model
+from gear.measuring.results import grouped
 from gear.measuring.shown_size import size_note
 from gear.reporting.display import displayed
 from gear.values.errors import DatasetError
 from gear.values.progress import Callbacks, Progress, Warn
 from gear.values.serial import Json
 from gear.verbs.evaluate.alarm_notes import alarm_notes
-from gear.verbs.evaluate.compare import Measured, compared, drive_note, row_report, together
+from gear.verbs.evaluate.compare import EvaluatedDataset, compared, drive_note, row_report, together
 from gear.verbs.evaluate.distribute import FIT, measure_dataset, predict_in_workers, store_fit
 from gear.verbs.evaluate.pools import Pools, check_pools, pooled
 from gear.verbs.evaluate.report import EvaluateReport
@@ -45,7 +45,7 @@ LEARNT = {"calibration", "calibration_samples"}
 """Keys of `plan.json`, the inputs of an evaluation, that describe the calibration data of the defense."""
 
 
-class OtherLessonsError(DatasetError):
+class CalibrationChangedError(DatasetError):
     """Raised if the folder contains an evaluation that differs from the requested one only in the calibration data
     of its defense.
     """
@@ -212,7 +212,7 @@ def _measured(
     names: Sequence[str],
     guarded: GuardedModel,
     callbacks: Callbacks,
-) -> list[Measured]:
+) -> list[EvaluatedDataset]:
     """Runs the model over the datasets, and returns their samples' scores.
 
     If an engine is requested, its workers predict the samples; the scores are then read from their notes.
@@ -248,7 +248,7 @@ def _begin(root: Path, facts: Json) -> None:
     elif there != plain:
         what = ", ".join(differences(there, plain)[:3]) or "its plan.json has other keys"
         is_same_otherwise = is_ours and {key for key in plain if there[key] != plain[key]} <= LEARNT
-        raise (OtherLessonsError if is_same_otherwise else DatasetError)(
+        raise (CalibrationChangedError if is_same_otherwise else DatasetError)(
             root, f"holds an evaluation of something else ({what}); use another --out"
         )
 

@@ -133,7 +133,7 @@ def test_a_sample_whose_result_is_damaged_is_predicted_again_and_that_is_told(
     note.write_text("[]")
     assert main(["evaluate", "--model", "odd", "--data", str(data), "--out", str(out)]) == 0
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"gear: note: {note}: is no note of a sample") and "predicted again" in line
+    assert line.startswith(f"gear: note: {note}: is not the stored result of a sample") and "predicted again" in line
 
 
 @pytest.mark.parametrize("damaged", [lambda text: "", lambda text: text[: len(text) // 2], lambda text: "é"])
