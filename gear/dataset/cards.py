@@ -14,7 +14,7 @@ from pathlib import Path
 from gear.dataset.files import inside, read_bytes, sha256, write_whole
 from gear.dataset.guarded_paths import owned, remove_file
 from gear.dataset.layout import CARD, CARDS, CROISSANT, GEAR, manifest_path, split_folder
-from gear.dataset.locks import turn
+from gear.dataset.locks import dataset_lock
 from gear.dataset.plan import read_plan
 from gear.dataset.sealed_json import is_sealed, is_whole, load_sealed, sealed_json
 from gear.formats.croissant import FilePattern, croissant
@@ -53,7 +53,7 @@ def write_cards(root: Path, *, is_repair: bool = False) -> None:
     folder = owned(root, GEAR)
     if not folder.is_dir():
         return
-    with turn(folder):  # and not of the root, which the caller may have locked
+    with dataset_lock(folder):  # and not of the root, which the caller may have locked
         wanted = cards(root)
         for relative in CARDS:
             path = owned(root, relative)

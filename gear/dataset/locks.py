@@ -18,7 +18,7 @@ from gear.values.progress import Warn
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["alone_at_work", "at_work", "is_at_work", "lock_note", "turn"]
+__all__ = ["dataset_lock", "exclusive_lock", "is_locked", "lock_note", "shared_split_lock"]
 
 ALONE = "other runs in this folder are not detected, so run one command at a time there"
 """What the lack of locks means for a folder of results."""
@@ -37,7 +37,7 @@ LOCAL_OPTIONS = {"nolock", "local_lock=all", "local_lock=flock", "localflock", "
 
 
 @contextlib.contextmanager
-def turn(root: Path) -> Iterator[None]:
+def dataset_lock(root: Path) -> Iterator[None]:
     """A context that locks a dataset against other runs that start or remove splits; it waits until such runs end.
 
     A missing root is created.
@@ -48,7 +48,7 @@ def turn(root: Path) -> Iterator[None]:
     while True:
         with explained(root):
             root.mkdir(parents=True, exist_ok=True)
-        with _locked(root, alone=True, wait=True) as lock:
+        with _locked(root, exclusive=True, wait=True) as lock:
             # The run that held the lock may have removed the folder that this one waited for.
             if lock is not None and not _is_still(root, lock):
                 continue
@@ -57,17 +57,17 @@ def turn(root: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def at_work(folder: Path) -> Iterator[None]:
+def shared_split_lock(folder: Path) -> Iterator[None]:
     """A context that holds a shared lock on a split's folder while a run writes samples.
 
     Several runs with the same plan may hold the lock.
     """
-    with _locked(folder, alone=False, wait=True):
+    with _locked(folder, exclusive=False, wait=True):
         yield
 
 
 @contextlib.contextmanager
-def alone_at_work(root: Path, on_warning: Warn | None = None) -> Iterator[None]:
+def exclusive_lock(root: Path, on_warning: Warn | None = None) -> Iterator[None]:
     """A context that locks a folder of results for this run only; a missing folder is created.
 
     Args:
@@ -81,7 +81,7 @@ def alone_at_work(root: Path, on_warning: Warn | None = None) -> Iterator[None]:
         root.mkdir(parents=True, exist_ok=True)
     with contextlib.ExitStack() as work:
         try:
-            work.enter_context(_locked(root, alone=True, wait=False))
+            work.enter_context(_locked(root, exclusive=True, wait=False))
         except BlockingIOError as error:
             problem = "another gear run is using this folder; wait for its end, or use another --out"
             raise DatasetError(root, problem) from error
@@ -134,23 +134,23 @@ def _local_option(folder: Path) -> str | None:
     return min(LOCAL_OPTIONS & set(found[1].split(",")), default=None)
 
 
-def is_at_work(folder: Path) -> bool:
+def is_locked(folder: Path) -> bool:
     """Whether any run, including this one, is writing samples of a split, and therefore locks its folder."""
     try:
-        with _locked(folder, alone=True, wait=False):
+        with _locked(folder, exclusive=True, wait=False):
             return False
     except BlockingIOError:
         return True
 
 
 @contextlib.contextmanager
-def _locked(folder: Path, *, alone: bool, wait: bool) -> Iterator[int | None]:
+def _locked(folder: Path, *, exclusive: bool, wait: bool) -> Iterator[int | None]:
     """Locks a folder and yields its descriptor; None if the file system has no locks.
 
     Raises:
         BlockingIOError: another run holds the lock, and `wait` is False.
     """
-    descriptor = _lock(folder, alone=alone, wait=wait)
+    descriptor = _lock(folder, exclusive=exclusive, wait=wait)
     try:
         yield descriptor
     finally:
@@ -158,7 +158,7 @@ def _locked(folder: Path, *, alone: bool, wait: bool) -> Iterator[int | None]:
             os.close(descriptor)
 
 
-def _lock(folder: Path, *, alone: bool, wait: bool) -> int | None:
+def _lock(folder: Path, *, exclusive: bool, wait: bool) -> int | None:
     if sys.platform == "win32":
         return None
     try:
@@ -166,7 +166,7 @@ def _lock(folder: Path, *, alone: bool, wait: bool) -> int | None:
     except OSError:  # missing, or unreadable
         return None
     try:
-        fcntl.flock(descriptor, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | (0 if wait else fcntl.LOCK_NB))
+        fcntl.flock(descriptor, (fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH) | (0 if wait else fcntl.LOCK_NB))
     except BaseException as error:
         os.close(descriptor)
         if isinstance(error, OSError) and not isinstance(error, BlockingIOError):

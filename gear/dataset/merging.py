@@ -16,7 +16,7 @@ from gear.dataset.files import inside, read_bytes, write_whole
 from gear.dataset.guarded_paths import owned, remove_file, remove_tree
 from gear.dataset.hashing import file_hash, in_threads
 from gear.dataset.layout import GEAR, is_reserved, patch_path, sidecar_path, split_folder
-from gear.dataset.locks import is_at_work
+from gear.dataset.locks import is_locked
 from gear.dataset.plan import Plan, differences, read_plan, write_plan
 from gear.dataset.reading import check_hash
 from gear.dataset.sidecar import read_sidecar
@@ -68,7 +68,7 @@ def find_parts(roots: Sequence[Path], split: str) -> Parts:
     plans = [plan_of(root, split) for root in having]
     for root, plan in zip(having, plans, strict=True):
         _refuse_other_plan(having[0], plans[0], root, plan)
-        if is_at_work(inside(root, split_folder(split))):
+        if is_locked(inside(root, split_folder(split))):
             raise DatasetError(root, f"a run is making split {split!r} just now; wait for its end")
     total = plans[0].samples
     homes: dict[int, list[int]] = {}  # grows with the sidecars that are there; the plan may name any number

@@ -29,7 +29,7 @@ from gear.dataset.layout import (
     sidecar_path,
     split_folder,
 )
-from gear.dataset.locks import at_work, is_at_work, turn
+from gear.dataset.locks import dataset_lock, is_locked, shared_split_lock
 from gear.dataset.plan import Plan, begin, read_plan, refuse_copy, refuse_other_tasks
 from gear.dataset.sealed_json import REPAIR, DamagedError, load_sealed, sealed_json
 from gear.dataset.shards import WHOLE, Shard
@@ -152,12 +152,12 @@ class Store:
         is_new = not self._is_begun()
         with contextlib.ExitStack() as work:
             try:
-                with turn(self.root):
+                with dataset_lock(self.root):
                     if force:
                         self._replace(patch_files)
                     is_new = not self._is_begun()  # others may have begun it, or taken it back, while this one waited
                     self.open(patch_files)
-                    work.enter_context(at_work(inside(self.root, split_folder(self.split))))
+                    work.enter_context(shared_split_lock(inside(self.root, split_folder(self.split))))
                 yield
             except BaseException as error:
                 work.close()
@@ -175,7 +175,7 @@ class Store:
         """Removes the split and all folders that become empty, except those that existed before."""
         with contextlib.suppress(OSError, DatasetError):
             if self.root.is_dir():
-                with turn(self.root):
+                with dataset_lock(self.root):
                     _remove_idle(self.root, self.split)
             remove_empty_folders(self.root, GEAR)
             for folder in self._folders():
@@ -360,7 +360,7 @@ def _remove_idle(root: Path, split: str) -> None:
     Raises:
         DatasetError: a run is writing it, or as `remove_split`.
     """
-    if is_at_work(inside(root, split_folder(split))):
+    if is_locked(inside(root, split_folder(split))):
         problem = f"another run is making split {split!r} just now; wait for its end, or use another --out"
         raise DatasetError(root, problem)
     remove_split(root, split)

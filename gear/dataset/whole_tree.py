@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gear.dataset.files import explained, sync_folder
 from gear.dataset.guarded_paths import owned, refuse_links, remove_tree
-from gear.dataset.locks import alone_at_work
+from gear.dataset.locks import exclusive_lock
 from gear.values.errors import DatasetError
 
 
@@ -64,7 +64,7 @@ def whole_tree(target: Path, command: str, *, is_kept: bool = False) -> Iterator
     """
     check_target(target, command)
     unfinished = unfinished_place(target, command)
-    with alone_at_work(unfinished):
+    with exclusive_lock(unfinished):
         try:
             yield unfinished
             with explained(target):

@@ -40,25 +40,25 @@ def prepare(threads: int = 0) -> None:
         mallopt(M_TOP_PAD, TOP_PAD_BYTES)
 
 
-def device_of(wish: Literal["auto", "cpu", "cuda"]) -> torch.device:
+def device_of(requested: Literal["auto", "cpu", "cuda"]) -> torch.device:
     """The torch device that the option `device` names: `auto` is a GPU if there is one, otherwise the CPU.
 
     Raises:
         GearError: the machine has no such device.
     """
-    if wish == "cuda" and not torch.cuda.is_available():
+    if requested == "cuda" and not torch.cuda.is_available():
         raise GearError("device cuda: torch sees no GPU here; use device=auto or device=cpu")
-    if wish == "auto":
+    if requested == "auto":
         return torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    return torch.device(wish)
+    return torch.device(requested)
 
 
-def has_cuda(wish: str | None) -> bool:
-    """Whether networks run on a GPU of this machine, if the option `device` has the value `wish` (None is `auto`)."""
-    return wish != "cpu" and torch.cuda.is_available()
+def has_cuda(requested: str | None) -> bool:
+    """Whether networks run on a GPU of this machine, if the option `device` has the value `requested` (None is `auto`)."""
+    return requested != "cpu" and torch.cuda.is_available()
 
 
-def is_quick_in_half(device: torch.device) -> bool:
+def supports_bfloat16(device: torch.device) -> bool:
     """Whether a device has instructions for bfloat16. On a device without them, bfloat16 is slower than float32."""
     if device.type == "cuda":
         return bool(torch.cuda.is_bf16_supported(including_emulation=False))

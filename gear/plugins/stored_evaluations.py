@@ -40,7 +40,7 @@ KEPT: Any = {
     "facts": Any, "sha256": dict[str, str], "model_s": float, "defense_s": float, "score": float | None,
     "mask": dict[str, float | None] | None,
 }  # fmt: skip
-"""Keys and types of a sample's note, a JSON file, that a later run reads."""
+"""Keys and types of a sample's stored result, a JSON file, that a later run reads."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -159,10 +159,10 @@ def _parts(root: Path, found: dict[str, Any]) -> tuple[EvaluatedDataset, ...]:
 
 
 def read_result(path: Path) -> dict[str, Any]:
-    """Reads the note of a sample, a JSON file, and checks its keys and types.
+    """Reads the stored result of a sample, a JSON file, and checks its keys and types.
 
     Raises:
-        DatasetError: the file is not a note that gear wrote.
+        DatasetError: the file is not a result that gear wrote.
     """
     there = load_json(path)
     if not isinstance(there, dict) or not there.keys() >= KEPT.keys():
@@ -194,7 +194,7 @@ def read_defended(folder: Path, stored: Mapping[str, Any]) -> dict[str, UInt8Ima
 
     Args:
         folder: folder of the dataset in the evaluation.
-        stored: the sample's note; its key `defended` has the hashes of the files by path.
+        stored: the stored result of the sample; its key `defended` has the hashes of the files by path.
 
     Returns:
         (H, W, 3) uint8 RGB by camera.

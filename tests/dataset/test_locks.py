@@ -9,25 +9,25 @@ from pathlib import Path
 import pytest
 
 from gear.dataset import locks
-from gear.dataset.locks import ALONE, SHARED, alone_at_work, at_work, is_at_work, lock_note, turn
+from gear.dataset.locks import ALONE, SHARED, dataset_lock, exclusive_lock, is_locked, lock_note, shared_split_lock
 from gear.values.errors import DatasetError
 
 
 def test_a_folder_of_results_is_locked_for_one_run(tmp_path: Path) -> None:
     notes: list[str] = []
-    with alone_at_work(tmp_path / "a", notes.append):
+    with exclusive_lock(tmp_path / "a", notes.append):
         assert lock_note(tmp_path / "a", ALONE) is None, "a lock that is held is one that works"
-        with pytest.raises(DatasetError, match="another gear run is using this folder"), alone_at_work(tmp_path / "a"):
+        with pytest.raises(DatasetError, match="another gear run is using this folder"), exclusive_lock(tmp_path / "a"):
             pass
-    with alone_at_work(tmp_path / "a", notes.append):
+    with exclusive_lock(tmp_path / "a", notes.append):
         pass
     assert notes == []
 
 
 def test_several_runs_may_collect_a_split(tmp_path: Path) -> None:
-    with at_work(tmp_path), at_work(tmp_path):
-        assert is_at_work(tmp_path)
-    assert not is_at_work(tmp_path)
+    with shared_split_lock(tmp_path), shared_split_lock(tmp_path):
+        assert is_locked(tmp_path)
+    assert not is_locked(tmp_path)
 
 
 @pytest.fixture(params=[errno.ENOLCK, errno.EOPNOTSUPP, errno.EBADF])
@@ -43,8 +43,13 @@ def refused(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_a_file_system_without_locks_is_named_once_and_nothing_waits(tmp_path: Path, refused: str) -> None:
     notes: list[str] = []
-    with turn(tmp_path), turn(tmp_path), alone_at_work(tmp_path, notes.append), at_work(tmp_path):
-        assert not is_at_work(tmp_path)
+    with (
+        dataset_lock(tmp_path),
+        dataset_lock(tmp_path),
+        exclusive_lock(tmp_path, notes.append),
+        shared_split_lock(tmp_path),
+    ):
+        assert not is_locked(tmp_path)
     assert notes == [f"{tmp_path}: the file system has no locks ({refused}): {ALONE}"]
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from gear.dataset.files import sha256
 from gear.dataset.layout import sidecar_path
-from gear.dataset.locks import at_work
+from gear.dataset.locks import shared_split_lock
 from gear.dataset.merging import Parts, copy_patches, copy_samples, find_parts, prepare_merge
 from gear.dataset.plan import Plan, write_plan
 from gear.dataset.sealed_json import sealed_json
@@ -119,7 +119,7 @@ def test_folders_of_different_commands_are_refused(changes: dict[str, Any], said
 
 def test_a_folder_where_a_run_is_at_work_is_refused(halves: list[Path]) -> None:
     with (
-        at_work(halves[1] / "gear/test"),
+        shared_split_lock(halves[1] / "gear/test"),
         pytest.raises(DatasetError, match=r"/b: a run is making split 'test' just now; wait for its end"),
     ):
         find_parts(halves, "test")

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gear.dataset.locks import turn
+from gear.dataset.locks import dataset_lock
 from tests.shared import shared_folder
 
 ROOT = Path(__file__).parents[2]
@@ -33,7 +33,7 @@ def call(*command: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
 def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An environment with gear and all examples from wheels, which all of a run's processes share."""
     shared = shared_folder(tmp_path_factory, "examples")
-    with turn(shared):
+    with dataset_lock(shared):
         if not (shared / "whole").exists():
             install(shared / "env", shared / "wheels")
             (shared / "whole").touch()

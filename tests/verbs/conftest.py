@@ -16,7 +16,7 @@ import pytest
 from gear.collecting.run import CollectReport
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import AttackSpec, DefenseSpec, MetricSpec, ModelSpec
-from gear.dataset.locks import turn
+from gear.dataset.locks import dataset_lock
 from gear.measuring.gap.report import GapReport
 from gear.measuring.guard import Guard
 from gear.plugins import build as building
@@ -111,7 +111,7 @@ def collected(tmp_path_factory: pytest.TempPathFactory, collect_small: Callable[
     def root(task: str, name: str = "data", **changes: Any) -> Path:
         asked = json.dumps([task, name, changes], sort_keys=True, default=str)
         folder = shared_folder(tmp_path_factory, f"collected/{hashlib.sha256(asked.encode()).hexdigest()[:16]}")
-        with turn(folder):
+        with dataset_lock(folder):
             if not (folder / "whole").exists():
                 collect_small(task, folder / name, **changes)
                 (folder / "whole").touch()

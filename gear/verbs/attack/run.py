@@ -20,7 +20,7 @@ from gear.contracts.defenses import ReportsFit
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
 from gear.dataset.json_text import dump_json
-from gear.dataset.locks import alone_at_work
+from gear.dataset.locks import exclusive_lock
 from gear.measuring.guard import Guard
 from gear.measuring.guarded_model import weights_digest
 from gear.measuring.patch_checks import check_patches
@@ -177,7 +177,7 @@ def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
     product, root = build(job.found, job.options), Path(request.out)
     network = build_model(job.models, job.guard, job.seed, job.weights)
     plan = job.plan(weights_digest(network), product)
-    with alone_at_work(root, callbacks.on_warning):
+    with exclusive_lock(root, callbacks.on_warning):
         there = begin(root, plan, force=request.force)
         if there is not None:
             return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)

@@ -21,7 +21,7 @@ from gear.contracts.specs import AttackSpec
 from gear.dataset.executors.engines import DEFAULT, open_engine
 from gear.dataset.files import clear_scratch, write_whole
 from gear.dataset.json_text import dump_json
-from gear.dataset.locks import alone_at_work
+from gear.dataset.locks import exclusive_lock
 from gear.dataset.store import check_output
 from gear.leaderboard.record import Kind
 from gear.measuring.plugin_selection import check_optics
@@ -119,7 +119,7 @@ def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | Non
     """
     plan, root = prepared(request), Path(request.out)
     config = to_yaml(plan.config).encode()
-    with alone_at_work(root, callbacks.on_warning):
+    with exclusive_lock(root, callbacks.on_warning):
         if not (root / CONFIG).exists():  # an existing config belongs to the existing reports
             write_whole(root, CONFIG, config)
         steps = list(plan.steps())

@@ -16,7 +16,7 @@ from gear.config.dump import to_plain
 from gear.dataset.executors.engines import DEFAULT
 from gear.dataset.files import clear_scratch, inside, write_whole
 from gear.dataset.json_text import dump_json, load_json
-from gear.dataset.locks import alone_at_work
+from gear.dataset.locks import exclusive_lock
 from gear.dataset.plan import differences
 from gear.dataset.reading import Dataset
 from gear.dataset.store import check_output
@@ -155,7 +155,7 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
         **learnt.counted(),
         "seed": request.seed,
     }
-    with alone_at_work(root, callbacks.on_warning):
+    with exclusive_lock(root, callbacks.on_warning):
         _begin(root, facts)
         rows = _measured(request, datasets, names, guarded, callbacks)
         learnt_facts = _fit_facts(root, guarded, request, callbacks.on_warning)

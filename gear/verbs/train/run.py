@@ -11,7 +11,7 @@ from typing import Any
 from gear.config.dump import to_plain
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.files import clear_scratch
-from gear.dataset.locks import alone_at_work
+from gear.dataset.locks import exclusive_lock
 from gear.dataset.reading import scenes_of
 from gear.dataset.store import check_output
 from gear.measuring.appearance_hash import PLANNED, appearance_of
@@ -35,13 +35,13 @@ from gear.verbs.train.request import TrainRequest
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, known, metrics_of, packed, write_history
 from gear.verbs.train.sizes import picture_scale, without_empty_margins
 from gear.verbs.train.starting import (
-    begin_with,
     build_network,
     check_options,
-    go_on_from,
-    goes_on_alone,
+    freeze_pretrained,
+    load_initial_weights,
     picture_share,
     precision_of,
+    resumes_without_init,
     sizes_note,
     with_scale,
 )
@@ -168,7 +168,7 @@ def run_train(request: TrainRequest, callbacks: Callbacks, on_step: OnStep | Non
     origin = _origin(request, callbacks)
     found, spec, root = origin.model, origin.spec, Path(request.out)
     parts = _parts(origin, root, callbacks)
-    with alone_at_work(root, callbacks.on_warning):
+    with exclusive_lock(root, callbacks.on_warning):
         clear_scratch(root)
         training = Training(
             parts, origin.config, on_step=with_progress(on_step, callbacks), pack=partial(packed, origin)
@@ -263,9 +263,13 @@ def trainable(found: PluginEntry, task: str) -> Any:
 def _parts(origin: Origin, root: Path, callbacks: Callbacks) -> Parts:
     found, config = origin.model, origin.config
     model = build_network(found, config, precision=config.precision)
-    started = "" if goes_on_alone(found, config.init, begun_config(root)) else begin_with(found, model, config.init)
+    started = (
+        ""
+        if resumes_without_init(found, config.init, begun_config(root))
+        else load_initial_weights(found, model, config.init)
+    )
     with blamed(found, "module"):
-        go_on_from(model, config.init)
+        freeze_pretrained(model, config.init)
     if started:
         callbacks.on_warning(started)
     twin = build_network(found, config, precision="float32")

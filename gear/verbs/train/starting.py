@@ -12,7 +12,7 @@ from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.networks.efficientnet_lite0 import freeze_trunks
 from gear.networks.input_scale import width_share
 from gear.networks.options import NONE, SHIPPED
-from gear.networks.runtime import device_of, is_quick_in_half, seeded
+from gear.networks.runtime import device_of, seeded, supports_bfloat16
 from gear.networks.shipped import resolve, shipped, shipped_networks, trained_option
 from gear.networks.weights import load_into, load_trunk
 from gear.plugins.build import blamed, build
@@ -95,7 +95,7 @@ def with_scale(found: PluginEntry, config: TrainConfig, share: float, begun: Jso
     """
     if not _notes_share(found, config):
         return config
-    known = _given_scale(begun) if goes_on_alone(found, config.init, begun) else None
+    known = _given_scale(begun) if resumes_without_init(found, config.init, begun) else None
     scale = (known or _scale_of_start(found, config.init)) if share == 1 else 1
     if scale is None:
         return config
@@ -103,7 +103,7 @@ def with_scale(found: PluginEntry, config: TrainConfig, share: float, begun: Jso
     return dataclasses.replace(config, options=options)
 
 
-def goes_on_alone(found: PluginEntry, init: str, begun: Json) -> bool:
+def resumes_without_init(found: PluginEntry, init: str, begun: Json) -> bool:
     """Whether a resumed training continues without its initial weights, because their file no longer exists.
 
     The checkpoint contains everything on which the next step depends, so the initial weights are not needed.
@@ -153,7 +153,7 @@ def precision_of(found: PluginEntry, config: TrainConfig) -> Literal["float32", 
     spec = found.spec
     assert isinstance(spec, ModelSpec)
     knows = any(field.name == "precision" for field in dataclasses.fields(spec.config))
-    return "bfloat16" if config.time_budget_s and knows and is_quick_in_half(device_of(config.device)) else "float32"
+    return "bfloat16" if config.time_budget_s and knows and supports_bfloat16(device_of(config.device)) else "float32"
 
 
 def build_network(found: PluginEntry, config: TrainConfig, *, precision: str) -> Any:
@@ -176,7 +176,7 @@ def build_network(found: PluginEntry, config: TrainConfig, *, precision: str) ->
         return build(found, options)
 
 
-def go_on_from(model: Any, init: str) -> None:
+def freeze_pretrained(model: Any, init: str) -> None:
     """Freezes the parts of a network that are not trained further after published weights are loaded.
 
     A network with random weights, or with weights loaded by `trunk:`, is trained as a whole.
@@ -185,7 +185,7 @@ def go_on_from(model: Any, init: str) -> None:
         freeze_trunks(model.module())
 
 
-def begin_with(found: PluginEntry, model: Any, init: str) -> str:
+def load_initial_weights(found: PluginEntry, model: Any, init: str) -> str:
     """Loads initial weights into a network.
 
     Args:

@@ -9,7 +9,7 @@ from gear.collecting.run import executor_of, run_job
 from gear.dataset.cards import damaged_cards, own_cards, write_cards
 from gear.dataset.guarded_paths import refuse_links, remove_files
 from gear.dataset.layout import sidecar_path, split_folder
-from gear.dataset.locks import is_at_work, turn
+from gear.dataset.locks import dataset_lock, is_locked
 from gear.dataset.plan import write_plan
 from gear.dataset.verification import Finding, SplitCheck, check_split, splits_in, unexpected_files
 from gear.reporting.display import displayed
@@ -121,8 +121,8 @@ def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callb
             run is writing the split.
     """
     job = job_of(root, check, sources)
-    with turn(root):
-        if is_at_work(root / split_folder(check.split)):
+    with dataset_lock(root):
+        if is_locked(root / split_folder(check.split)):
             raise DatasetError(root, f"a run is making split {check.split!r} just now; wait for its end")
         if check.plan is None:
             write_plan(root, job.plan)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import gear
-from gear.dataset.locks import turn
+from gear.dataset.locks import dataset_lock
 from gear.testing.tiny_networks import tiny_depth, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from tests.shared import shared_folder
@@ -75,7 +75,7 @@ def made(
 
     def copy(changes: tuple[tuple[str, str], ...]) -> Path:
         folder = shared_folder(tmp_path_factory, f"benches/{'few' if changes == FEW else 'learning'}")
-        with turn(folder):
+        with dataset_lock(folder):
             if not (folder / "whole").exists():
                 gear.bench(write(folder, changes), out=folder / "out")
                 (folder / "whole").touch()

@@ -13,7 +13,7 @@ import pytest
 import gear
 from gear.contracts.executors import Executor, Outcome, Report, Work
 from gear.dataset.executors.in_process import InThisProcess
-from gear.dataset.locks import alone_at_work
+from gear.dataset.locks import exclusive_lock
 from gear.values.errors import DatasetError, GearError
 from gear.values.progress import Callbacks
 from gear.verbs.bench import run
@@ -159,7 +159,7 @@ def test_several_workers_or_an_engine_schedule_the_steps() -> None:
 @pytest.mark.usefixtures("plugins")
 def test_a_second_run_in_the_same_folder_says_so(tmp_path: Path, written: Callable[..., Path]) -> None:
     out = tmp_path / "out"
-    with alone_at_work(out), pytest.raises(DatasetError, match="another gear run is using this folder"):
+    with exclusive_lock(out), pytest.raises(DatasetError, match="another gear run is using this folder"):
         gear.bench(written(*FEW), out=out)
     assert not list(out.iterdir())
 

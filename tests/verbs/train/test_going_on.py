@@ -15,7 +15,7 @@ from gear.plugins.build import find
 from gear.plugins.models.retinanet_r18_fpn import build_lite0
 from gear.verbs.train.config import read_config
 from gear.verbs.train.run import train
-from gear.verbs.train.starting import begin_with, build_network
+from gear.verbs.train.starting import build_network, load_initial_weights
 
 BODY = "backbone.body."
 STATISTICS = ("running_mean", "running_var")
@@ -50,6 +50,6 @@ def test_a_part_that_would_stay_random_for_ever_is_told_of(name: str, is_told: b
     found = find("model", name)
     assert isinstance(found.spec, ModelSpec)
     model = build_network(found, read_config(found.spec.recipe, {}, ()), precision="float32")
-    told = begin_with(found, model, "")
+    told = load_initial_weights(found, model, "")
     assert told.startswith(f"{name} leaves a part as it begins, which is at random (0.2") == is_told
     assert told.endswith("begin with --init FILE") == is_told and bool(told) == is_told

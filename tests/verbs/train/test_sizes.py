@@ -93,7 +93,7 @@ def test_a_network_that_could_not_say_it_afterwards_sees_them_whole(
 def test_half_precision_is_for_time_budgets_on_devices_that_are_quicker_so(
     quick: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(starting, "is_quick_in_half", lambda device: quick)
+    monkeypatch.setattr(starting, "supports_bfloat16", lambda device: quick)
     found = find("model", "ddrnet23_slim")
     half = "bfloat16" if quick else "float32"
     assert starting.precision_of(found, config_of(time_budget_s=60)) == half
