@@ -9,6 +9,6 @@ import pytest
 
 
 def shared_folder(tmp_path_factory: pytest.TempPathFactory, name: str) -> Path:
-    """A place of that name, the same one in every process; who writes there takes its `gear.dataset.locks.dataset_lock`."""
+    """A folder of that name, shared by all processes; a writer must hold its `gear.dataset.locks.dataset_lock`."""
     run = tmp_path_factory.getbasetemp()
     return (run.parent if "PYTEST_XDIST_WORKER" in os.environ else run) / name
