@@ -79,7 +79,7 @@ class _Curve(torch.autograd.Function):
     """An elementwise function with known derivatives, so that its backward pass is one product."""
 
     @staticmethod
-    def forward(ctx: Any, given: torch.Tensor, values: torch.Tensor, slope: torch.Tensor) -> torch.Tensor:
+    def forward(ctx: Any, light: torch.Tensor, values: torch.Tensor, slope: torch.Tensor) -> torch.Tensor:
         ctx.save_for_backward(slope)
         return values
 

@@ -38,8 +38,8 @@ def collect_samples(session: Session, store: Store, indices: Iterable[int], repo
     waiting: deque[Future[Outcome]] = deque()
     in_row = 0
 
-    def settle(most: int) -> None:
-        while len(waiting) > most:
+    def settle(max_waiting: int) -> None:
+        while len(waiting) > max_waiting:
             outcome = waiting[0].result()
             waiting.popleft()
             tell(outcome)

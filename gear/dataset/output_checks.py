@@ -13,7 +13,7 @@ from gear.contracts.tasks import Encoded
 from gear.values.frames import UInt8Image
 
 
-def check_encoded(given: Any, method: str) -> Encoded:
+def check_encoded(encoded: Any, method: str) -> Encoded:
     """Checks that a method of a task returned files as bytes and metadata as JSON, and returns its value.
 
     Raises:
@@ -21,26 +21,26 @@ def check_encoded(given: Any, method: str) -> Encoded:
             cannot represent.
         ValueError: the metadata hold numbers that JSON cannot represent.
     """
-    if not isinstance(given, Encoded):
-        raise TypeError(f"{method} must give an Encoded, got {type(given).__name__}")
-    for path, data in given.files.items():
+    if not isinstance(encoded, Encoded):
+        raise TypeError(f"{method} must give an Encoded, got {type(encoded).__name__}")
+    for path, data in encoded.files.items():
         if not isinstance(data, bytes):
             raise TypeError(f"{method}: file {path!r} must be bytes, got {type(data).__name__}")
     try:
-        json.dumps(given.facts, allow_nan=False)
+        json.dumps(encoded.facts, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise type(error)(f"{method}: facts must be JSON: {error}") from error
-    return given
+    return encoded
 
 
-def check_previews(given: Any) -> dict[str, UInt8Image]:
+def check_previews(previews: Any) -> dict[str, UInt8Image]:
     """Checks the return value of a task's `preview` and returns it as a dictionary of (H, W, 3) uint8 pictures.
 
     Raises:
         TypeError: the value is not a mapping, or a picture in it is not (H, W, 3) uint8.
         ValueError: the value cannot be read as a mapping.
     """
-    pictures = dict(given)
+    pictures = dict(previews)
     for name, pixels in pictures.items():
         good = isinstance(pixels, np.ndarray) and pixels.dtype == np.uint8 and pixels.ndim == 3
         if not (good and pixels.shape[2] == 3 and pixels.size):
@@ -49,15 +49,15 @@ def check_previews(given: Any) -> dict[str, UInt8Image]:
     return {str(name): pixels for name, pixels in pictures.items()}
 
 
-def check_metrics(given: Any, method: str) -> dict[str, float]:
+def check_metrics(metrics: Any, method: str) -> dict[str, float]:
     """Checks the return value of an evaluator's `method` and returns it as a dictionary.
 
     Raises:
         TypeError: the value is not a mapping of names to numbers.
     """
-    if not isinstance(given, Mapping):
-        raise TypeError(f"{method} must give metrics by name, got {type(given).__name__}")
-    for name, value in given.items():
+    if not isinstance(metrics, Mapping):
+        raise TypeError(f"{method} must give metrics by name, got {type(metrics).__name__}")
+    for name, value in metrics.items():
         if not isinstance(name, str) or not isinstance(value, Real):
             raise TypeError(f"{method}: metric {name!r} must be a number, got {type(value).__name__}")
-    return dict(given)
+    return dict(metrics)

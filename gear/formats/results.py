@@ -28,7 +28,7 @@ def kitti_object_path(index: int) -> str:
     return f"data/{index:06d}.txt"
 
 
-def kitti_result_lines(found: Iterable[KittiLabel]) -> bytes:
+def kitti_result_lines(detections: Iterable[KittiLabel]) -> bytes:
     """The bytes of a KITTI result file: one line of 16 fields per predicted box.
 
     Numbers have all digits, so that an independent evaluation gets exactly the same metrics as gear.
@@ -36,7 +36,7 @@ def kitti_result_lines(found: Iterable[KittiLabel]) -> bytes:
     Raises:
         ValueError: a detection has no score.
     """
-    return "".join(_result_line(label) + "\n" for label in found).encode()
+    return "".join(_result_line(label) + "\n" for label in detections).encode()
 
 
 def _result_line(label: KittiLabel) -> str:

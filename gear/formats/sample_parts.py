@@ -82,11 +82,11 @@ def _ends(stems: list[str]) -> list[str]:
     return ["_".join(one[shared:]) for one in words]
 
 
-def column_of(name: str, suffix: str, found: Collection[tuple[str, str]]) -> str:
+def column_of(name: str, suffix: str, files: Collection[tuple[str, str]]) -> str:
     """The column name of a file in a table: its short name. The suffix is appended if files with different suffixes
     share the name.
 
-    `found` contains the short name and suffix of every file that occurs.
+    `files` contains the short name and suffix of every file that occurs.
     """
-    is_shared = sum(other == name for other, _ in found) > 1
+    is_shared = sum(other == name for other, _ in files) > 1
     return f"{name}_{suffix.replace('.', '_')}" if is_shared else name

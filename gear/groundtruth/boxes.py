@@ -86,15 +86,18 @@ def middle_in_camera(box_px: BoxPx, distance_m: float, pinhole: Intrinsics) -> V
     return (x, y, z)
 
 
-def box_in_camera(thing: SceneObject, camera: CameraRecord) -> Box3d:
+def box_in_camera(scene_object: SceneObject, camera: CameraRecord) -> Box3d:
     """The tight 3D box of an object in the camera's frame.
 
     The heading is the direction of the object's front, projected on the camera's x-z plane. It is exact for level
     cameras and upright objects. In other cases it is an approximation, because KITTI has a single angle, about the
     camera's y axis.
     """
-    camera_from_object = camera.world_from_camera_transform.inverse().matrix @ thing.world_from_object.matrix
-    centre, (length_m, width_m, height_m) = thing.shape.box_centre_m, (float(v) for v in thing.shape.box_size_m)
+    camera_from_object = camera.world_from_camera_transform.inverse().matrix @ scene_object.world_from_object.matrix
+    centre, (length_m, width_m, height_m) = (
+        scene_object.shape.box_centre_m,
+        (float(v) for v in scene_object.shape.box_size_m),
+    )
     bottom = camera_from_object @ [centre[0], centre[1], centre[2] - height_m / 2, 1.0]
     front = camera_from_object[:3, 0]
     return Box3d(

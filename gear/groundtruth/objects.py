@@ -71,10 +71,10 @@ def observe_objects(
     return tuple(truths)
 
 
-def in_camera(thing: SceneObject, camera: CameraRecord) -> Array:
+def in_camera(scene_object: SceneObject, camera: CameraRecord) -> Array:
     """The (N, 3) vertices of an object in the camera's frame, metres."""
-    camera_from_object = camera.world_from_camera_transform.inverse().matrix @ thing.world_from_object.matrix
-    return np.asarray(thing.shape.vertices_m @ camera_from_object[:3, :3].T + camera_from_object[:3, 3])
+    camera_from_object = camera.world_from_camera_transform.inverse().matrix @ scene_object.world_from_object.matrix
+    return np.asarray(scene_object.shape.vertices_m @ camera_from_object[:3, :3].T + camera_from_object[:3, 3])
 
 
 def _measure(

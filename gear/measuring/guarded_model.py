@@ -204,9 +204,9 @@ class GuardedModel:
         return answers
 
 
-def plugin_error(found: PluginEntry, stage: str, problem: str) -> PluginError:
+def plugin_error(plugin: PluginEntry, stage: str, problem: str) -> PluginError:
     """Makes an error whose message names the plugin, its package and version, and the stage at which it failed."""
-    return PluginError(f"{found.spec.name} ({found.owner.package} {found.owner.version})", stage, problem)
+    return PluginError(f"{plugin.spec.name} ({plugin.owner.package} {plugin.owner.version})", stage, problem)
 
 
 def weights_digest(model: Any) -> str | None:

@@ -45,19 +45,19 @@ def widened(masks: Mapping[str, Mask], margin_px: int = MARGIN_PX) -> dict[str, 
     return {name: cv2.dilate(mask.astype(np.uint8), disc).astype(np.bool_) for name, mask in masks.items()}
 
 
-def mask_metrics(sample: Sample, found: Mapping[str, Any]) -> dict[str, float]:
+def mask_metrics(sample: Sample, masks: Mapping[str, Any]) -> dict[str, float]:
     """The agreement of a defense's mask with the true patch area, over the pixels of all cameras together.
 
     Args:
         sample: the sample with its ground truth.
-        found: the defense's mask, (H, W) in 0..1, by camera name.
+        masks: the defense's mask, (H, W) in 0..1, by camera name.
 
     Returns:
         The metrics `MASK_METRICS` by name, in 0..1; NaN for a metric that is undefined, such as IoU without a patch.
     """
     truth = patch_masks(sample)
-    real = np.concatenate([truth[name].reshape(-1) for name in found])
-    said = np.concatenate([np.asarray(mask).reshape(-1) >= SURE for mask in found.values()])
+    real = np.concatenate([truth[name].reshape(-1) for name in masks])
+    said = np.concatenate([np.asarray(mask).reshape(-1) >= SURE for mask in masks.values()])
     both, either = int((real & said).sum()), int((real | said).sum())
     there = bool(real.any())
     metrics = (

@@ -149,7 +149,7 @@ class CocoEvaluator(Generic[SampleT]):
         """Sets the parameters of the evaluation; subclasses may change limits."""
 
 
-def coco_eval(truth: Json, found: list[Json]) -> Any:
+def coco_eval(truth: Json, detections: list[Json]) -> Any:
     """Makes pycocotools' `COCOeval` for 2D boxes over all of COCO's categories, from ground truth and detections
     in COCO's JSON format.
     """
@@ -158,7 +158,7 @@ def coco_eval(truth: Json, found: list[Json]) -> Any:
 
     labels, answers = COCO(), COCO()
     labels.dataset = truth
-    answers.dataset = {"images": truth["images"], "categories": truth["categories"], "annotations": found}
+    answers.dataset = {"images": truth["images"], "categories": truth["categories"], "annotations": detections}
     labels.createIndex()
     answers.createIndex()
     evaluation = COCOeval(labels, answers, "bbox")

@@ -219,16 +219,16 @@ def perfect_curve(chosen: Iterable[Chosen]) -> Array:
     return _monotone(np.ones(len(recall_thresholds(range(wanted, 0, -1), wanted))))
 
 
-def recall_thresholds(scores: Sequence[float], wanted: int) -> Array:
-    """The scores, in decreasing order, at which the recall reaches each step of 1/40; at most 41. `wanted` is the
+def recall_thresholds(scores: Sequence[float], label_count: int) -> Array:
+    """The scores, in decreasing order, at which the recall reaches each step of 1/40; at most 41. `label_count` is the
     number of labels that count.
     """
     thresholds = []
     recall = 0.0
     for i, score in enumerate(scores):
         is_last = i == len(scores) - 1
-        here = (i + 1) / wanted
-        following = here if is_last else (i + 2) / wanted
+        here = (i + 1) / label_count
+        following = here if is_last else (i + 2) / label_count
         if following - recall < recall - here and not is_last:
             continue
         thresholds.append(score)

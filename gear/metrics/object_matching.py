@@ -42,19 +42,19 @@ counts as `moved`.
 """
 
 
-def outcomes(given: PictureObjects, patch: PatchArea) -> PictureOutcomes:
+def outcomes(picture: PictureObjects, patch: PatchArea) -> PictureOutcomes:
     """Determines the outcome of each object of a picture, and the role of each confident detection.
 
     Args:
-        given: objects and detections of one view.
+        picture: objects and detections of one view.
         patch: visible patches of the same view.
     """
-    order = np.argsort([-one.score for one in given.detections], kind="stable")
-    sure = [int(index) for index in order if given.detections[index].score >= SURE]
-    found = [given.detections[index] for index in sure]
+    order = np.argsort([-one.score for one in picture.detections], kind="stable")
+    sure = [int(index) for index in order if picture.detections[index].score >= SURE]
+    found = [picture.detections[index] for index in sure]
     boxes_px = _boxes([one.box_px for one in found])
-    overlaps = iou_2d(boxes_px, _boxes([thing.box_px for thing in given.objects]))
-    is_same = np.array([[one.label == thing.label for thing in given.objects] for one in found], np.bool_)
+    overlaps = iou_2d(boxes_px, _boxes([thing.box_px for thing in picture.objects]))
+    is_same = np.array([[one.label == thing.label for thing in picture.objects] for one in found], np.bool_)
     is_same = is_same.reshape(overlaps.shape)
     fitting = _choose(np.where(is_same, overlaps, 0.0), MIN_OVERLAP, {})
     wrong = _choose(np.where(is_same, 0.0, overlaps), MIN_OVERLAP, fitting)
@@ -63,9 +63,9 @@ def outcomes(given: PictureObjects, patch: PatchArea) -> PictureOutcomes:
     roles.update(dict.fromkeys(wrong, "misclassified"))
     roles.update(dict.fromkeys(near, "moved"))
     for detection, thing in fitting.items():
-        is_here = given.is_in_place is None or given.is_in_place[thing, sure[detection]]
+        is_here = picture.is_in_place is None or picture.is_in_place[thing, sure[detection]]
         roles[detection] = "found" if is_here else "moved"
-    is_excused = share_of_first(boxes_px, _boxes(given.ignored_px)).max(axis=1, initial=0.0) >= MIN_OVERLAP
+    is_excused = share_of_first(boxes_px, _boxes(picture.ignored_px)).max(axis=1, initial=0.0) >= MIN_OVERLAP
     for detection in range(len(found)):
         if detection not in roles:
             is_double = overlaps[detection].max(initial=0.0) >= MIN_OVERLAP
@@ -73,7 +73,8 @@ def outcomes(given: PictureObjects, patch: PatchArea) -> PictureOutcomes:
     explained = {thing: detection for detection, thing in (fitting | wrong | near).items()}
     return PictureOutcomes(
         objects=tuple(
-            _object(given, number, found, roles, explained.get(number), patch) for number in range(len(given.objects))
+            _object(picture, number, found, roles, explained.get(number), patch)
+            for number in range(len(picture.objects))
         ),
         detections=tuple(
             DetectionOutcome(

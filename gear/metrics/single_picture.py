@@ -41,7 +41,7 @@ def boxes(rows: Sequence[tuple[Sequence[float], int, float]]) -> Boxes:
     )
 
 
-def single_metrics(labels: Boxes, found: Boxes, ignored_px: Array, low_px: float = 0.0) -> dict[str, float]:
+def single_metrics(labels: Boxes, detections: Boxes, ignored_px: Array, low_px: float = 0.0) -> dict[str, float]:
     """Computes `found_share`, the share of the labels that are detected (NaN without labels), and the number of
     `false_alarms`.
 
@@ -51,18 +51,18 @@ def single_metrics(labels: Boxes, found: Boxes, ignored_px: Array, low_px: float
 
     Args:
         labels: labels; those with weight 0 do not count as missed.
-        found: detections.
+        detections: detections.
         ignored_px: (M, 4) boxes of regions to ignore.
         low_px: detections that are lower than this height and match nothing are no false alarms.
     """
-    sure = np.flatnonzero(found.weight >= SURE)
-    sure = sure[np.argsort(-found.weight[sure], kind="stable")]
-    overlaps = iou_2d(found.box_px, labels.box_px)
-    excused = share_of_first(found.box_px, ignored_px).max(axis=1, initial=0.0) >= MIN_OVERLAP
-    excused |= found.box_px[:, 3] - found.box_px[:, 1] < low_px
+    sure = np.flatnonzero(detections.weight >= SURE)
+    sure = sure[np.argsort(-detections.weight[sure], kind="stable")]
+    overlaps = iou_2d(detections.box_px, labels.box_px)
+    excused = share_of_first(detections.box_px, ignored_px).max(axis=1, initial=0.0) >= MIN_OVERLAP
+    excused |= detections.box_px[:, 3] - detections.box_px[:, 1] < low_px
     taken, alarms = np.zeros(len(labels.kind), dtype=np.bool_), 0
     for index in sure:
-        fits = np.where((labels.kind == found.kind[index]) & ~taken, overlaps[index], 0.0)
+        fits = np.where((labels.kind == detections.kind[index]) & ~taken, overlaps[index], 0.0)
         if fits.max(initial=0.0) >= MIN_OVERLAP:
             taken[int(np.argmax(fits))] = True
         elif not excused[index]:

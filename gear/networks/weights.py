@@ -102,29 +102,29 @@ def load_trunk(network: nn.Module, path: str | Path) -> tuple[int, int]:
     return loaded, total
 
 
-def mismatches(wanted: Mapping[str, Tensor], given: Mapping[str, Tensor]) -> list[str]:
+def mismatches(expected: Mapping[str, Tensor], state: Mapping[str, Tensor]) -> list[str]:
     """Lists the reasons why tensors from a file do not fit a network; the list is empty if they fit.
 
     The reasons are missing and unknown keys, wrong shapes, wrong kinds of numbers, and numbers that are not finite.
 
     Args:
-        wanted: the network's own tensors by key.
-        given: the tensors that are to be loaded, by key.
+        expected: the network's own tensors by key.
+        state: the tensors that are to be loaded, by key.
     """
-    missing = [key for key in wanted if key not in given and not key.endswith(OPTIONAL)]
-    surplus = [key for key in given if key not in wanted]
-    shared = [key for key in wanted if key in given]
+    missing = [key for key in expected if key not in state and not key.endswith(OPTIONAL)]
+    surplus = [key for key in state if key not in expected]
+    shared = [key for key in expected if key in state]
     shapes = [
-        f"{key} is {tuple(given[key].shape)}, not {tuple(wanted[key].shape)}"
+        f"{key} is {tuple(state[key].shape)}, not {tuple(expected[key].shape)}"
         for key in shared
-        if given[key].shape != wanted[key].shape
+        if state[key].shape != expected[key].shape
     ]
     kinds = [
         key
         for key in shared
-        if given[key].is_floating_point() != wanted[key].is_floating_point() and not key.endswith(OPTIONAL)
+        if state[key].is_floating_point() != expected[key].is_floating_point() and not key.endswith(OPTIONAL)
     ]
-    broken = [key for key in shared if not _finite(given[key])]
+    broken = [key for key in shared if not _finite(state[key])]
     found = {
         "missing": missing,
         "not known": surplus,

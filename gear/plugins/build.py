@@ -55,20 +55,20 @@ def name_of_task(written: JsonMapping[str, Any]) -> str:
     return full if any(found.full_name == full for found in catalogue().of_kind("task")) else written["name"]
 
 
-def build(found: PluginEntry, options: Node = NO_OPTIONS) -> Any:
+def build(plugin: PluginEntry, options: Node = NO_OPTIONS) -> Any:
     """Builds a plugin's product (a task, model, attack, defense, controller or metric) from its options.
 
     Raises:
         ConfigError: the options do not fit.
         PluginError: the `build` function of another package failed.
     """
-    config = read_node(found.spec.config, options, "options")
-    with blamed(found, "build"):
-        return found.spec.build(config)
+    config = read_node(plugin.spec.config, options, "options")
+    with blamed(plugin, "build"):
+        return plugin.spec.build(config)
 
 
 @contextlib.contextmanager
-def blamed(found: PluginEntry, stage: str) -> Iterator[None]:
+def blamed(plugin: PluginEntry, stage: str) -> Iterator[None]:
     """A context for running a plugin's code: exceptions get the plugin's name, and output to stdout goes to stderr.
 
     Raises:
@@ -81,10 +81,10 @@ def blamed(found: PluginEntry, stage: str) -> Iterator[None]:
     except (GearError, KeyboardInterrupt):
         raise
     except BaseException as error:  # SystemExit, GeneratorExit and those of the plugin's own making, too
-        owner = found.owner
+        owner = plugin.owner
         if owner.package == DISTRIBUTION:
             raise
-        name = f"{found.spec.name} ({owner.package} {owner.version})"
+        name = f"{plugin.spec.name} ({owner.package} {owner.version})"
         raise PluginError(name, stage, one_line(error)) from error
 
 

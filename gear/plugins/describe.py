@@ -27,19 +27,19 @@ UNITS = {
 """Units by the last word of an option's name."""
 
 
-def summary(found: PluginEntry) -> dict[str, Any]:
+def summary(plugin: PluginEntry) -> dict[str, Any]:
     """A plugin's kind, name, package, version, summary and capabilities as a JSON object."""
     capabilities = {
-        field.name: sorted(value) if isinstance(value := getattr(found.spec, field.name), frozenset) else value
-        for field in dataclasses.fields(found.spec)
+        field.name: sorted(value) if isinstance(value := getattr(plugin.spec, field.name), frozenset) else value
+        for field in dataclasses.fields(plugin.spec)
         if field.name not in COMMON | ELSEWHERE
     }
     return {
-        "kind": found.kind,
-        "name": found.spec.name,
-        "package": found.owner.package,
-        "version": found.owner.version,
-        "summary": found.spec.summary,
+        "kind": plugin.kind,
+        "name": plugin.spec.name,
+        "package": plugin.owner.package,
+        "version": plugin.owner.version,
+        "summary": plugin.spec.summary,
         "capabilities": capabilities,
     }
 

@@ -46,16 +46,16 @@ def run(args: argparse.Namespace) -> int:
     return show_all(found, kinds, args.json)
 
 
-def show_all(found: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
+def show_all(catalogue: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
     """Prints the working plugins, the broken plugins, and the names that several plugins share; returns exit code 0."""
     from gear.plugins.describe import summary
 
-    rows = [summary(plugin) for kind in kinds for plugin in found.of_kind(kind)]
-    clashes = [clash for clash in found.clashes() if clash[0] in kinds]
+    rows = [summary(plugin) for kind in kinds for plugin in catalogue.of_kind(kind)]
+    clashes = [clash for clash in catalogue.clashes() if clash[0] in kinds]
     if as_json:
         broken = [
             {"plugin": b.owner.plugin, "package": b.owner.package, "version": b.owner.version, "stage": b.stage,
-             "problem": b.problem} for b in found.broken
+             "problem": b.problem} for b in catalogue.broken
         ]  # fmt: skip
         named = [{"kind": kind, "name": name, "choices": choices} for kind, name, choices in clashes]
         print(json.dumps({"plugins": rows, "broken": broken, "clashes": named}, indent=1))
@@ -63,7 +63,7 @@ def show_all(found: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
     cells = [[row["kind"], row["name"], f"{row['package']} {row['version']}", row["summary"]] for row in rows]
     if cells:
         print("\n".join(text_table(("kind", "name", "package", "summary"), cells, width=line_width())))
-    for b in found.broken:
+    for b in catalogue.broken:
         remedy = f"tell its author, uninstall {b.owner.package}, or set GEAR_DISABLE_PLUGINS={b.owner.plugin}"
         print(f"broken   {b.owner.plugin:20} {b.owner.package} {b.owner.version}  at {b.stage}: {b.problem}; {remedy}")
     for kind, name, choices in clashes:
@@ -71,11 +71,11 @@ def show_all(found: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
     return 0
 
 
-def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) -> int:
+def show(catalogue: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) -> int:
     """Prints one plugin with its source, capabilities and options; returns exit code 0."""
     from gear.plugins.describe import options, source_of, summary, training
 
-    plugin = the_one(found, kinds, args.name)
+    plugin = the_one(catalogue, kinds, args.name)
     trained = training(plugin.spec)
     facts = summary(plugin) | trained | {"source": source_of(plugin.spec), "options": options(plugin.spec.config)}
     if args.json:
@@ -98,7 +98,7 @@ def show(found: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) ->
     return 0
 
 
-def the_one(found: Catalogue, kinds: tuple[Kind, ...], name: str | None) -> PluginEntry:
+def the_one(catalogue: Catalogue, kinds: tuple[Kind, ...], name: str | None) -> PluginEntry:
     """Returns the plugin with the given name, of any of the given kinds, for `gear plugins show`.
 
     Raises:
@@ -110,13 +110,13 @@ def the_one(found: Catalogue, kinds: tuple[Kind, ...], name: str | None) -> Plug
 
     if not name:
         raise GearError("gear plugins show needs a name, such as: gear plugins show semseg")
-    hits = [kind for kind in kinds if any(name in (f.spec.name, f.full_name) for f in found.of_kind(kind))]
+    hits = [kind for kind in kinds if any(name in (f.spec.name, f.full_name) for f in catalogue.of_kind(kind))]
     if len(hits) > 1:
         raise GearError(f"{name!r} is the name of plugins of several kinds; add --kind {' or --kind '.join(hits)}")
     if not hits:
-        known = [other for kind in kinds for other in found.names(kind)]
-        raise UnknownNameError(kinds[0] if len(kinds) == 1 else "plugin", name, known, found.broken_hint())
-    return found.get(hits[0], name)
+        known = [other for kind in kinds for other in catalogue.names(kind)]
+        raise UnknownNameError(kinds[0] if len(kinds) == 1 else "plugin", name, known, catalogue.broken_hint())
+    return catalogue.get(hits[0], name)
 
 
 def _text(value: object) -> str:

@@ -19,7 +19,7 @@ from gear.dataset.reading import Dataset
 from gear.measuring.gap.request import GapRequest
 from gear.measuring.guard import open_guard
 from gear.measuring.guarded_model import GuardedModel
-from gear.measuring.metric_checks import said_of
+from gear.measuring.metric_checks import checked_metrics
 from gear.measuring.plugin_selection import check_model, chosen_model
 from gear.measuring.shown_size import size_note
 from gear.plugins.build import find, name_of_task
@@ -94,18 +94,18 @@ class Effect:
             metric=spec.metric.rpartition(".")[2],
         )
 
-    def update(self, index: int, clean: Any, shown: Mapping[str, Any]) -> None:
+    def update(self, index: int, clean: Any, patched: Mapping[str, Any]) -> None:
         """Adds the predictions on one sample to the metrics.
 
         Args:
             index: index of the sample.
             clean: the sample without a patch.
-            shown: the sample with the patch, by name of the compositor and for `rendered`.
+            patched: the sample with the patch, by name of the compositor and for `rendered`.
         """
         alone: dict[str, Metrics] = {}
-        for name, sample in {CLEAN: clean, **shown}.items():
+        for name, sample in {CLEAN: clean, **patched}.items():
             (answer,) = self.guarded.predict([sample.images], [index])
-            alone[name] = said_of(self.plan, self.evaluators[name].update(sample, answer.prediction), "update")
+            alone[name] = checked_metrics(self.plan, self.evaluators[name].update(sample, answer.prediction), "update")
         before = alone.pop(CLEAN)
         change = {
             name: {metric: metrics.get(metric, math.nan) - value for metric, value in before.items()}
@@ -121,4 +121,4 @@ class Effect:
 
     def result(self) -> dict[str, Metrics]:
         """The metrics over all samples, by metric, for `clean`, each compositor and `rendered`."""
-        return {name: said_of(self.plan, one.result(), "result") for name, one in self.evaluators.items()}
+        return {name: checked_metrics(self.plan, one.result(), "result") for name, one in self.evaluators.items()}

@@ -42,7 +42,7 @@ class AdaBins(DepthNetwork):
         of the depth bins; all in metres.
         """
         height, width = (int(side) for side in picture.shape[2:])
-        seen = resized(picture, *fitting(height, width, least=self.options.queries + 1))
+        seen = resized(picture, *fitting(height, width, min_patches=self.options.queries + 1))
         half_m, centres_m = self.graph(self._normalise(seen))
         depth_m = functional.interpolate(half_m, (height, width), mode="bilinear", align_corners=True)
         return {DEPTH: depth_m[:, 0], BINS: centres_m}

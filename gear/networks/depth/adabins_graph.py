@@ -191,24 +191,26 @@ def patches(height: int, width: int) -> int:
     return rows * columns
 
 
-def fitting(height: int, width: int, least: int, most: int = MOST_PATCHES) -> tuple[int, int]:
+def fitting(height: int, width: int, min_patches: int, max_patches: int = MOST_PATCHES) -> tuple[int, int]:
     """The picture size nearest to `height` x `width`, at the same aspect ratio, whose number of transformer tokens
-    lies between `least` and `most`.
+    lies between `min_patches` and `max_patches`.
 
     Args:
         height, width: size of the picture.
-        least, most: smallest and largest number of patches (transformer tokens).
+        min_patches, max_patches: smallest and largest number of patches (transformer tokens).
 
     Returns:
         Height and width.
     """
     count = patches(height, width)
-    if least <= count <= most:
+    if min_patches <= count <= max_patches:
         return height, width
-    below, above = (0.0, 1.0) if count > most else (1.0, 64.0)
+    below, above = (0.0, 1.0) if count > max_patches else (1.0, 64.0)
     for _ in range(30):
         middle = (below + above) / 2
-        enough = patches(round(height * middle), round(width * middle)) > (most if count > most else least - 1)
+        enough = patches(round(height * middle), round(width * middle)) > (
+            max_patches if count > max_patches else min_patches - 1
+        )
         below, above = (below, middle) if enough else (middle, above)
-    scale = below if count > most else above
+    scale = below if count > max_patches else above
     return round(height * scale), round(width * scale)

@@ -163,14 +163,14 @@ class Detector(Network):
             ignored=self._boxes(others) * shrinkage,
         )
 
-    def detections(self, found: Mapping[str, Tensor]) -> tuple[Detection, ...]:
+    def detections(self, outputs: Mapping[str, Tensor]) -> tuple[Detection, ...]:
         """The detections of one picture with COCO's categories; detections of classes without a COCO category are
         left out.
 
         Args:
-            found: torchvision's raw output for the picture: `boxes`, `scores` and `labels`.
+            outputs: torchvision's raw output for the picture: `boxes`, `scores` and `labels`.
         """
-        columns = (found["boxes"].tolist(), found["labels"].tolist(), found["scores"].tolist())
+        columns = (outputs["boxes"].tolist(), outputs["labels"].tolist(), outputs["scores"].tolist())
         return tuple(
             Detection(category_id=category, box_px=(left, top, right, bottom), score=score)
             for (left, top, right, bottom), label, score in zip(*columns, strict=True)

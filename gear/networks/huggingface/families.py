@@ -51,11 +51,11 @@ class Family:
     networks: tuple[str, ...] = ()
     is_square: bool = True
 
-    def facts(self, said: Mapping[str, Any]) -> dict[str, Any]:
-        """The values in a preprocessor_config.json (`said`), completed with the defaults of the class; null values
+    def facts(self, config: Mapping[str, Any]) -> dict[str, Any]:
+        """The values in a preprocessor_config.json (`config`), completed with the defaults of the class; null values
         are left out.
         """
-        return {**EVERYWHERE, **self.defaults, **{key: value for key, value in said.items() if value is not None}}
+        return {**EVERYWHERE, **self.defaults, **{key: value for key, value in config.items() if value is not None}}
 
     def steps(self) -> frozenset[str]:
         """Names of the keys `do_…` that gear accepts: steps that gear implements, and steps that do not change the
@@ -121,18 +121,18 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
 )  # fmt: skip
 
 
-def family_of(said: Mapping[str, Any], model_type: str, path: Path) -> str:
+def family_of(config: Mapping[str, Any], model_type: str, path: Path) -> str:
     """The key in `FAMILIES` of the image processor class that a network's folder uses.
 
     Args:
-        said: content of preprocessor_config.json, by key.
+        config: content of preprocessor_config.json, by key.
         model_type: type of the folder's network, for files that name no class.
         path: path of the file, for error messages.
 
     Raises:
         GearError: gear does not implement the class, or neither the file nor the network determines one.
     """
-    named = said.get("image_processor_type") or said.get("feature_extractor_type")
+    named = config.get("image_processor_type") or config.get("feature_extractor_type")
     if named is not None:
         name = str(named)
         for ending in ("Fast", "Pil", "ImageProcessor", "FeatureExtractor"):

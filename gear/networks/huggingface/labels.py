@@ -17,7 +17,7 @@ that gear does not know.
 """
 
 
-def match(names: Mapping[int, str], known: Mapping[str, int]) -> tuple[dict[int, int], tuple[str, ...]]:
+def match(names: Mapping[int, str], class_ids: Mapping[str, int]) -> tuple[dict[int, int], tuple[str, ...]]:
     """Matches the classes of a network with gear's classes by name.
 
     A class may have several names, separated by commas or semicolons, as in ADE20K; the first name that gear knows is
@@ -25,7 +25,7 @@ def match(names: Mapping[int, str], known: Mapping[str, int]) -> tuple[dict[int,
 
     Args:
         names: class names of the network, by its class number.
-        known: gear's class numbers by name, in lower case.
+        class_ids: gear's class numbers by name, in lower case.
 
     Returns:
         gear's class number for each matched class number of the network, and the unmatched names in the network's
@@ -34,8 +34,8 @@ def match(names: Mapping[int, str], known: Mapping[str, int]) -> tuple[dict[int,
     found = {}
     for index, name in names.items():
         words = [word.strip().casefold().replace("_", " ") for word in re.split("[,;]", name)]
-        numbers = [known[word] for word in words if word in known]
-        numbers += [known[SYNONYMS[word]] for word in words if SYNONYMS.get(word) in known]
+        numbers = [class_ids[word] for word in words if word in class_ids]
+        numbers += [class_ids[SYNONYMS[word]] for word in words if SYNONYMS.get(word) in class_ids]
         if numbers:
             found[index] = numbers[0]
     return found, tuple(name for index, name in names.items() if index not in found)

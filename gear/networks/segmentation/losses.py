@@ -85,19 +85,19 @@ def sampled_ids(ids: Tensor) -> Tensor:
 
 
 def hard_cross_entropy(
-    logits: Tensor, ids: Tensor, *, easy: float, least: float, weights: Sequence[float] = ()
+    logits: Tensor, ids: Tensor, *, easy: float, min_share: float, weights: Sequence[float] = ()
 ) -> Tensor:
     """Mean cross-entropy over hard pixels: online hard example mining (Shrivastava et al., arXiv 1604.03540), applied
     to pixels.
 
-    A pixel counts if the probability of its correct class is below `easy`. If fewer than the share `least` of all
+    A pixel counts if the probability of its correct class is below `easy`. If fewer than the share `min_share` of all
     pixels count, the pixels with the largest losses count up to that share.
 
     Args:
         logits: (B, C, H, W).
         ids: (B, H, W) int64 class of each pixel; 255 is ignored.
         easy: probability, 0..1; with 1 every pixel counts.
-        least: smallest share of the pixels that count, 0..1, without the ignored ones.
+        min_share: smallest share of the pixels that count, 0..1, without the ignored ones.
         weights: weight of each of the C classes in the mean; () for equal weights.
 
     Returns:
@@ -107,7 +107,7 @@ def hard_cross_entropy(
     known = (ids != IGNORED_TRAIN_ID).flatten()
     with torch.no_grad():
         ranked = each.masked_fill(~known, -1.0)
-        fewest = math.ceil(least * int(known.sum()))
+        fewest = math.ceil(min_share * int(known.sum()))
         hard = ranked >= -math.log(easy)
         if int(hard.sum()) < fewest:
             hard = ranked >= ranked.topk(fewest).values[-1]
@@ -161,7 +161,7 @@ class SegmentationLosses:
             ids = sampled_ids(ids)
         losses = {}
         for name, logits in outputs.items():
-            loss = hard_cross_entropy(logits, ids, easy=self.easy, least=self.least, weights=self.weights)
+            loss = hard_cross_entropy(logits, ids, easy=self.easy, min_share=self.least, weights=self.weights)
             if name == "logits":
                 losses["cross_entropy"] = loss
             else:

@@ -33,31 +33,31 @@ class FoundCar:
 
 
 def decode_cars(
-    said: Mapping[str, Tensor], scale: float, size_px: tuple[int, int], score_threshold: float
+    outputs: Mapping[str, Tensor], scale: float, size_px: tuple[int, int], score_threshold: float
 ) -> list[FoundCar]:
     """Converts the raw outputs for one picture to detected cars, highest score first.
 
     Args:
-        said: outputs of the network for one picture, without the batch dimension.
+        outputs: outputs of the network for one picture, without the batch dimension.
         scale: factor from the original pictures to the network's input.
         size_px: height and width of the network's input.
         score_threshold: smallest score that is reported.
     """
-    scores = said["class_logits"].softmax(dim=1)[:, 1]
-    is_pair = (said["rois_left"][:, 2:] > said["rois_left"][:, :2]).all(dim=1)
+    scores = outputs["class_logits"].softmax(dim=1)[:, 1]
+    is_pair = (outputs["rois_left"][:, 2:] > outputs["rois_left"][:, :2]).all(dim=1)
     chosen = ((scores > score_threshold) & is_pair).nonzero()[:, 0]
     scores = scores[chosen]
-    codes = said["box_codes"][chosen, 1]
+    codes = outputs["box_codes"][chosen, 1]
     codes = codes * codes.new_tensor(BOX_DEVIATION)
     left_codes, right_codes = left_and_right(codes)
-    anchors_left, anchors_right = said["rois_left"][chosen], said["rois_right"][chosen]
+    anchors_left, anchors_right = outputs["rois_left"][chosen], outputs["rois_right"][chosen]
     left = clip(decode(left_codes, anchors_left), size_px)
     right = clip(decode(right_codes, anchors_right), size_px)
-    body = said["size_and_direction"][chosen, 1]
+    body = outputs["size_and_direction"][chosen, 1]
     body = body * SIZE_DEVIATION + body.new_tensor(SIZE_MEAN)
-    cells = said["keypoint_logits"].shape[-1]
-    best = said["keypoint_logits"][chosen].flatten(1).argmax(dim=1)
-    borders = said["border_logits"][chosen].argmax(dim=2)
+    cells = outputs["keypoint_logits"].shape[-1]
+    best = outputs["keypoint_logits"][chosen].flatten(1).argmax(dim=1)
+    borders = outputs["border_logits"][chosen].argmax(dim=2)
     start, width = anchors_left[:, 0], anchors_left[:, 2] - anchors_left[:, 0] + 1
     corner_px = (best % cells) * width / cells + start
     borders_px = borders * width[:, None] / cells + start[:, None]

@@ -216,11 +216,11 @@ def _six(left: Tensor, right: Tensor, left_from: Tensor, right_from: Tensor) -> 
     return torch.cat([encode(left, left_from), encode(right, right_from)[:, [0, 2]]], dim=1)
 
 
-def smooth_l1(said: Tensor, wanted: Tensor, sigma: float = 1.0) -> Tensor:
-    """Smooth L1 loss of predictions (`said`) and targets (`wanted`), element by element: quadratic for differences
+def smooth_l1(predicted: Tensor, target: Tensor, sigma: float = 1.0) -> Tensor:
+    """Smooth L1 loss of predictions (`predicted`) and targets (`target`), element by element: quadratic for differences
     below 1 / sigma^2, linear above.
     """
-    return functional.smooth_l1_loss(said, wanted, reduction="none", beta=1 / sigma**2)
+    return functional.smooth_l1_loss(predicted, target, reduction="none", beta=1 / sigma**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -263,11 +263,11 @@ def sample_pairs(left: Tensor, right: Tensor, cars: CarTargets, draws: torch.Gen
     return SampledPairs(left=left[chosen], right=right[chosen], owner=owner[car])
 
 
-def region_losses(said: Mapping[str, Tensor], pairs: SampledPairs, cars: CarTargets) -> dict[str, Tensor]:
+def region_losses(predicted: Mapping[str, Tensor], pairs: SampledPairs, cars: CarTargets) -> dict[str, Tensor]:
     """Computes the four losses of the second stage for one picture.
 
     Args:
-        said: outputs of `gear.networks.stereo.rcnn_graph.StereoRcnn.regions` for the R pairs.
+        predicted: outputs of `gear.networks.stereo.rcnn_graph.StereoRcnn.regions` for the R pairs.
         pairs: the R sampled pairs of boxes; the pairs that lie on a car are first.
         cars: training targets of the picture.
 
@@ -280,21 +280,21 @@ def region_losses(said: Mapping[str, Tensor], pairs: SampledPairs, cars: CarTarg
     count, held = max(len(pairs.left), 1), len(pairs.owner)
     labels = torch.zeros(len(pairs.left), dtype=torch.long, device=pairs.left.device)
     labels[:held] = 1
-    nothing = torch.stack([tensor.sum() for tensor in said.values()]).sum() * 0
+    nothing = torch.stack([tensor.sum() for tensor in predicted.values()]).sum() * 0
     losses = dict.fromkeys(("class", "boxes", "size_and_direction", "keypoints"), nothing)
     if len(labels):
-        losses["class"] = functional.cross_entropy(said["class_logits"], labels)
+        losses["class"] = functional.cross_entropy(predicted["class_logits"], labels)
     if not held:
         return losses
     left, right = pairs.left[:held], pairs.right[:held]
     codes = _six(cars.left[pairs.owner], cars.right[pairs.owner], left, right)
-    losses["boxes"] = smooth_l1(said["box_codes"][:held, 1], codes / codes.new_tensor(BOX_DEVIATION)).sum() / count
+    losses["boxes"] = smooth_l1(predicted["box_codes"][:held, 1], codes / codes.new_tensor(BOX_DEVIATION)).sum() / count
     body = (cars.size_and_direction[pairs.owner] - codes.new_tensor(SIZE_MEAN)) / SIZE_DEVIATION
-    losses["size_and_direction"] = smooth_l1(said["size_and_direction"][:held, 1], body).sum() / count
-    corner = _columns(cars.corner_px[pairs.owner], left, said["keypoint_logits"].shape[-1])
-    borders = _columns(cars.borders_px[pairs.owner], left, said["border_logits"].shape[-1])
-    parts = [_corner_entropy(said["keypoint_logits"][:held], corner)]
-    parts += [_column_entropy(said["border_logits"][:held, side], borders[:, side]) for side in (0, 1)]
+    losses["size_and_direction"] = smooth_l1(predicted["size_and_direction"][:held, 1], body).sum() / count
+    corner = _columns(cars.corner_px[pairs.owner], left, predicted["keypoint_logits"].shape[-1])
+    borders = _columns(cars.borders_px[pairs.owner], left, predicted["border_logits"].shape[-1])
+    parts = [_corner_entropy(predicted["keypoint_logits"][:held], corner)]
+    parts += [_column_entropy(predicted["border_logits"][:held, side], borders[:, side]) for side in (0, 1)]
     losses["keypoints"] = torch.stack(parts).mean()
     return losses
 

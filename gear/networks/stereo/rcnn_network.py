@@ -150,7 +150,7 @@ class StereoRcnnNetwork(Network):
         self, chances: Tensor, codes: Tensor, places: Tensor, size: tuple[int, int], most: int
     ) -> tuple[Tensor, Tensor]:
         pre_nms_top_n = self.options.pre_nms_top_n * (2 if self.training else 1)
-        return propose(chances[0].float(), codes[0].float(), places, size, pre_nms_top_n=pre_nms_top_n, most=most)
+        return propose(chances[0].float(), codes[0].float(), places, size, pre_nms_top_n=pre_nms_top_n, max_pairs=most)
 
     def _draws(self, count: int) -> list[torch.Generator]:
         """A random generator for each picture of a batch."""

@@ -12,7 +12,7 @@ SAME_OVERLAP = 0.7
 
 
 def propose(
-    chances: Tensor, codes: Tensor, anchors: Tensor, size_px: tuple[int, int], *, pre_nms_top_n: int, most: int
+    chances: Tensor, codes: Tensor, anchors: Tensor, size_px: tuple[int, int], *, pre_nms_top_n: int, max_pairs: int
 ) -> tuple[Tensor, Tensor]:
     """Selects the best box pairs of one picture by non-maximum suppression; a pair is kept if both its left and
     its right box are kept.
@@ -25,7 +25,7 @@ def propose(
         anchors: (A, 4) anchors in pixels of the network's input.
         size_px: height and width of the network's input.
         pre_nms_top_n: number of anchors with the highest probability from which pairs are selected.
-        most: largest number of pairs.
+        max_pairs: largest number of pairs.
 
     Returns:
         (R, 4) left and (R, 4) right boxes, R <= most, best first.
@@ -39,7 +39,7 @@ def propose(
             kept = torch.zeros_like(in_both)
             kept[legacy_nms(boxes, scores, SAME_OVERLAP)] = True
             in_both &= kept
-        chosen = in_both.nonzero()[:most, 0]
+        chosen = in_both.nonzero()[:max_pairs, 0]
         return left[chosen], right[chosen]
 
 

@@ -97,8 +97,8 @@ class Rp2:
         objective = self.objective(dataset[0])
         check_seen(self._config.source_class, dataset)
 
-        def harm(_: Tensor, seen: PatchedBatch) -> Mapping[str, Tensor]:
-            return self._harm(problem.model, objective, seen)
+        def harm(_: Tensor, batch: PatchedBatch) -> Mapping[str, Tensor]:
+            return self._harm(problem.model, objective, batch)
 
         return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
 

@@ -84,8 +84,8 @@ class Thys:
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)
         objective = self.objective(dataset[0])
 
-        def harm(_: Tensor, seen: PatchedBatch) -> Mapping[str, Tensor]:
-            return self._harm(problem.model, objective, seen)
+        def harm(_: Tensor, batch: PatchedBatch) -> Mapping[str, Tensor]:
+            return self._harm(problem.model, objective, batch)
 
         return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
 

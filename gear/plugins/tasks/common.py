@@ -125,7 +125,7 @@ def read_rgb(root: Path, relative: str, record: SceneRecord | None = None, view:
 
 
 def read_map(
-    root: Path, relative: str, record: SceneRecord, view: str, dtype: npt.DTypeLike, most: int | None = None
+    root: Path, relative: str, record: SceneRecord, view: str, dtype: npt.DTypeLike, max_value: int | None = None
 ) -> npt.NDArray[Any]:
     """Reads the (H, W) label or depth map of one view of a record.
 
@@ -135,15 +135,15 @@ def read_map(
         record: record of the sample.
         view: name of the camera.
         dtype: dtype that the map must have.
-        most: largest allowed value.
+        max_value: largest allowed value.
 
     Raises:
         DatasetError: the file is missing or damaged, or has another size than the view, another dtype or larger values.
     """
     values = read_plain(root, relative)
     _check_size(root / relative, values, record, view)
-    if values.ndim != 2 or values.dtype != dtype or (most is not None and int(values.max()) > most):
-        limit = "" if most is None else f" of 0 to {most}"
+    if values.ndim != 2 or values.dtype != dtype or (max_value is not None and int(values.max()) > max_value):
+        limit = "" if max_value is None else f" of 0 to {max_value}"
         raise DatasetError(root / relative, f"is no map of one {np.dtype(dtype).name}{limit} a pixel; {REPAIR}")
     return values
 

@@ -23,7 +23,12 @@ def random_patches(patches: Sequence[Patch], seed: int) -> tuple[Patch, ...]:
 
 
 def compared(
-    scenes: Scenes, network: Model, objective: Objective, patches: Sequence[Patch], seed: int, most: int | None = None
+    scenes: Scenes,
+    network: Model,
+    objective: Objective,
+    patches: Sequence[Patch],
+    seed: int,
+    max_samples: int | None = None,
 ) -> Json:
     """Measures the mean objective over samples, once with random patches and once with the patches of the attack.
 
@@ -33,14 +38,14 @@ def compared(
         objective: the objective that the attack maximises.
         patches: patches of the attack.
         seed: seed of the random patches.
-        most: largest number of samples, evenly spaced; None means all.
+        max_samples: largest number of samples, evenly spaced; None means all.
 
     Returns:
         A dict with `samples`, the number of samples, and the mean objectives `random` and `patch`; None for an
         objective that is not finite.
     """
     count = len(scenes.samples)
-    chosen = np.unique(np.linspace(0, count - 1, min(count, most or count)).round().astype(int)).tolist()
+    chosen = np.unique(np.linspace(0, count - 1, min(count, max_samples or count)).round().astype(int)).tolist()
     values = {
         "random": scenes.harm(network, objective, random_patches(patches, seed), chosen),
         "patch": scenes.harm(network, objective, patches, chosen),

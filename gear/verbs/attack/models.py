@@ -66,7 +66,7 @@ def check_gradient(defense: Chosen | None, attack: AttackSpec[Any]) -> None:
 
 
 def check_attack(
-    found: PluginEntry, models: Sequence[Chosen], task: str, surfaces: int, queries: int | None
+    plugin: PluginEntry, models: Sequence[Chosen], task: str, surfaces: int, queries: int | None
 ) -> AttackSpec[Any]:
     """Checks that the attack supports the task, the number of surfaces, the models and the budget; returns its
     spec.
@@ -75,7 +75,7 @@ def check_attack(
         GearError: the attack is for other tasks or for fewer surfaces, needs gradients that a model does not give, or
             `queries` is missing or not allowed for this attack.
     """
-    spec = found.spec
+    spec = plugin.spec
     assert isinstance(spec, AttackSpec)
     if spec.tasks and task not in spec.tasks:
         raise GearError(f"attack {spec.name!r} is for {', '.join(spec.tasks)}; this is a {task} dataset")
@@ -86,7 +86,7 @@ def check_attack(
     for model in models:
         assert isinstance(model.found.spec, ModelSpec)
         if spec.needs_gradients and not model.found.spec.has_gradients:
-            raise GearError(f"attack {spec.name!r} needs gradients; model {model.found.spec.name!r} gives none")
+            raise GearError(f"attack {spec.name!r} needs gradients; model {model.plugin.spec.name!r} gives none")
     is_counted = not spec.needs_gradients and not spec.is_control
     if queries is not None and not is_counted:
         raise GearError(f"attack {spec.name!r} takes steps; --queries is for attacks without gradients")

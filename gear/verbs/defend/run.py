@@ -137,13 +137,13 @@ def run_defend(request: DefendRequest, callbacks: Callbacks) -> DefendReport:
     return DefendReport(root=root, split=name, samples=count, made=len(missing), outdated=outdated)
 
 
-def suitable(found: PluginEntry, task: str) -> DefenseSpec[Any]:
+def suitable(plugin: PluginEntry, task: str) -> DefenseSpec[Any]:
     """Returns the spec of a defense after checking that the defense needs nothing but pictures.
 
     Raises:
         GearError: the defense is not for the task, or needs a model or calibration data.
     """
-    spec = found.spec
+    spec = plugin.spec
     assert isinstance(spec, DefenseSpec)
     if spec.tasks and task not in spec.tasks:
         raise GearError(f"defense {spec.name!r} is for {', '.join(spec.tasks)}; this is a {task} dataset")

@@ -182,10 +182,12 @@ class Canvas:
         return float(cv2.getTextSize(words, FONT, scale, thickness)[0][0]) / OVERSAMPLING
 
 
-def round_step_m(span_m: float, most: int) -> float:
-    """Returns the smallest length of 1, 2 or 5 times a power of ten that divides `span_m` into at most `most` parts."""
-    power = 10.0 ** math.floor(math.log10(span_m / most))
-    return next(power * factor for factor in (1, 2, 5, 10) if span_m / (power * factor) <= most)
+def round_step_m(span_m: float, max_parts: int) -> float:
+    """Returns the smallest length of 1, 2 or 5 times a power of ten that divides `span_m` into at most `max_parts`
+    parts.
+    """
+    power = 10.0 ** math.floor(math.log10(span_m / max_parts))
+    return next(power * factor for factor in (1, 2, 5, 10) if span_m / (power * factor) <= max_parts)
 
 
 def rectangle(x_px: float, y_px: float, width_px: float, height_px: float) -> Points:

@@ -192,20 +192,20 @@ def _states(tensors: Mapping[str, Tensor], optimiser: torch.optim.Optimizer) -> 
     return state
 
 
-def check_plan(root: Path, there: Json, wanted: Json) -> None:
+def check_plan(root: Path, stored: Json, expected: Json) -> None:
     """Checks that the training in a folder has the requested settings and data.
 
     Args:
         root: folder of the training, for the message.
-        there: plan in the checkpoint: everything on which the weights depend, as JSON.
-        wanted: plan of the requested training.
+        stored: plan in the checkpoint: everything on which the weights depend, as JSON.
+        expected: plan of the requested training.
 
     Raises:
         DatasetError: the plans differ; the message names the keys.
     """
-    if there == wanted:
+    if stored == expected:
         return
-    differs = sorted(_differences(there, wanted))
+    differs = sorted(_differences(stored, expected))
     raise DatasetError(root, f"holds a training with other settings ({', '.join(differs)} differ); use another --out")
 
 

@@ -14,9 +14,9 @@ TRAINING = ("finetuning", "train")
 VALIDATION = ("val",)
 
 
-def spread(samples: Samples, most: int) -> Samples:
-    """Returns at most `most` of the samples, evenly spaced."""
-    count = min(most, len(samples))
+def spread(samples: Samples, max_count: int) -> Samples:
+    """Returns at most `max_count` of the samples, evenly spaced."""
+    count = min(max_count, len(samples))
     return Samples(samples.datasets, tuple(samples.places[i * len(samples) // count] for i in range(count)))
 
 

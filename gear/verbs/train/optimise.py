@@ -92,6 +92,8 @@ class Buffers:
             torch._foreach_copy_(self._buffers, self._kept)
 
 
-def clip_gradients(module: nn.Module, most: float) -> Tensor:
-    """Scales the gradients to a total norm of at most `most` (0 means no limit) and returns the norm before scaling."""
-    return nn.utils.clip_grad_norm_(module.parameters(), most if most > 0 else math.inf)
+def clip_gradients(module: nn.Module, max_norm: float) -> Tensor:
+    """Scales the gradients to a total norm of at most `max_norm` (0 means no limit) and returns the norm before
+    scaling.
+    """
+    return nn.utils.clip_grad_norm_(module.parameters(), max_norm if max_norm > 0 else math.inf)

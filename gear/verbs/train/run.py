@@ -245,13 +245,13 @@ def _origin(request: TrainRequest, callbacks: Callbacks) -> Origin:
     )
 
 
-def trainable(found: PluginEntry, task: str) -> Any:
+def trainable(plugin: PluginEntry, task: str) -> Any:
     """Returns the recipe (default hyperparameters) of a network, after checking that it can be trained for a task.
 
     Raises:
         GearError: the network is for other tasks, or cannot be trained.
     """
-    spec = found.spec
+    spec = plugin.spec
     assert isinstance(spec, ModelSpec)
     if task not in spec.tasks:
         raise GearError(f"model {spec.name!r} does {', '.join(spec.tasks)}, not {task}")

@@ -24,7 +24,7 @@ LEAST_PIXELS = 1 << 16
 NEARLY_WHOLE = 0.9
 
 
-def picture_scale(found: PluginEntry, config: TrainConfig, samples: Samples) -> float:
+def picture_scale(plugin: PluginEntry, config: TrainConfig, samples: Samples) -> float:
     """Returns the factor, at most 1, by which pictures are resized in a training.
 
     If the config gives a factor, that factor is returned. Otherwise the factor is below 1 only for a training on a CPU
@@ -40,7 +40,7 @@ def picture_scale(found: PluginEntry, config: TrainConfig, samples: Samples) -> 
         return config.picture_scale
     if not config.time_budget_s or config.crop_px is not None or config.adversarial.attack:
         return 1.0
-    if device_of(config.device).type != "cpu" or not _says_its_scale(found, config):
+    if device_of(config.device).type != "cpu" or not _says_its_scale(plugin, config):
         return 1.0
     sample = samples[0]
     geometry = geometry_of(sample)
@@ -66,8 +66,8 @@ def without_empty_margins(config: TrainConfig, samples: Samples) -> TrainConfig:
     return replace(config, crop_px=(min(config.crop_px[0], height_px), min(config.crop_px[1], width_px)))
 
 
-def _says_its_scale(found: PluginEntry, config: TrainConfig) -> bool:
-    spec = found.spec
+def _says_its_scale(plugin: PluginEntry, config: TrainConfig) -> bool:
+    spec = plugin.spec
     assert isinstance(spec, ModelSpec)
     is_given = isinstance(config.options, Mapping) and OPTION in config.options.entries
     return not is_given and getattr(spec.config(), OPTION, 1.0) is None

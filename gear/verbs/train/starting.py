@@ -32,7 +32,7 @@ FLAGS = {"weights": "--init", "seed": "--seed", "device": "--device", "precision
 """Network options that the training sets itself, with the command-line flag that controls each."""
 
 
-def check_options(found: PluginEntry, config: TrainConfig) -> None:
+def check_options(plugin: PluginEntry, config: TrainConfig) -> None:
     """Checks that the user gave no network option that the training sets itself, such as `weights` or `precision`.
 
     Initial weights given as an option would be recorded as random weights, and a precision would also apply to
@@ -41,19 +41,19 @@ def check_options(found: PluginEntry, config: TrainConfig) -> None:
     Raises:
         GearError: such an option is given.
     """
-    fields = {field.name for field in dataclasses.fields(found.spec.config)}
+    fields = {field.name for field in dataclasses.fields(plugin.spec.config)}
     given = config.options.entries if isinstance(config.options, Mapping) else {}
     for name, flag in FLAGS.items():
         if name in fields and name in given:
             raise GearError(f"options.{name} is set by the training; say it with {flag}")
 
 
-def sizes_note(found: PluginEntry, config: TrainConfig, samples: Samples) -> str:
+def sizes_note(plugin: PluginEntry, config: TrainConfig, samples: Samples) -> str:
     """Returns a warning if the pictures have several sizes and the weights would record the scale of one size;
     otherwise an empty text.
     """
     widths_px = _widths_px(samples)
-    if len(widths_px) == 1 or not _notes_share(found, config):
+    if len(widths_px) == 1 or not _notes_share(plugin, config):
         return ""
     return (
         f"pictures are {', '.join(map(str, sorted(widths_px)))} px wide: the network sees each unscaled, and its"
@@ -80,7 +80,7 @@ def _notes_share(found: PluginEntry, config: TrainConfig) -> bool:
     return getattr(found.spec.config(), SCALE, 1.0) is None and not is_given
 
 
-def with_scale(found: PluginEntry, config: TrainConfig, share: float, begun: Json = None) -> TrainConfig:
+def with_scale(plugin: PluginEntry, config: TrainConfig, share: float, earlier_config: Json = None) -> TrainConfig:
     """Returns the config with the network option `input_scale`: the factor by which the network itself resizes its
     input pictures.
 
@@ -88,34 +88,35 @@ def with_scale(found: PluginEntry, config: TrainConfig, share: float, begun: Jso
     scale of the initial weights is used. The new weights record the scale for their later use.
 
     Args:
-        found: the network's plugin.
+        plugin: the network's plugin.
         config: config of the training.
         share: width of the training pictures divided by the task's default width.
-        begun: config of the resumed training; it records the scale of initial weights that have been deleted since.
+        earlier_config: config of the resumed training; it records the scale of initial weights that have been deleted
+            since.
     """
-    if not _notes_share(found, config):
+    if not _notes_share(plugin, config):
         return config
-    known = _given_scale(begun) if resumes_without_init(found, config.init, begun) else None
-    scale = (known or _scale_of_start(found, config.init)) if share == 1 else 1
+    known = _given_scale(earlier_config) if resumes_without_init(plugin, config.init, earlier_config) else None
+    scale = (known or _scale_of_start(plugin, config.init)) if share == 1 else 1
     if scale is None:
         return config
     options = with_value(config.options, (SCALE,), Scalar(str(scale), False, Place("gear train")))
     return dataclasses.replace(config, options=options)
 
 
-def resumes_without_init(found: PluginEntry, init: str, begun: Json) -> bool:
+def resumes_without_init(plugin: PluginEntry, init: str, earlier_config: Json) -> bool:
     """Whether a resumed training continues without its initial weights, because their file no longer exists.
 
     The checkpoint contains everything on which the next step depends, so the initial weights are not needed.
 
     Args:
-        found: the network's plugin.
+        plugin: the network's plugin.
         init: the initial weights, as in `TrainConfig.init`.
-        begun: config of the training in the folder; None if there is none.
+        earlier_config: config of the training in the folder; None if there is none.
     """
-    spec = found.spec
+    spec = plugin.spec
     assert isinstance(spec, ModelSpec)
-    if not isinstance(begun, dict) or begun.get("init") != init or init in ("", NONE, *spec.starts):
+    if not isinstance(earlier_config, dict) or earlier_config.get("init") != init or init in ("", NONE, *spec.starts):
         return False
     if init == SHIPPED:
         return shipped(spec.name) is None
@@ -141,7 +142,7 @@ def _scale_of_start(found: PluginEntry, init: str) -> Json:
     return trained_option(init, spec.name, SCALE)
 
 
-def precision_of(found: PluginEntry, config: TrainConfig) -> Literal["float32", "bfloat16"]:
+def precision_of(plugin: PluginEntry, config: TrainConfig) -> Literal["float32", "bfloat16"]:
     """Returns the precision of the training steps.
 
     It is the requested precision. For `auto` it is bfloat16 if there is a time budget and the device is faster in
@@ -150,13 +151,13 @@ def precision_of(found: PluginEntry, config: TrainConfig) -> Literal["float32", 
     """
     if config.precision != "auto":
         return config.precision
-    spec = found.spec
+    spec = plugin.spec
     assert isinstance(spec, ModelSpec)
     knows = any(field.name == "precision" for field in dataclasses.fields(spec.config))
     return "bfloat16" if config.time_budget_s and knows and supports_bfloat16(device_of(config.device)) else "float32"
 
 
-def build_network(found: PluginEntry, config: TrainConfig, *, precision: str) -> Any:
+def build_network(plugin: PluginEntry, config: TrainConfig, *, precision: str) -> Any:
     """Builds the network on its device, with random weights drawn from the seed.
 
     The options `weights`, `seed`, `device` and `precision` are set only if the network has them.
@@ -166,14 +167,14 @@ def build_network(found: PluginEntry, config: TrainConfig, *, precision: str) ->
         PluginError: the `build` function of another package failed.
     """
     wanted = {"weights": NONE, "seed": str(config.seed), "device": config.device, "precision": precision}
-    fields = {field.name for field in dataclasses.fields(found.spec.config)}
+    fields = {field.name for field in dataclasses.fields(plugin.spec.config)}
     options = config.options
     place = Place("gear train")
     for name, text in wanted.items():
         if name in fields:
             options = with_value(options, (name,), Scalar(text, False, place))
     with seeded(config.seed):  # for networks that draw their weights from torch's global generator
-        return build(found, options)
+        return build(plugin, options)
 
 
 def freeze_pretrained(model: Any, init: str) -> None:
@@ -185,11 +186,11 @@ def freeze_pretrained(model: Any, init: str) -> None:
         freeze_trunks(model.module())
 
 
-def load_initial_weights(found: PluginEntry, model: Any, init: str) -> str:
+def load_initial_weights(plugin: PluginEntry, model: Any, init: str) -> str:
     """Loads initial weights into a network.
 
     Args:
-        found: the network's plugin.
+        plugin: the network's plugin.
         model: the built network.
         init: "" or `none` for random weights, `shipped`, a safetensors file, a name that the network defines, or
             `trunk:` followed by a file or by a network with reference weights; `trunk:` loads the weights whose keys
@@ -202,12 +203,12 @@ def load_initial_weights(found: PluginEntry, model: Any, init: str) -> str:
         GearError: these weights do not exist, or do not fit the network.
         UnknownNameError: `init` is neither a file nor a name that the network defines.
     """
-    spec = found.spec
+    spec = plugin.spec
     assert isinstance(spec, ModelSpec)
     if not init or init == NONE:
         return _kept_at_random(spec, model)
     if init in spec.starts:
-        with blamed(found, f"starts[{init!r}]"):
+        with blamed(plugin, f"starts[{init!r}]"):
             spec.starts[init](model)
     elif init == SHIPPED:
         path = resolve(SHIPPED, spec.name)

@@ -21,13 +21,13 @@ LOSS = "loss"
 
 
 def validate(
-    model: Any, found: PluginEntry, task: Task[Any, Any], samples: Sequence[Any], views: Sequence[str]
+    model: Any, plugin: PluginEntry, task: Task[Any, Any], samples: Sequence[Any], views: Sequence[str]
 ) -> dict[str, float]:
     """Computes the validation metrics of a network over samples.
 
     Args:
         model: the network, in eval mode.
-        found: plugin of the network.
+        plugin: plugin of the network.
         task: the task, which supplies the evaluators.
         samples: held-out samples.
         views: names of the cameras whose pictures the network uses.
@@ -49,11 +49,11 @@ def validate(
         sample = item.sample
         pictures = {name: sample.images[name] for name in views}
         batch = as_pictures({name: picture[None] for name, picture in item.views.items()})
-        with blamed(found, "forward"), torch.no_grad():
+        with blamed(plugin, "forward"), torch.no_grad():
             losses.append(float(total(model.forward(batch, [sample]))))
-        with blamed(found, "predict"):
+        with blamed(plugin, "predict"):
             prediction = model.predict(pictures)
-        with blamed(found, "prediction"):
+        with blamed(plugin, "prediction"):
             for evaluator in evaluators.values():
                 try:
                     evaluator.update(sample, prediction)

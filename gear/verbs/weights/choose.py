@@ -41,13 +41,13 @@ class Chosen:
 
 
 def choose_state(
-    found: PluginEntry, wanted: Mapping[str, Tensor], entries: list[Candidate], path: Path, entry: str = ""
+    plugin: PluginEntry, expected: Mapping[str, Tensor], entries: list[Candidate], path: Path, entry: str = ""
 ) -> Chosen:
     """Returns the first entry of a checkpoint that has exactly the keys and shapes of the network.
 
     Args:
-        found: plugin of the model; its spec may translate the keys of published files.
-        wanted: state dict of the network.
+        plugin: plugin of the model; its spec may translate the keys of published files.
+        expected: state dict of the network.
         entries: entries of the checkpoint, the most probable first.
         path: path of the checkpoint, for messages.
         entry: path of the entry to take; "" tries all entries.
@@ -63,8 +63,8 @@ def choose_state(
             raise GearError(f"{path}: has no entry {entry!r}; it holds {printable(_listed(entries), LONGEST)}")
     fitting: list[Chosen] = []
     for one in candidates:
-        state = _translated(found, one)
-        if state is None or mismatches(wanted, state):
+        state = _translated(plugin, one)
+        if state is None or mismatches(expected, state):
             continue
         # Two candidates may be equal after translation, because `convert` may remove the prefix.
         if not any(_same(state, known.state) for known in fitting):
@@ -72,7 +72,7 @@ def choose_state(
     if fitting:
         first, *others = fitting
         return Chosen(name=first.name, state=first.state, others=tuple(one.name for one in others))
-    raise _refusal(found, wanted, candidates, entries, path)
+    raise _refusal(plugin, expected, candidates, entries, path)
 
 
 def _same(one: Mapping[str, Tensor], other: Mapping[str, Tensor]) -> bool:

@@ -139,7 +139,7 @@ def test_the_padded_convolution_keeps_its_two_pixels() -> None:
     ],
 )
 def test_pictures_are_resized_where_patches_do_not_fit(size: tuple[int, int], expected: tuple[int, int] | None) -> None:
-    height, width = fitting(*size, least=129)
+    height, width = fitting(*size, min_patches=129)
     assert 129 <= patches(height, width) <= 500
     assert abs(height / width - size[0] / size[1]) < 0.02
     if expected is not None:

@@ -53,7 +53,7 @@ def test_labels_become_train_ids() -> None:
 def test_with_every_pixel_kept_it_is_plain_cross_entropy() -> None:
     logits, ids = logits_and_ids()
     expected = functional.cross_entropy(logits, ids, ignore_index=255)
-    torch.testing.assert_close(hard_cross_entropy(logits, ids, easy=1.0, least=0.0), expected)
+    torch.testing.assert_close(hard_cross_entropy(logits, ids, easy=1.0, min_share=0.0), expected)
 
 
 def test_only_hard_pixels_count() -> None:
@@ -61,7 +61,7 @@ def test_only_hard_pixels_count() -> None:
     right = probabilities(logits, ids)
     hard = right[right < 0.3]
     assert 0 < len(hard) < len(right)
-    loss = hard_cross_entropy(logits, ids, easy=0.3, least=0.0)
+    loss = hard_cross_entropy(logits, ids, easy=0.3, min_share=0.0)
     torch.testing.assert_close(loss, -hard.log().mean())
 
 
@@ -69,14 +69,14 @@ def test_the_hardest_make_up_the_least_share() -> None:
     logits, ids = logits_and_ids()
     right = probabilities(logits, ids).sort().values
     count = math.ceil(0.25 * len(right))
-    loss = hard_cross_entropy(logits, ids, easy=1e-6, least=0.25)
+    loss = hard_cross_entropy(logits, ids, easy=1e-6, min_share=0.25)
     torch.testing.assert_close(loss, -right[:count].log().mean())
 
 
 def test_ignored_pixels_have_no_gradient() -> None:
     logits, ids = logits_and_ids()
     logits.requires_grad_(True)
-    hard_cross_entropy(logits, ids, easy=1.0, least=0.1).backward()
+    hard_cross_entropy(logits, ids, easy=1.0, min_share=0.1).backward()
     assert logits.grad is not None
     ignored = (ids == 255).unsqueeze(1).expand_as(logits)
     assert float(logits.grad[ignored].abs().max()) == 0
@@ -86,7 +86,7 @@ def test_ignored_pixels_have_no_gradient() -> None:
 def test_pictures_without_a_class_cost_nothing() -> None:
     logits, ids = logits_and_ids()
     logits.requires_grad_(True)
-    loss = hard_cross_entropy(logits, torch.full_like(ids, 255), easy=0.9, least=0.1)
+    loss = hard_cross_entropy(logits, torch.full_like(ids, 255), easy=0.9, min_share=0.1)
     loss.backward()
     assert float(loss.detach()) == 0 and logits.grad is not None and float(logits.grad.abs().max()) == 0
 
@@ -137,8 +137,8 @@ def test_weights_make_a_mean_of_classes_as_they_say() -> None:
     logits[:, 0] = 1.0
     common, rare = -math.log(math.e / (math.e + 1)), -math.log(1 / (math.e + 1))
 
-    loss = hard_cross_entropy(logits, ids, easy=1.0, least=0.0, weights=(1.0, 3.0))
-    ignored = hard_cross_entropy(logits, torch.full_like(ids, 255), easy=1.0, least=0.0, weights=(1.0, 3.0))
+    loss = hard_cross_entropy(logits, ids, easy=1.0, min_share=0.0, weights=(1.0, 3.0))
+    ignored = hard_cross_entropy(logits, torch.full_like(ids, 255), easy=1.0, min_share=0.0, weights=(1.0, 3.0))
 
     assert float(loss) == pytest.approx((3 * common + 3 * rare) / 6)
     assert float(ignored) == 0

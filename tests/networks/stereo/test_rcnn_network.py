@@ -137,9 +137,9 @@ def test_proposals_must_survive_on_both_sides() -> None:
     places = torch.tensor([[10.0, 10, 49, 49], [10.0, 10, 49, 49], [100.0, 10, 139, 49]])
     codes = torch.zeros(3, 6)
     codes[1, 0] = 2.0
-    left, right = propose(torch.tensor([0.9, 0.8, 0.7]), codes, places, (64, 200), pre_nms_top_n=3, most=3)
+    left, right = propose(torch.tensor([0.9, 0.8, 0.7]), codes, places, (64, 200), pre_nms_top_n=3, max_pairs=3)
     assert left.tolist() == [[10, 10, 50, 50], [100, 10, 140, 50]] and torch.equal(left, right)
-    limited, _ = propose(torch.tensor([0.9, 0.8, 0.95]), codes, places, (64, 200), pre_nms_top_n=3, most=1)
+    limited, _ = propose(torch.tensor([0.9, 0.8, 0.95]), codes, places, (64, 200), pre_nms_top_n=3, max_pairs=1)
     assert limited.tolist() == [[100, 10, 140, 50]]
 
 

@@ -37,7 +37,7 @@ def test_random_patches_have_the_sizes_and_follow_the_seed() -> None:
 
 def test_both_are_measured_on_the_same_evenly_spaced_samples() -> None:
     scenes: Any = Scenes()
-    found: Any = compared(scenes, None, None, PATCHES, 0, most=4)  # type: ignore[arg-type]
+    found: Any = compared(scenes, None, None, PATCHES, 0, max_samples=4)  # type: ignore[arg-type]
     assert scenes.chosen == [0, 3, 6, 9]
     assert found["samples"] == 4
     assert found["patch"] == 1.0

@@ -105,7 +105,7 @@ def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:
     return min(reversed(names), key=lambda name: maps[name].shape[1] * maps[name].shape[2])
 
 
-def spread(items: Sequence[Any], most: int) -> Iterator[Any]:
-    """Yields at most `most` items of a sequence, evenly spaced, starting with the first."""
-    count = min(most, len(items))
+def spread(items: Sequence[Any], max_count: int) -> Iterator[Any]:
+    """Yields at most `max_count` items of a sequence, evenly spaced, starting with the first."""
+    count = min(max_count, len(items))
     return (items[index * len(items) // count] for index in range(count))
