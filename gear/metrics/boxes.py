@@ -12,56 +12,58 @@ MAX_CORNERS = 8
 """Largest number of corners that the intersection of two rectangles can have."""
 
 
-def intersections_px2(a: Array, b: Array) -> Array:
+def intersections_px2(boxes: Array, other_boxes: Array) -> Array:
     """The (N, M) intersection areas, in square pixels, of (N, 4) boxes and (M, 4) boxes (left, top, right, bottom)."""
-    low = np.maximum(a[:, None, :2], b[None, :, :2])
-    high = np.minimum(a[:, None, 2:], b[None, :, 2:])
+    low = np.maximum(boxes[:, None, :2], other_boxes[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], other_boxes[None, :, 2:])
     return np.asarray(np.prod(np.clip(high - low, 0, None), axis=-1))
 
 
-def iou_2d(a: Array, b: Array) -> Array:
+def iou_2d(boxes: Array, other_boxes: Array) -> Array:
     """The (N, M) intersection over union of (N, 4) boxes and (M, 4) boxes (left, top, right, bottom)."""
-    shared = intersections_px2(a, b)
-    return _over(shared, _areas(a)[:, None] + _areas(b)[None] - shared)
+    shared = intersections_px2(boxes, other_boxes)
+    return _over(shared, _areas(boxes)[:, None] + _areas(other_boxes)[None] - shared)
 
 
-def share_of_first(a: Array, b: Array) -> Array:
-    """The (N, M) shares of each box of `a` that lie inside each box of `b`, 0..1; (N, 4) and (M, 4) boxes (left,
-    top, right, bottom).
+def intersection_over_first(boxes: Array, other_boxes: Array) -> Array:
+    """The (N, M) shares of each box of `boxes` that lie inside each box of `other_boxes`, 0..1; (N, 4) and (M, 4) boxes
+    (left, top, right, bottom).
     """
-    return _over(intersections_px2(a, b), np.broadcast_to(_areas(a)[:, None], (len(a), len(b))))
+    return _over(
+        intersections_px2(boxes, other_boxes), np.broadcast_to(_areas(boxes)[:, None], (len(boxes), len(other_boxes)))
+    )
 
 
-def iou_ground_and_space(a: Array, b: Array) -> tuple[Array, Array]:
+def iou_ground_and_space(boxes: Array, other_boxes: Array) -> tuple[Array, Array]:
     """Computes the intersection over union of all pairs of KITTI's 3D boxes, on the ground and in space.
 
     Args:
-        a, b: (N, 7) and (M, 7) boxes: height, width, length, x, y, z of the middle of the bottom face, and rotation_y,
-            in the camera's frame with y down.
+        boxes, other_boxes: (N, 7) and (M, 7) boxes: height, width, length, x, y, z of the middle of the bottom face,
+            and rotation_y, in the camera's frame with y down.
 
     Returns:
         (N, M) intersection over union of the footprints, and of the volumes.
     """
-    shared_m2 = footprint_intersections_m2(a, b)
-    ground_a, ground_b = a[:, 1] * a[:, 2], b[:, 1] * b[:, 2]
+    shared_m2 = footprint_intersections_m2(boxes, other_boxes)
+    ground_a, ground_b = boxes[:, 1] * boxes[:, 2], other_boxes[:, 1] * other_boxes[:, 2]
     ground = _over(shared_m2, ground_a[:, None] + ground_b[None] - shared_m2)
-    bottom = np.minimum(a[:, None, 4], b[None, :, 4])
-    top = np.maximum((a[:, 4] - a[:, 0])[:, None], (b[:, 4] - b[:, 0])[None])
+    bottom = np.minimum(boxes[:, None, 4], other_boxes[None, :, 4])
+    top = np.maximum((boxes[:, 4] - boxes[:, 0])[:, None], (other_boxes[:, 4] - other_boxes[:, 0])[None])
     shared_m3 = shared_m2 * np.clip(bottom - top, 0, None)
-    volume = (ground_a * a[:, 0])[:, None] + (ground_b * b[:, 0])[None] - shared_m3
+    volume = (ground_a * boxes[:, 0])[:, None] + (ground_b * other_boxes[:, 0])[None] - shared_m3
     return ground, _over(shared_m3, volume)
 
 
-def footprint_intersections_m2(a: Array, b: Array) -> Array:
+def footprint_intersections_m2(boxes: Array, other_boxes: Array) -> Array:
     """The (N, M) intersection areas, in square metres, of the footprints of (N, 7) and (M, 7) KITTI boxes (height,
     width, length, x, y, z, rotation_y).
     """
-    shared = np.zeros((len(a), len(b)))
-    reach = (np.hypot(a[:, 1], a[:, 2])[:, None] + np.hypot(b[:, 1], b[:, 2])[None]) / 2
-    near = np.hypot(a[:, None, 3] - b[None, :, 3], a[:, None, 5] - b[None, :, 5]) < reach
+    shared = np.zeros((len(boxes), len(other_boxes)))
+    reach = (np.hypot(boxes[:, 1], boxes[:, 2])[:, None] + np.hypot(other_boxes[:, 1], other_boxes[:, 2])[None]) / 2
+    near = np.hypot(boxes[:, None, 3] - other_boxes[None, :, 3], boxes[:, None, 5] - other_boxes[None, :, 5]) < reach
     first, second = np.nonzero(near)
     if first.size:
-        shared[first, second] = _convex_intersections(footprints(a)[first], footprints(b)[second])
+        shared[first, second] = _convex_intersections(footprints(boxes)[first], footprints(other_boxes)[second])
     return shared
 
 

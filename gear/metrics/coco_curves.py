@@ -28,13 +28,13 @@ class Matches:
         owner: (D,) index of the picture of each of the D detections.
         hit: (T, D) whether the detection matches a label, for each of T IoU thresholds.
         counts: (T, D) whether the detection counts, that is, is not ignored.
-        wanted: (N,) number of labels in each of N pictures that a detector should find.
+        label_counts: (N,) number of labels in each of N pictures that a detector should find.
     """
 
     owner: npt.NDArray[np.int64]
     hit: npt.NDArray[np.bool_]
     counts: npt.NDArray[np.bool_]
-    wanted: npt.NDArray[np.int64]
+    label_counts: npt.NDArray[np.int64]
 
 
 def matches(evaluation: Any) -> dict[int, Matches]:
@@ -47,28 +47,28 @@ def matches(evaluation: Any) -> dict[int, Matches]:
     for index, category in enumerate(parameters.catIds):
         first = index * areas * pictures
         rows = [(n, row) for n, row in enumerate(evaluation.evalImgs[first : first + pictures]) if row is not None]
-        wanted = np.zeros(pictures, dtype=np.int64)
+        label_counts = np.zeros(pictures, dtype=np.int64)
         for number, row in rows:
-            wanted[number] = int(np.sum(np.asarray(row["gtIgnore"]) == 0))
-        if wanted.any():
-            found[category] = _gathered(rows, wanted, parameters.maxDets[-1], len(parameters.iouThrs))
+            label_counts[number] = int(np.sum(np.asarray(row["gtIgnore"]) == 0))
+        if label_counts.any():
+            found[category] = _gathered(rows, label_counts, parameters.maxDets[-1], len(parameters.iouThrs))
     return found
 
 
-def _gathered(rows: list[tuple[int, Any]], wanted: npt.NDArray[np.int64], most: int, overlaps: int) -> Matches:
+def _gathered(rows: list[tuple[int, Any]], label_counts: npt.NDArray[np.int64], most: int, overlaps: int) -> Matches:
     scores = np.concatenate([np.asarray(row["dtScores"])[:most] for _, row in rows])
     owner = np.concatenate([np.full(len(row["dtScores"][:most]), number, dtype=np.int64) for number, row in rows])
     hit = np.concatenate([np.asarray(row["dtMatches"])[:, :most].reshape(overlaps, -1) for _, row in rows], axis=1) > 0
     ignored = np.concatenate([np.asarray(row["dtIgnore"])[:, :most].reshape(overlaps, -1) for _, row in rows], axis=1)
     surest = np.argsort(-scores, kind="stable")
-    return Matches(owner=owner[surest], hit=hit[:, surest], counts=ignored[:, surest] == 0, wanted=wanted)
+    return Matches(owner=owner[surest], hit=hit[:, surest], counts=ignored[:, surest] == 0, label_counts=label_counts)
 
 
 def average_precision(found: Matches, weights: npt.NDArray[np.int64]) -> Array:
     """The (T,) average precision at 101 recalls for T IoU thresholds. Picture i counts `weights[i]` times; NaN if
     no label counts.
     """
-    total = int(weights @ found.wanted)
+    total = int(weights @ found.label_counts)
     if not total:
         return np.full(len(found.hit), np.nan)
     each = weights[found.owner] * found.counts
@@ -89,7 +89,7 @@ def resampled(found: Sequence[Matches], draws: Draws) -> Array:
     values = np.full((len(draws), len(found), len(found[0].hit) if found else 1), np.nan)
     for row, drawn in enumerate(draws):
         for column, one in enumerate(found):
-            values[row, column] = average_precision(one, np.bincount(drawn, minlength=len(one.wanted)))
+            values[row, column] = average_precision(one, np.bincount(drawn, minlength=len(one.label_counts)))
     return values
 
 

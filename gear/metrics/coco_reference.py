@@ -39,7 +39,7 @@ class TallObjects(CocoEvaluator[SampleT]):
         `instances_<category>`, the number of instances.
         """
         found = self._found()
-        counts = {name: int(one.wanted.sum()) if (one := found.get(name)) else 0 for name in CATEGORIES}
+        counts = {name: int(one.label_counts.sum()) if (one := found.get(name)) else 0 for name in CATEGORIES}
         values = {
             name: float(average_precision(found[name], np.ones(len(self.pictures), dtype=np.int64))[0])
             if counts[name] >= MIN_INSTANCES
@@ -54,7 +54,7 @@ class TallObjects(CocoEvaluator[SampleT]):
         """The metrics `ap50` and `ap50_<category>` of R resampled datasets, (R,) each. The categories with at
         least 50 instances in the whole dataset count.
         """
-        found = {name: one for name, one in self._found().items() if int(one.wanted.sum()) >= MIN_INSTANCES}
+        found = {name: one for name, one in self._found().items() if int(one.label_counts.sum()) >= MIN_INSTANCES}
         values = resampled(list(found.values()), draws)[:, :, 0]
         return {"ap50": known_mean(values, (1,)), **{f"ap50_{name}": values[:, i] for i, name in enumerate(found)}}
 

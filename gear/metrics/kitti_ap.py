@@ -167,7 +167,7 @@ def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:
     Row r of the (R, N) draws lists the picture indices of dataset r. Every picture is matched only once, at all
     thresholds that occur in any draw.
     """
-    wanted = np.array([int((picture.label_state == 0).sum()) for picture in chosen])
+    label_counts = np.array([int((picture.label_state == 0).sum()) for picture in chosen])
     scores = [(score, number) for number, picture in enumerate(chosen) for score in matched_scores(picture)]
     scores.sort(reverse=True)
     ordered, owners = np.array([s for s, _ in scores]), np.array([n for _, n in scores], dtype=np.int64)
@@ -177,7 +177,7 @@ def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:
     values = np.full(len(draws), np.nan)
     for row, drawn in enumerate(draws):
         weights = np.bincount(drawn, minlength=len(chosen))
-        total = int(weights @ wanted)
+        total = int(weights @ label_counts)
         if not total:
             continue
         drawn_scores = np.repeat(ordered, weights[owners]) if len(ordered) else ordered
@@ -191,11 +191,11 @@ def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:
 
 def curves(chosen: Sequence[Chosen]) -> tuple[Array, Array]:
     """The (41,) precision and the (41,) orientation similarity at recalls 0, 1/40, …, 1; NaN if no label counts."""
-    wanted = sum(int((picture.label_state == 0).sum()) for picture in chosen)
-    if not wanted:
+    label_count = sum(int((picture.label_state == 0).sum()) for picture in chosen)
+    if not label_count:
         return np.full(STEPS + 1, np.nan), np.full(STEPS + 1, np.nan)
     scores = sorted((score for picture in chosen for score in matched_scores(picture)), reverse=True)
-    thresholds = recall_thresholds(scores, wanted)
+    thresholds = recall_thresholds(scores, label_count)
     total = Counts(tp=np.zeros(1), fp=np.zeros(1), fn=np.zeros(1), similarity=np.zeros(1))
     if len(thresholds):
         parts = [count(picture, thresholds) for picture in chosen]
@@ -213,10 +213,10 @@ def perfect_curve(chosen: Iterable[Chosen]) -> Array:
     """The (41,) precision at recalls 0, 1/40, …, 1 that perfect detections would reach; below 1 at the end for
     fewer than 41 labels.
     """
-    wanted = sum(int((picture.label_state == 0).sum()) for picture in chosen)
-    if not wanted:
+    label_count = sum(int((picture.label_state == 0).sum()) for picture in chosen)
+    if not label_count:
         return np.full(STEPS + 1, np.nan)
-    return _monotone(np.ones(len(recall_thresholds(range(wanted, 0, -1), wanted))))
+    return _monotone(np.ones(len(recall_thresholds(range(label_count, 0, -1), label_count))))
 
 
 def recall_thresholds(scores: Sequence[float], label_count: int) -> Array:

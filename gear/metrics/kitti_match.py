@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.formats.kitti_object import KittiLabel, to_edge_pixels
-from gear.metrics.boxes import iou_2d, iou_ground_and_space, share_of_first
+from gear.metrics.boxes import intersection_over_first, iou_2d, iou_ground_and_space
 from gear.values.geometry import Array
 from gear.values.ground_truth import BoxPx
 from gear.values.picture_objects import PictureDetection
@@ -114,7 +114,7 @@ def is_in_place(labels: Sequence[KittiLabel], detections: Sequence[KittiLabel]) 
 
 def _largest_share(boxes_px: Array, regions_px: Array) -> Array:
     """(N,) largest share of each box that lies in one region."""
-    return np.asarray(share_of_first(boxes_px, regions_px).max(axis=1, initial=0.0))
+    return np.asarray(intersection_over_first(boxes_px, regions_px).max(axis=1, initial=0.0))
 
 
 def _boxes_px(labels: Sequence[KittiLabel]) -> Array:
@@ -138,7 +138,8 @@ class Chosen:
         scores: (detections,) scores.
         overlaps: (labels, detections) intersections over union.
         angle_gain: (labels, detections) (1 + cos of the difference of alpha) / 2.
-        excused: (detections,) whether the detection lies in a DontCare region or an ignored box, and is no false alarm.
+        is_ignored: (detections,) whether the detection lies in a DontCare region or an ignored box, and is no false
+            alarm.
         min_overlap: smallest overlap of a match.
     """
 
@@ -147,7 +148,7 @@ class Chosen:
     scores: Array
     overlaps: Array
     angle_gain: Array
-    excused: Bools
+    is_ignored: Bools
     min_overlap: float
 
 
@@ -199,7 +200,7 @@ def choose(
         overlaps=picture.overlaps[overlap],
         angle_gain=np.asarray((1 + np.cos(label_alpha[:, None] - found_alpha[None])) / 2),
         # DontCare regions have no place in space, so they excuse in the picture alone.
-        excused=((picture.in_dont_care > MIN_OVERLAP[kind]) & (overlap == "2d"))
+        is_ignored=((picture.in_dont_care > MIN_OVERLAP[kind]) & (overlap == "2d"))
         | (picture.in_ignored > MIN_OVERLAP[kind]),
         min_overlap=MIN_OVERLAP[kind] if min_overlap is None else min_overlap,
     )
@@ -256,6 +257,6 @@ def count(chosen: Chosen, thresholds: Array) -> Counts:
             counts.tp += has_proper
             counts.fn += ~has_any
             counts.similarity[has_proper] += chosen.angle_gain[i, best[has_proper]]
-    wrong = kept & ~taken & (chosen.detection_state == 0)[None] & ~chosen.excused[None]
+    wrong = kept & ~taken & (chosen.detection_state == 0)[None] & ~chosen.is_ignored[None]
     counts.fp += wrong.sum(axis=1)
     return counts

@@ -21,7 +21,7 @@ from typing import cast
 
 import numpy as np
 
-from gear.metrics.boxes import iou_2d, share_of_first
+from gear.metrics.boxes import intersection_over_first, iou_2d
 from gear.metrics.patch_distance import PatchArea
 from gear.metrics.single_picture import MIN_OVERLAP, SURE
 from gear.values.geometry import Array
@@ -65,11 +65,11 @@ def outcomes(picture: PictureObjects, patch: PatchArea) -> PictureOutcomes:
     for detection, thing in fitting.items():
         is_here = picture.is_in_place is None or picture.is_in_place[thing, sure[detection]]
         roles[detection] = "found" if is_here else "moved"
-    is_excused = share_of_first(boxes_px, _boxes(picture.ignored_px)).max(axis=1, initial=0.0) >= MIN_OVERLAP
+    is_ignored = intersection_over_first(boxes_px, _boxes(picture.ignored_px)).max(axis=1, initial=0.0) >= MIN_OVERLAP
     for detection in range(len(found)):
         if detection not in roles:
             is_double = overlaps[detection].max(initial=0.0) >= MIN_OVERLAP
-            roles[detection] = "duplicate" if is_double else "ignored" if is_excused[detection] else "background"
+            roles[detection] = "duplicate" if is_double else "ignored" if is_ignored[detection] else "background"
     explained = {thing: detection for detection, thing in (fitting | wrong | near).items()}
     return PictureOutcomes(
         objects=tuple(
@@ -82,7 +82,7 @@ def outcomes(picture: PictureObjects, patch: PatchArea) -> PictureOutcomes:
                 box_px=one.box_px,
                 score=one.score,
                 role=roles[number],
-                is_false_alarm=number not in fitting and not is_excused[number],
+                is_false_alarm=number not in fitting and not is_ignored[number],
                 patch=patch.distance(one.box_px),
             )
             for number, one in enumerate(found)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gear.metrics.boxes import iou_2d, share_of_first
+from gear.metrics.boxes import intersection_over_first, iou_2d
 from gear.values.geometry import Array
 
 SURE = 0.5
@@ -58,13 +58,13 @@ def single_metrics(labels: Boxes, detections: Boxes, ignored_px: Array, low_px: 
     sure = np.flatnonzero(detections.weight >= SURE)
     sure = sure[np.argsort(-detections.weight[sure], kind="stable")]
     overlaps = iou_2d(detections.box_px, labels.box_px)
-    excused = share_of_first(detections.box_px, ignored_px).max(axis=1, initial=0.0) >= MIN_OVERLAP
-    excused |= detections.box_px[:, 3] - detections.box_px[:, 1] < low_px
+    is_ignored = intersection_over_first(detections.box_px, ignored_px).max(axis=1, initial=0.0) >= MIN_OVERLAP
+    is_ignored |= detections.box_px[:, 3] - detections.box_px[:, 1] < low_px
     taken, alarms = np.zeros(len(labels.kind), dtype=np.bool_), 0
     for index in sure:
         fits = np.where((labels.kind == detections.kind[index]) & ~taken, overlaps[index], 0.0)
         if fits.max(initial=0.0) >= MIN_OVERLAP:
             taken[int(np.argmax(fits))] = True
-        elif not excused[index]:
+        elif not is_ignored[index]:
             alarms += 1
     return {"found_share": float(taken.mean()) if len(taken) else float("nan"), "false_alarms": float(alarms)}

@@ -4,7 +4,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gear.metrics.boxes import footprints, iou_2d, iou_ground_and_space, share_of_first
+from gear.metrics.boxes import footprints, intersection_over_first, iou_2d, iou_ground_and_space
 
 
 def boxes(seed: int, count: int) -> np.ndarray:
@@ -63,7 +63,7 @@ def test_the_front_points_where_rotation_y_says() -> None:
 def test_upright_boxes() -> None:
     a, b = np.array([[0.0, 0, 10, 10]]), np.array([[5.0, 0, 15, 10], [20, 20, 30, 30], [2, 2, 4, 4]])
     np.testing.assert_allclose(iou_2d(a, b), [[1 / 3, 0, 0.04]])
-    np.testing.assert_allclose(share_of_first(b, a), [[0.5], [0], [1]])
+    np.testing.assert_allclose(intersection_over_first(b, a), [[0.5], [0], [1]])
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -78,7 +78,7 @@ def test_upright_boxes_overlap_as_polygons_do(seed: int) -> None:
             first, second = shapely.box(*one), shapely.box(*two)
             shared = first.intersection(second).area
             assert iou_2d(a, b)[i, j] == pytest.approx(shared / first.union(second).area, abs=1e-9)
-            assert share_of_first(a, b)[i, j] == pytest.approx(shared / first.area, abs=1e-9)
+            assert intersection_over_first(a, b)[i, j] == pytest.approx(shared / first.area, abs=1e-9)
 
 
 def test_nothing_overlaps_nothing() -> None:

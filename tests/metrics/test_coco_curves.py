@@ -97,8 +97,8 @@ def test_matches_are_read_by_category_from_the_first_range_of_areas() -> None:
     assert car.owner.tolist() == [0, 1, 0], "surest first: 0.9, 0.7, 0.5; the third of a picture is over the limit"
     assert car.hit.tolist() == [[True, True, False], [False, False, False]]
     assert car.counts.tolist() == [[True, True, False], [True, True, False]]
-    assert car.wanted.tolist() == [1, 2]
-    assert truck.owner.tolist() == [1] and truck.wanted.tolist() == [0, 2]
+    assert car.label_counts.tolist() == [1, 2]
+    assert truck.owner.tolist() == [1] and truck.label_counts.tolist() == [0, 2]
 
 
 def test_equal_scores_keep_the_order_of_the_pictures() -> None:

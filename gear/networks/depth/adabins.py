@@ -51,10 +51,10 @@ class AdaBins(DepthNetwork):
         """The two losses of the AdaBins paper: scale-invariant error of the depth, and Chamfer distance between
         bin centres and true depths.
         """
-        cap_m = self.options.max_depth_m
+        max_depth_m = self.options.max_depth_m
         return {
-            "silog": adabins_silog(outputs[DEPTH], depth_m, cap_m=cap_m),
-            "bins": CHAMFER_WEIGHT * bins_chamfer(outputs[BINS], depth_m, cap_m=cap_m),
+            "silog": adabins_silog(outputs[DEPTH], depth_m, max_depth_m=max_depth_m),
+            "bins": CHAMFER_WEIGHT * bins_chamfer(outputs[BINS], depth_m, max_depth_m=max_depth_m),
         }
 
     def taps(self) -> Mapping[str, nn.Module]:

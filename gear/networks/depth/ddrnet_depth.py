@@ -65,11 +65,11 @@ class DdrnetDepth(DepthNetwork):
 
         The scale-invariant error is dominated by outliers; the mean relative error is robust to them.
         """
-        cap_m = self.options.max_depth_m
+        max_depth_m = self.options.max_depth_m
         return {
-            "silog": silog(outputs[DEPTH], depth_m, cap_m=cap_m),
-            "log_l1": log_l1(outputs[DEPTH], depth_m, cap_m=cap_m),
-            "rms": root_mean_square(outputs[DEPTH], depth_m, cap_m=cap_m) / RMS_UNIT_M,
+            "silog": silog(outputs[DEPTH], depth_m, max_depth_m=max_depth_m),
+            "log_l1": log_l1(outputs[DEPTH], depth_m, max_depth_m=max_depth_m),
+            "rms": root_mean_square(outputs[DEPTH], depth_m, max_depth_m=max_depth_m) / RMS_UNIT_M,
         }
 
     def taps(self) -> Mapping[str, nn.Module]:

@@ -44,7 +44,7 @@ class Glpn(DepthNetwork):
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
         """The scale-invariant logarithmic loss of the GLPDepth paper (equation 3)."""
-        return {"silog": silog(outputs[DEPTH], depth_m, cap_m=self.options.max_depth_m)}
+        return {"silog": silog(outputs[DEPTH], depth_m, max_depth_m=self.options.max_depth_m)}
 
     def taps(self) -> Mapping[str, nn.Module]:
         """The modules whose outputs are feature maps: `stem` at 1/4 of the picture's sides, `trunk` at 1/32 and

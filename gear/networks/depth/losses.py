@@ -16,20 +16,25 @@ LEAST_M = 1e-3
 LEAST_SQUARE = 1e-12
 """Value added to the argument of a square root; it keeps the gradient finite where the error is 0."""
 
-CAP_M = 80.0
+MAX_DEPTH_M = 80.0
 """Greatest true depth that the losses use by default, in metres, as in most training and evaluation on KITTI."""
 
 
-def known(depth_m: Tensor, cap_m: float | None = CAP_M) -> Tensor:
-    """The (B, H, W) bool mask of the pixels whose true depth is known, above 1 mm and at most `cap_m` metres (None
-    for no limit).
+def valid_mask(depth_m: Tensor, max_depth_m: float | None = MAX_DEPTH_M) -> Tensor:
+    """The (B, H, W) bool mask of the pixels whose true depth is known, above 1 mm and at most `max_depth_m` metres
+    (None for no limit).
     """
     is_known = torch.isfinite(depth_m) & (depth_m > LEAST_M)
-    return is_known if cap_m is None else is_known & (depth_m <= cap_m)
+    return is_known if max_depth_m is None else is_known & (depth_m <= max_depth_m)
 
 
 def silog(
-    predicted_m: Tensor, depth_m: Tensor, *, balance: float = 0.5, scale: float = 1.0, cap_m: float | None = CAP_M
+    predicted_m: Tensor,
+    depth_m: Tensor,
+    *,
+    balance: float = 0.5,
+    scale: float = 1.0,
+    max_depth_m: float | None = MAX_DEPTH_M,
 ) -> Tensor:
     """Scale-invariant logarithmic error: scale * sqrt(mean(g^2) - balance * mean(g)^2).
 
@@ -42,9 +47,9 @@ def silog(
         depth_m: (B, H, W) ground truth, NaN where unknown.
         balance: 0 gives the root mean square of g; 1 ignores an error that is the same factor everywhere.
         scale: factor of the result.
-        cap_m: greatest true depth that counts; None for no limit.
+        max_depth_m: greatest true depth that counts; None for no limit.
     """
-    mask = known(depth_m, cap_m)
+    mask = valid_mask(depth_m, max_depth_m)
     count = mask.sum().clamp_min(1)
     errors = _log_errors(predicted_m, depth_m, mask)
     mean = errors.sum() / count
@@ -53,27 +58,28 @@ def silog(
     return loss
 
 
-def adabins_silog(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
+def adabins_silog(predicted_m: Tensor, depth_m: Tensor, *, max_depth_m: float | None = MAX_DEPTH_M) -> Tensor:
     """AdaBins' pixel loss: 10 * sqrt(variance + 0.15 * mean^2) of the differences between logarithms of depth.
 
-    Depths are (B, H, W) metres, NaN where the truth is unknown. `cap_m` is the greatest true depth that
+    Depths are (B, H, W) metres, NaN where the truth is unknown. `max_depth_m` is the greatest true depth that
     counts; None for no limit.
     """
-    return silog(predicted_m, depth_m, balance=0.85, scale=10.0, cap_m=cap_m)
+    return silog(predicted_m, depth_m, balance=0.85, scale=10.0, max_depth_m=max_depth_m)
 
 
-def log_l1(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
+def log_l1(predicted_m: Tensor, depth_m: Tensor, *, max_depth_m: float | None = MAX_DEPTH_M) -> Tensor:
     """Mean absolute difference between the logarithms of depth, a relative error that is robust to outliers.
 
-    Depths are (B, H, W) metres, NaN where the truth is unknown. `cap_m` is the greatest true depth that
+    Depths are (B, H, W) metres, NaN where the truth is unknown. `max_depth_m` is the greatest true depth that
     counts; None for no limit.
     """
-    mask = known(depth_m, cap_m)
+    mask = valid_mask(depth_m, max_depth_m)
     return _log_errors(predicted_m, depth_m, mask).abs().sum() / mask.sum().clamp_min(1)
 
 
-def root_mean_square(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float = CAP_M) -> Tensor:
-    """Root mean square error in metres; predictions beyond `cap_m` are set to `cap_m`, as in the evaluation.
+def root_mean_square(predicted_m: Tensor, depth_m: Tensor, *, max_depth_m: float = MAX_DEPTH_M) -> Tensor:
+    """Root mean square error in metres; predictions beyond `max_depth_m` are set to `max_depth_m`, as in the
+    evaluation.
 
     The metric is that of Eigen et al., NeurIPS 2014. Logarithmic losses give near pixels the most weight; this loss
     gives far pixels the most weight.
@@ -81,30 +87,32 @@ def root_mean_square(predicted_m: Tensor, depth_m: Tensor, *, cap_m: float = CAP
     Args:
         predicted_m: (B, H, W) predicted depth, above 0.
         depth_m: (B, H, W) ground truth, NaN where unknown.
-        cap_m: greatest true depth that counts, metres.
+        max_depth_m: greatest true depth that counts, metres.
     """
-    mask = known(depth_m, cap_m)
-    errors = torch.where(mask, predicted_m.clamp_max(cap_m) - torch.where(mask, depth_m, 0.0), 0.0)
+    mask = valid_mask(depth_m, max_depth_m)
+    errors = torch.where(mask, predicted_m.clamp_max(max_depth_m) - torch.where(mask, depth_m, 0.0), 0.0)
     mean = errors.square().sum() / mask.sum().clamp_min(1)
     loss: Tensor = (mean + LEAST_SQUARE).sqrt() - LEAST_SQUARE**0.5
     return loss
 
 
-def smooth_l1(predicted_m: Tensor, depth_m: Tensor, *, beta_m: float = 1.0, cap_m: float | None = CAP_M) -> Tensor:
+def smooth_l1(
+    predicted_m: Tensor, depth_m: Tensor, *, beta_m: float = 1.0, max_depth_m: float | None = MAX_DEPTH_M
+) -> Tensor:
     """Mean smooth L1 error in metres: quadratic below `beta_m`, linear above (Girshick, ICCV 2015).
 
     Args:
         predicted_m: (B, H, W) predicted depth, above 0.
         depth_m: (B, H, W) ground truth, NaN where unknown.
         beta_m: error at which the loss changes from quadratic to linear, metres.
-        cap_m: greatest true depth that counts; None for no limit.
+        max_depth_m: greatest true depth that counts; None for no limit.
     """
-    mask = known(depth_m, cap_m)
+    mask = valid_mask(depth_m, max_depth_m)
     target_m = torch.where(mask, depth_m, predicted_m.detach())
     return functional.smooth_l1_loss(predicted_m, target_m, beta=beta_m, reduction="sum") / mask.sum().clamp_min(1)
 
 
-def bins_chamfer(centres_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CAP_M) -> Tensor:
+def bins_chamfer(centres_m: Tensor, depth_m: Tensor, *, max_depth_m: float | None = MAX_DEPTH_M) -> Tensor:
     """Chamfer distance between the centres of depth bins and the true depths (Fan et al., CVPR 2017; AdaBins, CVPR
     2021, equation 5).
 
@@ -115,10 +123,10 @@ def bins_chamfer(centres_m: Tensor, depth_m: Tensor, *, cap_m: float | None = CA
     Args:
         centres_m: (B, bins) centres in any order.
         depth_m: (B, H, W) ground truth, NaN where unknown.
-        cap_m: greatest true depth that counts; None for no limit.
+        max_depth_m: greatest true depth that counts; None for no limit.
     """
     terms = []
-    for centres, picture, mask in zip(centres_m, depth_m, known(depth_m, cap_m), strict=True):
+    for centres, picture, mask in zip(centres_m, depth_m, valid_mask(depth_m, max_depth_m), strict=True):
         if bool(mask.any()):
             depths = picture[mask].sort().values
             ordered = centres.sort().values

@@ -81,7 +81,7 @@ class FasterRcnnDetector(Detector):
 
         graph: Any = self.graph
         picture = pictures[VIEW]
-        maps = graph.backbone(self.seen(picture))
+        maps = graph.backbone(self.preprocess(picture))
         objectness, deltas = concat_box_prediction_layers(*graph.rpn.head(list(maps.values())))
         anchors = self.anchors(size_of(picture), [size_of(each) for each in maps.values()])
         size = torch.tensor(size_of(picture), device=self.device)

@@ -101,12 +101,12 @@ class Detector(Network):
         body = self.graph.get_submodule("backbone.body")
         return {name: body.get_submodule(name) for name in ("layer1", "layer2", "layer3", "layer4")}
 
-    def seen(self, pictures: Tensor) -> Tensor:
+    def preprocess(self, pictures: Tensor) -> Tensor:
         """The (B, 3, h, w) input of the graph: the pictures resized, normalised, and padded with zeros at the
         bottom and the right.
         """
         size = size_of(pictures)
-        inner, (height, width) = self.sizing.inner_px(size), self.seen_px(size)
+        inner, (height, width) = self.sizing.inner_px(size), self.input_px(size)
         pixels = self.normalise(pictures)
         if inner != size:
             pixels = functional.interpolate(
@@ -114,7 +114,7 @@ class Detector(Network):
             )
         return functional.pad(pixels, (0, width - inner[1], 0, height - inner[0]))
 
-    def seen_px(self, picture_px: Size) -> Size:
+    def input_px(self, picture_px: Size) -> Size:
         """Height and width, including the padding, of the graph's input for a picture of height and width
         `picture_px`.
         """
@@ -130,10 +130,10 @@ class Detector(Network):
         """
         from torchvision.models.detection.image_list import ImageList
 
-        shape = self.seen_px(picture_px)
-        seen = torch.empty((1, 0, *shape), device=self.device)
+        shape = self.input_px(picture_px)
+        network_input = torch.empty((1, 0, *shape), device=self.device)
         maps = [torch.empty((1, 0, *grid), device=self.device) for grid in grids]
-        found: Tensor = self.graph.get_submodule(self.generator)(ImageList(seen, [shape]), maps)[0]
+        found: Tensor = self.graph.get_submodule(self.generator)(ImageList(network_input, [shape]), maps)[0]
         return found
 
     def shrinkage(self, picture_px: Size) -> Tensor:

@@ -51,7 +51,7 @@ class RetinaNetDetector(Detector):
         input, and the picture's size.
         """
         picture = pictures[VIEW]
-        features = list(self.graph.get_submodule("backbone")(self.seen(picture)).values())
+        features = list(self.graph.get_submodule("backbone")(self.preprocess(picture)).values())
         outputs: dict[str, Tensor] = dict(self.graph.get_submodule("head")(features))
         anchors = self.anchors(size_of(picture), [size_of(each) for each in features])
         size = torch.tensor(size_of(picture), device=self.device)
@@ -101,7 +101,7 @@ class RetinaNetDetector(Detector):
         """Number of anchors of each feature map."""
         graph: Any = self.graph
         each = graph.anchor_generator.num_anchors_per_location()
-        height, width = (side // FIRST_STRIDE_PX for side in self.seen_px(picture_px))
+        height, width = (side // FIRST_STRIDE_PX for side in self.input_px(picture_px))
         counts = []
         for level in range(LEVELS):
             counts.append(height * width * each[level])

@@ -84,11 +84,11 @@ def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, 
     kind: Any = getattr(transformers, auto)
     # By default transformers would ask the user, and run the folder's code after a "y".
     common: dict[str, Any] = {"local_files_only": True, "trust_remote_code": False}
-    said = read_mapping(Path(options.folder) / "config.json")
-    described = _with_backbone(said)
+    stored = read_mapping(Path(options.folder) / "config.json")
+    described = _with_backbone(stored)
     config = (
         transformers.AutoConfig.from_pretrained(options.folder, **common)
-        if described == said
+        if described == stored
         else transformers.AutoConfig.for_model(**described)
     )
     if options.weights == FOLDER:
@@ -107,20 +107,20 @@ def _opened(options: FolderOptions, auto: str) -> tuple[nn.Module, Mapping[str, 
         return kind.from_config(config, dtype=torch.float32, trust_remote_code=False), {}
 
 
-def _with_backbone(said: Mapping[str, Any]) -> Mapping[str, Any]:
+def _with_backbone(config: Mapping[str, Any]) -> Mapping[str, Any]:
     """Converts a config.json in which a timm backbone is named next to its options to one in which it is described.
 
     transformers wrote DETRs in the first form before version 5; current versions would look the name up on the network.
     """
-    name, options = said.get("backbone"), said.get("backbone_kwargs", {})
-    if said.get("use_timm_backbone") is not True or said.get("backbone_config") is not None or not name:
-        return said
+    name, options = config.get("backbone"), config.get("backbone_kwargs", {})
+    if config.get("use_timm_backbone") is not True or config.get("backbone_config") is not None or not name:
+        return config
     if options is None:
-        return {key: value for key, value in said.items() if key != "backbone_kwargs"}
+        return {key: value for key, value in config.items() if key != "backbone_kwargs"}
     if not isinstance(options, dict) or "out_indices" not in options or options.keys() - OF_TIMM:
-        return said
-    kept = {key: value for key, value in said.items() if "backbone" not in key}
-    stride = {"output_stride": DILATED_STRIDE_PX} if said.get("dilation") else {}
+        return config
+    kept = {key: value for key, value in config.items() if "backbone" not in key}
+    stride = {"output_stride": DILATED_STRIDE_PX} if config.get("dilation") else {}
     of_timm = {OF_TIMM[key]: value for key, value in options.items()}
     return {**kept, "backbone_config": {"model_type": "timm_backbone", "backbone": name, **stride, **of_timm}}
 
@@ -154,14 +154,14 @@ def _refused(folder: Path, auto: str, error: Exception) -> GearError:
         )
     wanted = auto.removeprefix("AutoModelFor")
     return GearError(
-        f"{folder}: no network for {wanted}; see to config.json and model.safetensors there: {in_one_line(error)}"
+        f"{folder}: no network for {wanted}; check config.json and model.safetensors there: {in_one_line(error)}"
     )
 
 
 def in_one_line(error: Exception) -> str:
     """The type of an exception and the start of its message, in one line."""
-    said = " ".join(str(error).split())
-    return f"{type(error).__name__}: {said if len(said) <= SHOWN else said[:SHOWN] + '...'}"
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text if len(text) <= SHOWN else text[:SHOWN] + '...'}"
 
 
 def _check(graph: nn.Module, found: Mapping[str, Any], folder: Path) -> None:
@@ -178,7 +178,7 @@ def _check(graph: nn.Module, found: Mapping[str, Any], folder: Path) -> None:
     name = type(graph).__name__
     lost = sorted(key for key in found.get("missing_keys", ()) if not key.endswith(OPTIONAL))
     if lost:
-        raise GearError(f"{folder}: {len(lost)} weights of {name} are not there, such as {lost[0]}; see to config.json")
+        raise GearError(f"{folder}: {len(lost)} weights of {name} are not there, such as {lost[0]}; check config.json")
     other = sorted(found.get("mismatched_keys", ()))
     if other:
         key, given, wanted = other[0]

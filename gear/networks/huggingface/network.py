@@ -63,27 +63,28 @@ class FolderNetwork(Network):
         resizes = options.input_size == "processor"
         self.processor = read_processor(Path(options.folder), resizes=resizes, config=graph.config)
 
-    def seen(self, pictures: Mapping[str, Tensor]) -> Tensor:
+    def preprocess(self, pictures: Mapping[str, Tensor]) -> Tensor:
         """The (B, 3, h, w) input of the graph: the (B, 3, H, W) pictures in 0..1 after the image processor."""
         return self.processor.apply(pictures[VIEW])
 
-    def said(self, seen: Tensor, **labels: Any) -> Any:
+    def run_graph(self, network_input: Tensor, **labels: Any) -> Any:
         """Runs the graph (the network of transformers) and returns its raw output.
 
         Args:
-            seen: (B, 3, h, w) pictures after the image processor, as the method `seen` returns them.
+            network_input: (B, 3, h, w) pictures after the image processor, as the method `preprocess` returns them.
             **labels: labels, for graphs that compute their own losses.
 
         Raises:
             GearError: the graph fails, for example because sizes in config.json do not fit each other.
         """
         try:
-            return self.graph(pixel_values=seen, **labels)
+            return self.graph(pixel_values=network_input, **labels)
         except torch.OutOfMemoryError:
             raise
         except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError) as error:
             raise GearError(
-                f"{self.options.folder}: the network does not run on {seen.shape[3]} x {seen.shape[2]} pixels; see to "
+                f"{self.options.folder}: the network does not run on "
+                f"{network_input.shape[3]} x {network_input.shape[2]} pixels; check "
                 f"config.json and preprocessor_config.json there: {in_one_line(error)}"
             ) from error
 
@@ -115,12 +116,12 @@ class FolderNetwork(Network):
             GearError: no name matches, or the network's classes have no names.
         """
         config: Any = self.graph.config
-        theirs: dict[int, str] = config.id2label
-        if not all(isinstance(name, str) and 0 <= index < len(theirs) for index, name in theirs.items()):
+        native: dict[int, str] = config.id2label
+        if not all(isinstance(name, str) and 0 <= index < len(native) for index, name in native.items()):
             raise GearError(
-                f"{self.options.folder}/config.json: id2label must be names by number, from 0, got {theirs!r:.80}"
+                f"{self.options.folder}/config.json: id2label must be names by number, from 0, got {native!r:.80}"
             )
-        found, self.unmatched = match(theirs, known)
+        found, self.unmatched = match(native, known)
         if not found:
             names = ", ".join(self.unmatched[:10])
             raise GearError(f"{self.options.folder}: none of its classes is one of {whose} ({names})")
@@ -141,31 +142,31 @@ class FolderSegmenter(FolderNetwork):
         super().__init__(graph, options)
         train_id_of = {label.name: label.train_id for label in LABELS if label.is_evaluated}
         found = self.matched(train_id_of, "Cityscapes")
-        self._indexes = [[i for i, number in found.items() if number == train_id] for train_id in range(CLASSES)]
+        self._indices = [[i for i, number in found.items() if number == train_id] for train_id in range(CLASSES)]
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The output `logits` (B, 19, H, W) at the picture's size; channels are in the order of Cityscapes train
         ids.
         """
-        theirs = self.their_logits(self.seen(pictures)).float()
-        nothing = torch.full_like(theirs[:, 0], UNKNOWN_LOGIT)
-        ours = [theirs[:, indices].logsumexp(1) if indices else nothing for indices in self._indexes]
+        native = self.native_logits(self.preprocess(pictures)).float()
+        nothing = torch.full_like(native[:, 0], UNKNOWN_LOGIT)
+        ours = [native[:, indices].logsumexp(1) if indices else nothing for indices in self._indices]
         return {LOGITS: self.restored(torch.stack(ours, dim=1), pictures, "bilinear")}
 
-    def their_logits(self, seen: Tensor) -> Tensor:
+    def native_logits(self, network_input: Tensor) -> Tensor:
         """The (B, classes, h, w) logits over the network's own classes, before they are converted to Cityscapes'
         classes.
 
         Args:
-            seen: (B, 3, h, w) input of the graph, as the method `seen` returns it.
+            network_input: (B, 3, h, w) input of the graph, as the method `preprocess` returns it.
         """
-        logits: Tensor = self.said(seen).logits
+        logits: Tensor = self.run_graph(network_input).logits
         return logits
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         """The loss by name: the mean cross-entropy over the pixels whose true class the network has."""
         ids = train_ids(targets, self.device)
-        known = torch.tensor([train_id for train_id, indices in enumerate(self._indexes) if indices])
+        known = torch.tensor([train_id for train_id, indices in enumerate(self._indices) if indices])
         is_known = torch.isin(ids, known.to(self.device))
         each = functional.cross_entropy(outputs[LOGITS], ids.where(is_known, 0), reduction="none")
         return {"cross_entropy": (each * is_known).sum() / is_known.sum().clamp_min(1)}
@@ -198,12 +199,12 @@ class FolderDepth(FolderNetwork):
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The output `depth_m` (B, H, W) in metres, at the picture's size."""
-        said = self.said(self.seen(pictures)).predicted_depth.float()
-        said = self.restored(said[:, None], pictures, "bicubic")[:, 0]  # transformers uses bicubic interpolation too
+        raw = self.run_graph(self.preprocess(pictures)).predicted_depth.float()
+        raw = self.restored(raw[:, None], pictures, "bicubic")[:, 0]  # transformers uses bicubic interpolation too
         if self.options.inverse_scale:
-            inverse = self.options.inverse_scale * said + self.options.inverse_shift
-            said = 1 / inverse.clamp(min=1e-3)
-        return {DEPTH: said.clamp(min=NEAREST_M)}
+            inverse = self.options.inverse_scale * raw + self.options.inverse_shift
+            raw = 1 / inverse.clamp(min=1e-3)
+        return {DEPTH: raw.clamp(min=NEAREST_M)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         """The loss by name: the mean absolute difference between the logarithms of predicted and true depth, over
@@ -238,13 +239,13 @@ class FolderDetector(FolderNetwork):
         """The outputs `logits` (B, N, classes) and `pred_boxes` (B, N, 4), one entry for each of the N object
         queries.
         """
-        said = self.said(self.seen(pictures))
-        return {LOGITS: said.logits, BOXES: said.pred_boxes}
+        raw = self.run_graph(self.preprocess(pictures))
+        return {LOGITS: raw.logits, BOXES: raw.pred_boxes}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The input of `losses`: the graph's input and the picture's height and width."""
         size = torch.tensor(pictures[VIEW].shape[2:], device=self.device)
-        return {"seen": self.seen(pictures), PICTURE: size.expand(len(pictures[VIEW]), -1)}
+        return {"network_input": self.preprocess(pictures), PICTURE: size.expand(len(pictures[VIEW]), -1)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         """The set loss that transformers defines for this network, computed in float32.
@@ -254,7 +255,7 @@ class FolderDetector(FolderNetwork):
         height, width = outputs[PICTURE][0].tolist()
         labels = [self._labels(sample, torch.tensor([width, height] * 2)) for sample in targets]
         with autocast(self.device, self.options.precision):
-            return {"set_loss": self.said(outputs["seen"], labels=labels).loss}
+            return {"set_loss": self.run_graph(outputs["network_input"], labels=labels).loss}
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
         """Detections of COCO classes whose score is at least `score_threshold`, highest score first."""

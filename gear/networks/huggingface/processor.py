@@ -65,11 +65,11 @@ class Processor:
         rows, columns = self._margin(_size(pictures))
         if rows or columns:
             pictures = functional.pad(pictures, (columns, columns, rows, rows), mode="reflect")
-        seen: Tensor = Normalise(self.mean, self.std).to(pictures.device)(self._resized(pictures))
+        network_input: Tensor = Normalise(self.mean, self.std).to(pictures.device)(self._resized(pictures))
         if self.is_bgr:
-            seen = seen.flip(1)
-        top, bottom, left, right = self._filled(_size(seen))
-        return functional.pad(seen, (left, right, top, bottom))
+            network_input = network_input.flip(1)
+        top, bottom, left, right = self._filled(_size(network_input))
+        return functional.pad(network_input, (left, right, top, bottom))
 
     def restore(self, maps: Tensor, picture_px: Size, mode: str) -> Tensor:
         """Resamples maps from the size of the network's input to the size of the picture, and cuts margins off.
@@ -114,9 +114,9 @@ class Processor:
         rows, columns = (int(math.sqrt(side / 2) * 3) if self.has_margin else 0 for side in picture_px)
         return rows, columns
 
-    def _filled(self, seen_px: Size) -> tuple[int, int, int, int]:
+    def _filled(self, input_px: Size) -> tuple[int, int, int, int]:
         """Numbers of padded rows at the top and the bottom, and of padded columns at the left and the right."""
-        rows, columns = (-side % self.pads_to_px if self.pads_to_px else 0 for side in seen_px)
+        rows, columns = (-side % self.pads_to_px if self.pads_to_px else 0 for side in input_px)
         return rows // 2, rows - rows // 2, columns // 2, columns - columns // 2
 
 

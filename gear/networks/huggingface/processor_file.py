@@ -47,9 +47,9 @@ def read_processor(folder: Path, *, resizes: bool = True, config: object = None)
     needed_px = _patch_px(config) if model_type in IN_PATCHES else NEEDED_PX.get(model_type, 1)
     if not path.is_file():
         return Processor(multiple_px=needed_px, rounds_down=model_type == "glpn")
-    said = read_mapping(path)
-    name = family_of(said, model_type, path)
-    facts = _Facts(FAMILIES[name], said, path)
+    content = read_mapping(path)
+    name = family_of(content, model_type, path)
+    facts = _Facts(FAMILIES[name], content, path)
     facts.check_steps()
     return _processor(name, facts, needed_px, resizes=resizes)
 
@@ -76,10 +76,10 @@ class _Facts:
     wrong type.
     """
 
-    def __init__(self, family: Family, said: Mapping[str, Any], path: Path) -> None:
+    def __init__(self, family: Family, content: Mapping[str, Any], path: Path) -> None:
         self.family = family
-        self._said = said
-        self._all = family.facts(said)
+        self._content = content
+        self._all = family.facts(content)
         self._path = path
 
     def refuse(self, key: str, wanted: str) -> GearError:
@@ -145,11 +145,11 @@ class _Facts:
             if "longest_edge" in self.family.defaults["size"]:
                 edges["longest_edge"] = self.pixels("max_size") if "max_size" in self._all else DETR_LONGEST_PX
             return edges
-        said = {key: each for key, each in value.items() if each is not None} if isinstance(value, dict) else {}
-        is_known = said.keys() == {"height", "width"} or "shortest_edge" in said.keys() <= _EDGES
-        if not is_known or not all(_is_pixels(each) for each in said.values()):
+        content = {key: each for key, each in value.items() if each is not None} if isinstance(value, dict) else {}
+        is_known = content.keys() == {"height", "width"} or "shortest_edge" in content.keys() <= _EDGES
+        if not is_known or not all(_is_pixels(each) for each in content.values()):
             raise self.refuse("size", f"height and width, or shortest_edge, in whole pixels, 1 to {MOST_PX}")
-        return {key: int(each) for key, each in said.items()}
+        return {key: int(each) for key, each in content.items()}
 
 
 _EDGES = {"shortest_edge", "longest_edge"}
@@ -197,8 +197,8 @@ def _patch_px(config: object) -> int:
     """Side of the network's patches in pixels, of which the input's sides are multiples; 1 if the config states
     none.
     """
-    said = [getattr(each, "patch_size", None) for each in (config, getattr(config, "backbone_config", None))]
-    return math.lcm(*(int(each) for each in said if _is_pixels(each)))
+    content = [getattr(each, "patch_size", None) for each in (config, getattr(config, "backbone_config", None))]
+    return math.lcm(*(int(each) for each in content if _is_pixels(each)))
 
 
 def _divided(channels: Channels, scale: float) -> Channels:

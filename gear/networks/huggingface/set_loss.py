@@ -47,7 +47,7 @@ picture's sides (far outside).
 """
 
 
-def set_loss(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any) -> Any:
+def set_loss(loss: Callable[..., Any], device_type: str, *arguments: Any, **more: Any) -> Any:
     """Calls a loss of transformers in float32, whatever the precision of the network's output.
 
     Queries that lie mostly inside ignored objects and near no target are replaced by certain background far outside the
@@ -58,10 +58,10 @@ def set_loss(loss: Callable[..., Any], device_type: str, *said: Any, **more: Any
     Args:
         loss: loss function of transformers.
         device_type: type of the torch device, such as `cpu`.
-        *said: arguments of the loss.
+        *arguments: arguments of the loss.
         **more: keyword arguments of the loss.
     """
-    call = signature(loss).bind(*said, **more)
+    call = signature(loss).bind(*arguments, **more)
     given = call.arguments
     given.update({name: _float(value) for name, value in given.items()})
     with torch.autocast(device_type, enabled=False):

@@ -54,7 +54,7 @@ class _Made:
     Attributes:
         patches: the best patches in validation, or the last ones without validation.
         settings: settings of the attack, completed with the task's values.
-        seen: samples on which the patches were optimised.
+        optimised_on: samples on which the patches were optimised.
         objective: the objective that was maximised.
         held, held_objective: validation samples and the objective on them.
         recorder: monitor of the attack.
@@ -63,7 +63,7 @@ class _Made:
 
     patches: tuple[Patch, ...]
     settings: Any
-    seen: Scenes
+    optimised_on: Scenes
     objective: Objective
     held: Scenes
     held_objective: Objective
@@ -190,7 +190,7 @@ def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
             }
         names = ", ".join(one.found.spec.name for one in job.models)
         write_curves(root, f"{request.attack} on {names}", made.recorder.curves, made.recorder.judged)
-        write_samples(root, made.seen.pairs(made.patches))
+        write_samples(root, made.optimised_on.pairs(made.patches))
         write_patches(root, made.patches, facts)
         tidy(root)
     return AttackReport(out=root, patches=made.patches, facts=facts, made=True)
@@ -224,13 +224,13 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
         GearError: there are no samples.
     """
     cache, device = Cache[Prepared](CACHE_BYTES), device_name(network)
-    seen, held = (Scenes(group, job.compositor, device, cache) for group in (job.datasets, job.validation))
+    optimised_on, held = (Scenes(group, job.compositor, device, cache) for group in (job.datasets, job.validation))
     if job.spec.needs_gradients:
-        seen.check_adaptive(network, job.surfaces, derive_rng(job.seed, "adaptive"))
+        optimised_on.check_adaptive(network, job.surfaces, derive_rng(job.seed, "adaptive"))
     # Two objectives, because each caches the clean predictions of its samples by their index.
     make = product.objective if isinstance(product, WithObjective) else default_objective
-    settings = product.settings(seen.samples[0]) if isinstance(product, WithTaskOptions) else job.config
-    objective, held_objective = make(seen.samples[0]), make(seen.samples[0])
+    settings = product.settings(optimised_on.samples[0]) if isinstance(product, WithTaskOptions) else job.config
+    objective, held_objective = make(optimised_on.samples[0]), make(optimised_on.samples[0])
     recorder = Recorder(
         root=root,
         key=sha256(dump_json(plan)),
@@ -245,8 +245,8 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
     with blamed(job.found, "optimise"), traced(_asked(job), "forward"):
         last = product.optimise(
             network,
-            seen.samples,
-            seen.compositor,
+            optimised_on.samples,
+            optimised_on.compositor,
             budget=Budget(steps=job.steps, queries=job.queries),
             rng=derive_rng(job.seed, "attack", job.spec.name),
             monitor=recorder,
@@ -263,7 +263,7 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
     return _Made(
         patches=recorder.best or last,
         settings=settings,
-        seen=seen,
+        optimised_on=optimised_on,
         objective=objective,
         held=held,
         held_objective=held_objective,
@@ -295,7 +295,7 @@ def _facts(job: Job, network: Model, plan: Json, made: _Made) -> Json:
     recorder, done = made.recorder, made.steps_done
     seconds = recorder.clock()
     predicted, measured = (
-        (0.0, 0.0) if job.spec.is_control else made.seen.gradient_check(network, made.objective, made.patches)
+        (0.0, 0.0) if job.spec.is_control else made.optimised_on.gradient_check(network, made.objective, made.patches)
     )
     return {
         "gear": importlib.metadata.version("mujoco-gear"),
@@ -324,7 +324,7 @@ def _achieved(job: Job, network: Model, made: _Made) -> Json:
     validation samples.
     """
     found = {
-        "training": compared(made.seen, network, made.objective, made.patches, job.seed, MOST_SAMPLES),
+        "training": compared(made.optimised_on, network, made.objective, made.patches, job.seed, MOST_SAMPLES),
         "validation": None,
     }
     if job.validation:

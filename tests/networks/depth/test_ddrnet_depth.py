@@ -78,7 +78,7 @@ def test_it_learns_a_street(precision: str, memory: torch.memory_format) -> None
     with torch.no_grad():
         said_m = network(pictures)["depth_m"].numpy()
     truth_m = np.stack([sample.depth_m for sample in samples])
-    known = np.isfinite(truth_m) & (truth_m <= 80)
-    errors = np.abs(np.log(said_m[known]) - np.log(truth_m[known]))
-    constant = np.abs(np.log(truth_m[known]) - np.median(np.log(truth_m[known])))
+    valid_mask = np.isfinite(truth_m) & (truth_m <= 80)
+    errors = np.abs(np.log(said_m[valid_mask]) - np.log(truth_m[valid_mask]))
+    constant = np.abs(np.log(truth_m[valid_mask]) - np.median(np.log(truth_m[valid_mask])))
     assert errors.mean() < constant.mean() / 2

@@ -9,7 +9,15 @@ import pytest
 import torch
 from torch import Tensor
 
-from gear.networks.depth.losses import adabins_silog, bins_chamfer, known, log_l1, root_mean_square, silog, smooth_l1
+from gear.networks.depth.losses import (
+    adabins_silog,
+    bins_chamfer,
+    log_l1,
+    root_mean_square,
+    silog,
+    smooth_l1,
+    valid_mask,
+)
 
 LOSSES: list[Callable[[Tensor, Tensor], Tensor]] = [silog, adabins_silog, log_l1, root_mean_square, smooth_l1]
 
@@ -21,8 +29,8 @@ def depths(seed: int, shape: tuple[int, ...] = (2, 6, 9)) -> Tensor:
 
 def test_what_has_no_truth_is_masked() -> None:
     depth_m = torch.tensor([[[1.0, float("nan"), 0.0, 80.0, 80.1, float("inf")]]])
-    assert known(depth_m).tolist() == [[[True, False, False, True, False, False]]]
-    assert known(depth_m, None).tolist() == [[[True, False, False, True, True, False]]]
+    assert valid_mask(depth_m).tolist() == [[[True, False, False, True, False, False]]]
+    assert valid_mask(depth_m, None).tolist() == [[[True, False, False, True, True, False]]]
 
 
 @pytest.mark.parametrize("loss", LOSSES)

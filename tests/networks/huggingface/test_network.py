@@ -60,7 +60,7 @@ class TestSegformer(FolderContract):
         sample = self.samples("semseg")[0]
         assert set(model.predict(self.views(sample)).flat) <= {7, 8, 26}
         logits = model(self.batch([sample]))["logits"]
-        theirs = model.graph(pixel_values=model.seen(self.batch([sample]))).logits
+        theirs = model.graph(pixel_values=model.preprocess(self.batch([sample]))).logits
         small = theirs[:, [2, 3]].logsumexp(1)
         assert logits.shape == (1, 19, 64, 128) and bool((logits[:, 2] == -50).all())
         torch.testing.assert_close(logits[:, 13].mean(), small.mean(), rtol=1e-3, atol=1e-3)

@@ -186,4 +186,4 @@ def test_pictures_that_are_filled_up_to_whole_patches_are_not_resized(tmp_path: 
     folder = saved(networks.depth_anything, tmp_path, **processed("DPT", do_resize=False, do_pad=True, size_divisor=14))
     model: Any = depth.build(DepthFolderOptions(folder=str(folder), device="cpu", inverse_scale=1.0))
     assert model.processor.target((79, 159)) == (79, 159)
-    assert model.seen({"left": torch.rand(1, 3, 79, 159)}).shape == (1, 3, 84, 168)
+    assert model.preprocess({"left": torch.rand(1, 3, 79, 159)}).shape == (1, 3, 84, 168)
