@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.camera.lamps import Lamps
-from gear.camera.shadow_map import Floats, LampFrame, Layout, ShadowMap, first_hits, lengths, stop_behind
+from gear.camera.shadow_map import Floats, LampFrame, Layout, ShadowMap, add_occluder, first_hits, lengths
 from gear.camera.surface_points import longest_edges, points_on
 from gear.values.frames import FloatImage, Shape
 from gear.values.scene import ActorRecord, SceneRecord
@@ -87,7 +87,7 @@ class Casters:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class User:
+class RoadUserCaster:
     """A road user as a shadow caster: a set of surface points that block light.
 
     Attributes:
@@ -101,20 +101,20 @@ class User:
     middle_m: Floats
     radius_m: float
 
-    def is_before(self, lamp_frame: LampFrame, reach_m: float) -> bool:
+    def may_cast_shadow(self, lamp_frame: LampFrame, reach_m: float) -> bool:
         """Whether the road user may cast a shadow in the light of a lamp.
 
         It may if its bounding sphere is within the share `WORTH` of the lamp's range, and in the field of view of the
         lamp's shadow map.
         """
         away = self.middle_m - lamp_frame.place_m
-        away_m = float(np.linalg.norm(away))
-        if away_m >= WORTH * reach_m + self.radius_m:
+        distance_m = float(np.linalg.norm(away))
+        if distance_m >= WORTH * reach_m + self.radius_m:
             return False
-        if away_m <= self.radius_m:
+        if distance_m <= self.radius_m:
             return True
-        aside_rad = math.acos(min(max(float(away @ lamp_frame.frame[2]) / away_m, -1.0), 1.0))
-        return aside_rad < lamp_frame.layout.half_angle_rad + math.asin(self.radius_m / away_m)
+        aside_rad = math.acos(min(max(float(away @ lamp_frame.frame[2]) / distance_m, -1.0), 1.0))
+        return aside_rad < lamp_frame.layout.half_angle_rad + math.asin(self.radius_m / distance_m)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -143,7 +143,7 @@ class LampShadows:
             self._scenes[:] = [SceneShadows(town=self, record=record, users=users)]
         return self._scenes[0]
 
-    def _user(self, actor: ActorRecord, shape: Shape) -> User:
+    def _user(self, actor: ActorRecord, shape: Shape) -> RoadUserCaster:
         spacing_m = _SPACING_M["large" if shape.box_size_m[:2].max() > _LARGE_M else "small"]
         if actor.asset not in self._known:
             self._known[actor.asset] = _thinned(shape, spacing_m)
@@ -152,9 +152,9 @@ class LampShadows:
         points_m += pose.translation_m.astype(np.float32)
         middle_m = (points_m.min(axis=0) + points_m.max(axis=0)) / 2
         radius_m = float(lengths((points_m - middle_m).T).max())
-        return User(points_m=points_m, spacing_m=spacing_m, middle_m=middle_m, radius_m=radius_m)
+        return RoadUserCaster(points_m=points_m, spacing_m=spacing_m, middle_m=middle_m, radius_m=radius_m)
 
-    def standing(self, kind: str, index: int, lamp_frame: LampFrame, reach_m: float) -> Floats:
+    def static_shadow_map(self, kind: str, index: int, lamp_frame: LampFrame, reach_m: float) -> Floats:
         """Returns the shadow map of a static lamp, with the shadows of static objects only; computed once per
         lamp.
 
@@ -185,7 +185,7 @@ class SceneShadows:
 
     town: LampShadows
     record: SceneRecord
-    users: list[User]
+    users: list[RoadUserCaster]
     _maps: dict[tuple[str, int], ShadowMap] = field(default_factory=dict, init=False, repr=False)
 
     def map(self, kind: str, index: int, lamps: Lamps, *, stands: bool) -> ShadowMap:
@@ -201,12 +201,12 @@ class SceneShadows:
             place_m, axis = lamps.position_m[index], lamps.axis[index]
             lamp_frame = LampFrame.of(place_m, axis, STANDING if stands else DRIVING)
             if stands:
-                stop_m = self.town.standing(kind, index, lamp_frame, lamps.reach_m).copy()
+                stop_m = self.town.static_shadow_map(kind, index, lamp_frame, lamps.reach_m).copy()
             else:
                 stop_m = lamp_frame.layout.empty()
-            for user in self.users:
-                if user.is_before(lamp_frame, lamps.reach_m):
-                    stop_behind(stop_m, user.points_m, user.spacing_m, lamp_frame)
+            for road_user in self.users:
+                if road_user.may_cast_shadow(lamp_frame, lamps.reach_m):
+                    add_occluder(stop_m, road_user.points_m, road_user.spacing_m, lamp_frame)
             self._maps[kind, index] = ShadowMap(lamp_frame=lamp_frame, stop_m=stop_m)
         return self._maps[kind, index]
 
@@ -232,7 +232,7 @@ class LampShadow:
         self,
         light: FloatImage,
         towards: tuple[FloatImage, FloatImage, FloatImage],
-        away_m: FloatImage,
+        distance_m: FloatImage,
         facing: FloatImage,
         up: FloatImage,
     ) -> None:
@@ -241,7 +241,7 @@ class LampShadow:
         Args:
             light: (h, W) light of the lamp without shadows.
             towards: unit vectors from the lamp to the surfaces, as three (h, W) arrays: east, north and up.
-            away_m: (h, W) distances of the surfaces from the lamp, metres.
+            distance_m: (h, W) distances of the surfaces from the lamp, metres.
             facing: (h, W) cosines between the surfaces' normals and the direction to the lamp.
             up: (h, W) upward components of the surfaces' normals.
         """
@@ -251,7 +251,7 @@ class LampShadow:
             return
         found = self.scene.map(self.kind, self.index, self.lamps, stands=self.stands)
         unit = np.stack([part.reshape(-1)[where] for part in towards])
-        shown[where] *= found.through(unit, *(part.reshape(-1)[where] for part in (away_m, facing, up)))
+        shown[where] *= found.through(unit, *(part.reshape(-1)[where] for part in (distance_m, facing, up)))
 
 
 def _thinned(shape: Shape, spacing_m: float) -> Floats:

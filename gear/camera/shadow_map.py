@@ -134,12 +134,12 @@ class ShadowMap:
         object.__setattr__(self, "_least_m", cv2.erode(self.stop_m, nine))
         object.__setattr__(self, "_most_m", cv2.dilate(self.stop_m, nine))
 
-    def through(self, unit: Floats, away_m: FloatImage, facing: FloatImage, up: FloatImage) -> Floats:
+    def through(self, unit: Floats, distance_m: FloatImage, facing: FloatImage, up: FloatImage) -> Floats:
         """The share of the lamp's light that reaches each of N surfaces: (N,) values in 0..1.
 
         Args:
             unit: (3, N) unit vectors from the lamp to the surfaces.
-            away_m: (N,) distances of the surfaces from the lamp, metres.
+            distance_m: (N,) distances of the surfaces from the lamp, metres.
             facing: (N,) cosines between the surfaces' normals and the direction to the lamp.
             up: (N,) upward components of the normals; level ground does not shadow itself.
         """
@@ -150,7 +150,7 @@ class ShadowMap:
         cosine = np.clip(facing, np.float32(1e-3), 1)
         tilt = np.minimum(np.sqrt(1 - cosine * cosine) / cosine, np.float32(_MOST_TILT))
         tilt[up > _LEVEL] = 0
-        reach_m = away_m * (1 - np.float32(_STEEP * layout.grain_rad) * tilt) - np.float32(_SLACK_M)
+        reach_m = distance_m * (1 - np.float32(_STEEP * layout.grain_rad) * tilt) - np.float32(_SLACK_M)
         middle = row * layout.cells + column
         is_free = (self._least_m.reshape(-1)[middle] >= reach_m) | (self.lamp_frame.frame[2] @ unit <= 0)
         through: Floats = is_free.astype(np.float32)
@@ -192,10 +192,10 @@ def first_hits(corners_m: Floats, lamp_frame: LampFrame) -> Floats:
     unit = np.asarray(flat / np.maximum(corner_m, _EDGE_ON), np.float32)
     places = np.stack(lamp_frame.places(unit), axis=1).reshape(-1, 3, 2)
     corner_m = corner_m.reshape(-1, 3)
-    away_m = corner_m.mean(axis=1)
-    shown = np.flatnonzero((np.abs(places) < 2 * layout.cells).all(axis=(1, 2)) & (away_m > OWN_GLASS_M))
+    distance_m = corner_m.mean(axis=1)
+    shown = np.flatnonzero((np.abs(places) < 2 * layout.cells).all(axis=(1, 2)) & (distance_m > OWN_GLASS_M))
     # Painter's algorithm: nearer triangles are drawn last.
-    shown = shown[np.argsort(-away_m[shown], kind="stable")]
+    shown = shown[np.argsort(-distance_m[shown], kind="stable")]
     outlines = np.rint(places[shown] * (1 << _FRACTION_BITS)).astype(np.int32)
     painted = np.full((layout.cells, layout.cells), -1, np.int32)
     for number, outline in enumerate(outlines):
@@ -219,9 +219,9 @@ def _split(corners: Floats, axis: Floats) -> Floats:
     small = [np.zeros((0, 3, 3), np.float32)]
     while len(left):
         middle, longest_m = left.mean(axis=1), longest_edges(left)
-        away_m = lengths(middle.T)
-        chosen = (middle @ axis + longest_m > 0) & (away_m + longest_m > OWN_GLASS_M)
-        large = chosen & (longest_m > _LARGEST * np.maximum(away_m, OWN_GLASS_M))
+        distance_m = lengths(middle.T)
+        chosen = (middle @ axis + longest_m > 0) & (distance_m + longest_m > OWN_GLASS_M)
+        large = chosen & (longest_m > _LARGEST * np.maximum(distance_m, OWN_GLASS_M))
         small.append(left[chosen & ~large])
         left = _quartered(left[large])
     return np.concatenate(small)
@@ -240,7 +240,7 @@ def _quartered(corners: Floats) -> Floats:
     return np.concatenate([np.stack(three, axis=1) for three in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
 
 
-def stop_behind(stop_m: Floats, points_m: Floats, spacing_m: float, lamp_frame: LampFrame) -> None:
+def add_occluder(stop_m: Floats, points_m: Floats, spacing_m: float, lamp_frame: LampFrame) -> None:
     """Adds a body to a shadow map, in place.
 
     Light is stopped at the body's far side, so that the body does not shadow itself.
@@ -253,21 +253,21 @@ def stop_behind(stop_m: Floats, points_m: Floats, spacing_m: float, lamp_frame: 
     """
     layout = lamp_frame.layout
     away = np.ascontiguousarray(points_m.T) - lamp_frame.place_m[:, None]
-    away_m = lengths(away)
-    keep = (away_m > OWN_GLASS_M) & (lamp_frame.frame[2] @ away > 0)
-    away_m = away_m[keep]
-    unit: Floats = away[:, keep] / away_m
+    distance_m = lengths(away)
+    keep = (distance_m > OWN_GLASS_M) & (lamp_frame.frame[2] @ away > 0)
+    distance_m = distance_m[keep]
+    unit: Floats = away[:, keep] / distance_m
     column, row = (np.rint(place).astype(np.int64) for place in lamp_frame.places(unit))
     inside = np.minimum(column, row) >= BORDER
     inside &= np.maximum(column, row) < layout.cells - BORDER
     if not inside.any():
         return
-    column, row, away_m = column[inside], row[inside], away_m[inside]
+    column, row, distance_m = column[inside], row[inside], distance_m[inside]
     top, left = int(row.min()), int(column.min())
     size = int(row.max()) - top + 1, int(column.max()) - left + 1
     ends_m = np.zeros(size, np.float32)
-    np.maximum.at(ends_m.reshape(-1), (row - top) * size[1] + column - left, away_m)
-    gap = min(math.ceil(spacing_m / (layout.grain_rad * float(away_m.min()))), _CLOSED_CELLS)
+    np.maximum.at(ends_m.reshape(-1), (row - top) * size[1] + column - left, distance_m)
+    gap = min(math.ceil(spacing_m / (layout.grain_rad * float(distance_m.min()))), _CLOSED_CELLS)
     if gap > 1:
         ends_m = cv2.morphologyEx(ends_m, cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8))
     part = stop_m[top : top + size[0], left : left + size[1]]

@@ -53,16 +53,16 @@ class ObjectChange:
     patch: PatchDistance
 
 
-def found_in_twin(now: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectOutcome, ...]:
-    """The outcomes, in the picture `now`, of the objects that are found in `twin`, the same picture with another
+def found_in_twin(patched: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectOutcome, ...]:
+    """The outcomes, in the picture `patched`, of the objects that are found in `twin`, the same picture with another
     patch.
     """
     found = {(thing.object_id, thing.label) for thing in twin.objects if thing.state == "found"}
-    return tuple(thing for thing in now.objects if (thing.object_id, thing.label) in found)
+    return tuple(thing for thing in patched.objects if (thing.object_id, thing.label) in found)
 
 
-def changes(now: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectChange, ...]:
-    """Lists the changes from `twin` (the same picture with another patch) to `now`: objects in the order of the
+def changes(patched: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectChange, ...]:
+    """Lists the changes from `twin` (the same picture with another patch) to `patched`: objects in the order of the
     ground truth, then invented detections by decreasing score.
     """
     lost = [
@@ -75,7 +75,7 @@ def changes(now: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectChange, 
             score=thing.score,
             patch=thing.patch,
         )
-        for thing in found_in_twin(now, twin)
+        for thing in found_in_twin(patched, twin)
         if thing.state != "found"
     ]
     invented = [
@@ -88,7 +88,7 @@ def changes(now: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectChange, 
             score=one.score,
             patch=one.patch,
         )
-        for one in now.detections
+        for one in patched.detections
         if one.role == "background" and not _is_there(one.label, one.box_px, twin)
     ]
     return (*lost, *invented)

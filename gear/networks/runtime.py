@@ -54,7 +54,9 @@ def device_of(requested: Literal["auto", "cpu", "cuda"]) -> torch.device:
 
 
 def has_cuda(requested: str | None) -> bool:
-    """Whether networks run on a GPU of this machine, if the option `device` has the value `requested` (None is `auto`)."""
+    """Whether networks run on a GPU of this machine, if the option `device` has the value `requested` (None is
+    `auto`).
+    """
     return requested != "cpu" and torch.cuda.is_available()
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from gear.camera.lamp_shadows import STANDING, Casters, LampShadow, LampShadows
 from gear.camera.lamps import Lamps, globe_beam
-from gear.camera.shadow_map import BORDER, LampFrame, Layout, ShadowMap, first_hits, stop_behind
+from gear.camera.shadow_map import BORDER, LampFrame, Layout, ShadowMap, add_occluder, first_hits
 from gear.values.frames import Shape
 from gear.values.geometry import RigidTransform
 from gear.values.scene import ActorRecord, Pose, SceneRecord, Weather
@@ -205,7 +205,7 @@ def test_sparse_points_near_a_lamp_have_no_holes_between_them() -> None:
     lamp_frame = LampFrame.of(LAMP_M, DOWN, STANDING)
     stop_m = lamp_frame.layout.empty()
     x, y = (grid.reshape(-1) for grid in np.meshgrid(*[np.arange(-0.6, 0.61, 0.07)] * 2))
-    stop_behind(stop_m, np.stack([x, y, np.full(len(x), 5.5)], axis=1).astype(np.float32), 0.07, lamp_frame)
+    add_occluder(stop_m, np.stack([x, y, np.full(len(x), 5.5)], axis=1).astype(np.float32), 0.07, lamp_frame)
     places = along_x(*np.linspace(-1.2, 1.2, 50), y_m=0.3)
     away = (places - LAMP_M).astype(np.float32).T
     away_m = np.linalg.norm(away, axis=0)

@@ -62,7 +62,7 @@ class EvaluatedDataset:
         results = self.results[:count]
         key = (report, len(results))
         if key not in self.known:
-            parts = [note.parts[report] for note in results]
+            parts = [result.parts[report] for result in results]
             metric = self.scorer.reports[report]
             checked = partial(metric.checked, method="result")
             draws = leave_one_out(self.streets[:count])
@@ -107,14 +107,15 @@ def row_report(row: EvaluatedDataset) -> RowReport:
         cost=mean_cost(results),
         defense=mask_means(results, has_patch=plan.info.patch_label != NO_PATCH),
         per_sample=[
-            {k: v for k, v in note.as_json().items() if k not in {"facts", "objects", "defended"}} for note in results
+            {k: v for k, v in result.as_json().items() if k not in {"facts", "objects", "defended"}}
+            for result in results
         ],
     )
 
 
 def mean_cost(results: Sequence[SampleResult]) -> dict[str, float]:
     """Returns the mean seconds per sample of the model (`model_s`) and of the defense (`defense_s`)."""
-    return {key: float(np.mean([note.cost[key] for note in results])) for key in ("model_s", "defense_s")}
+    return {key: float(np.mean([result.cost[key] for result in results])) for key in ("model_s", "defense_s")}
 
 
 def mask_means(results: Sequence[SampleResult], *, has_patch: bool) -> dict[str, float]:
@@ -123,8 +124,8 @@ def mask_means(results: Sequence[SampleResult], *, has_patch: bool) -> dict[str,
     Metrics of masks are left out if the defense returns no masks, and the alarm if it returns no scores. Without a
     patch, the only metric of masks is `mask_area`, the share of the picture that is masked by mistake.
     """
-    masks = [note.mask for note in results if note.mask is not None]
-    scores = [note.score for note in results if note.score is not None]
+    masks = [result.mask for result in results if result.mask is not None]
+    scores = [result.score for result in results if result.score is not None]
     alarms = {ALARMS: float(np.mean(np.array(scores) > ALARM))} if scores else {}
     keys = [key for key in (masks[0] if masks else {}) if key == "mask_area" or has_patch]
     return {key: _known_mean([mask[key] for mask in masks]) for key in keys} | alarms
@@ -177,7 +178,7 @@ def metrics_of(row: EvaluatedDataset) -> dict[str, dict[str, Estimate]]:
 
 def as_one(name: str, members: Sequence[EvaluatedDataset]) -> EvaluatedDataset:
     """Combines several datasets into one with the given name; its other properties are those of the first dataset."""
-    results = [note for row in members for note in row.results]
+    results = [result for row in members for result in row.results]
     streets = [street for row in members for street in row.streets]
     return replace(members[0], name=name, results=results, streets=streets, known={})
 
@@ -202,25 +203,27 @@ def difference(row: EvaluatedDataset, other: EvaluatedDataset, seed: int) -> Dif
         seed: seed of the permutation tests.
     """
     count = min(len(row.results), len(other.results))
-    here, there, streets = row.results[:count], other.results[:count], row.streets[:count]
+    patched, twin, streets = row.results[:count], other.results[:count], row.streets[:count]
     return Difference(
         row=row.name,
         against=other.name,
         metrics={
             report: _paired(row.gathered(report, count), other.gathered(report, count)) for report in row.scorer.reports
         },
-        auroc=_auroc(here, there, streets),
-        paired={report: _tested(here, there, streets, report, seed) for report in row.scorer.reports},
-        objects=_objects(here, there, streets, seed),
+        auroc=_auroc(patched, twin, streets),
+        paired={report: _tested(patched, twin, streets, report, seed) for report in row.scorer.reports},
+        objects=_objects(patched, twin, streets, seed),
     )
 
 
 def _objects(
-    here: list[SampleResult], there: list[SampleResult], streets: list[Street], seed: int
+    patched: list[SampleResult], twin: list[SampleResult], streets: list[Street], seed: int
 ) -> ObjectChanges | None:
     """Returns how the detections of each object differ between twins; None for tasks without objects."""
-    now, twin = ([note.outcomes for note in results if note.outcomes is not None] for results in (here, there))
-    return object_changes([note.index for note in here], now, twin, streets, seed) if now else None
+    outcomes, twins = (
+        [result.outcomes for result in results if result.outcomes is not None] for results in (patched, twin)
+    )
+    return object_changes([result.index for result in patched], outcomes, twins, streets, seed) if outcomes else None
 
 
 def _paired(one: Metrics, other: Metrics) -> dict[str, Estimate]:
@@ -233,13 +236,13 @@ def _paired(one: Metrics, other: Metrics) -> dict[str, Estimate]:
 
 
 def _tested(
-    here: list[SampleResult], there: list[SampleResult], streets: list[Street], report: str, seed: int
+    patched: list[SampleResult], twin: list[SampleResult], streets: list[Street], report: str, seed: int
 ) -> dict[str, PairedTest]:
     """Returns a paired test for every metric of the report that is defined for single samples."""
-    names = list(dict.fromkeys(name for note in here for name in note.metrics[report]))
+    names = list(dict.fromkeys(name for result in patched for name in result.metrics[report]))
     ours, theirs = (
-        np.array([[note.metrics[report].get(name, np.nan) for name in names] for note in results], np.float64)
-        for results in (here, there)
+        np.array([[result.metrics[report].get(name, np.nan) for name in names] for result in results], np.float64)
+        for results in (patched, twin)
     )
     differences = _finite(ours) - _finite(theirs)
     found = paired_p(clustered(differences, streets), seed)
@@ -249,10 +252,10 @@ def _tested(
     }
 
 
-def _auroc(here: list[SampleResult], there: list[SampleResult], streets: list[Street]) -> Estimate | None:
-    high = [note.score for note in here if note.score is not None]
-    low = [note.score for note in there if note.score is not None]
-    if len(high) != len(here) or len(low) != len(there):
+def _auroc(patched: list[SampleResult], twin: list[SampleResult], streets: list[Street]) -> Estimate | None:
+    high = [result.score for result in patched if result.score is not None]
+    low = [result.score for result in twin if result.score is not None]
+    if len(high) != len(patched) or len(low) != len(twin):
         return None
     return Estimate(value=auroc(high, low), interval=auroc_interval(high, low, streets))
 

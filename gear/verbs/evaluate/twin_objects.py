@@ -34,8 +34,8 @@ BINS = {"metres": (0.0, 5.0, 10.0, 20.0, 40.0, math.inf), "pixels": (0.0, 25.0, 
 
 def object_changes(
     indices: Sequence[int],
-    here: Sequence[PictureOutcomes],
-    there: Sequence[PictureOutcomes],
+    patched: Sequence[PictureOutcomes],
+    twins: Sequence[PictureOutcomes],
     streets: Sequence[Hashable],
     seed: int,
 ) -> ObjectChanges:
@@ -44,16 +44,16 @@ def object_changes(
 
     Args:
         indices: indices of the N samples.
-        here: detection outcomes of the N samples in the dataset.
-        there: detection outcomes of the same samples in the twin.
+        patched: detection outcomes of the N samples in the dataset.
+        twins: detection outcomes of the same samples in the twin.
         streets: identifier of the scene content of each sample; intervals and tests treat samples with the same one
             together.
         seed: seed of the permutation tests.
     """
-    pairs = list(zip(here, there, strict=True))
-    lost = [changes(now, twin) for now, twin in pairs]
-    back = [changes(twin, now) for now, twin in pairs]
-    things = [found_in_twin(now, twin) for now, twin in pairs]
+    pairs = list(zip(patched, twins, strict=True))
+    lost = [changes(one, twin) for one, twin in pairs]
+    back = [changes(twin, one) for one, twin in pairs]
+    things = [found_in_twin(one, twin) for one, twin in pairs]
     found = np.array([_places([thing.patch.is_on_patch for thing in some]) for some in things])
     kept = [row[row != LEFT_OUT] for row in leave_one_out(streets)]
     counts = {}
