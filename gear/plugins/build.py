@@ -94,6 +94,10 @@ def traced(founds: Iterable[PluginEntry], stage: str) -> Iterator[None]:
 
     An exception that passed through the code of such a package gets the plugin's name.
 
+    Args:
+        founds: plugins whose code may be called.
+        stage: what the code does, for the message, such as `optimise`.
+
     Raises:
         PluginError: code of one of the packages, or code that it called, raised something other than a `GearError`.
     """

@@ -84,6 +84,10 @@ def roots_of(folder: Path) -> list[Path]:
 def open_twins(first: str | Path, second: str | Path, split: str | None = None) -> Twins[Sample]:
     """Opens two datasets that differ only in their patch (twins), and pairs their samples by index.
 
+    Args:
+        first, second: root folders of the two datasets.
+        split: name of the split; None if each dataset has only one.
+
     Raises:
         DatasetError: the datasets differ in more than the patch, or one of them cannot be opened.
     """

@@ -67,6 +67,14 @@ class CarlaGear:
 
         The paper's budget is 51 epochs of 100 samples: 2550 steps for segmentation (two samples per step), and 5100 for
         the other tasks.
+
+        Args:
+            model: the attacked network.
+            dataset: samples on which the patches are optimised.
+            compositor: renderer of patches into the pictures of these samples.
+            budget: number of steps, and of queries for black-box attacks.
+            rng: random generator of the attack.
+            monitor: receives the progress and the patches of each step; None for no monitor.
         """
         from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
 

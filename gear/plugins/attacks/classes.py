@@ -30,6 +30,10 @@ def check_classes(source_class: str, target: str) -> None:
 def check_seen(source_class: str, dataset: Sequence[Any]) -> None:
     """Checks that the ground truth of at least one sample contains the attacked class; an empty name passes.
 
+    Args:
+        source_class: name of a Cityscapes class, or "".
+        dataset: samples with `label_ids`.
+
     Raises:
         GearError: no sample contains the class, so there is nothing to attack.
     """

@@ -80,6 +80,14 @@ class Control:
     ) -> tuple[Patch, ...]:
         """Makes one patch for each patch surface of the scene; the model and the budget are not used.
 
+        Args:
+            model: the attacked network.
+            dataset: samples on which the patches are optimised.
+            compositor: renderer of patches into the pictures of these samples.
+            budget: number of steps, and of queries for black-box attacks.
+            rng: random generator of the attack.
+            monitor: receives the progress and the patches of each step; None for no monitor.
+
         Raises:
             GearError: the folder `reference_patches` has fewer patches than the scene has surfaces, or no unrounded
                 patches.

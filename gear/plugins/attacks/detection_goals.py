@@ -39,7 +39,14 @@ class DetectionGoal:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One term for each loss of the detector: the negative loss against the labels that it shall predict."""
+        """One term for each loss of the detector: the negative loss against the labels that it shall predict.
+
+        Args:
+            model: the attacked network.
+            views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+            samples: the B samples with their ground truth.
+            indices: indices of these samples in the dataset.
+        """
         wanted = [self.rewritten(sample) for sample in samples]
         losses = model.forward(views, wanted)
         return {name: Term(value=-loss) for name, loss in losses.items() if name not in self.left_out}

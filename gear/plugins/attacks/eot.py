@@ -72,7 +72,16 @@ class Eot:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each patch surface of the scene; all of the patches are pasted into every picture."""
+        """Optimises one patch for each patch surface of the scene; all of the patches are pasted into every picture.
+
+        Args:
+            model: the attacked network.
+            dataset: samples on which the patches are optimised.
+            compositor: renderer of patches into the pictures of these samples.
+            budget: number of steps, and of queries for black-box attacks.
+            rng: random generator of the attack.
+            monitor: receives the progress and the patches of each step; None for no monitor.
+        """
         from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
         from gear.plugins.attacks.optimisation.objectives import default_objective
         from gear.plugins.attacks.optimisation.upright_pasting import Upright

@@ -69,7 +69,16 @@ class Nes:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each patch surface of the scene, within the budget."""
+        """Optimises one patch for each patch surface of the scene, within the budget.
+
+        Args:
+            model: the attacked network.
+            dataset: samples on which the patches are optimised.
+            compositor: renderer of patches into the pictures of these samples.
+            budget: number of steps, and of queries for black-box attacks.
+            rng: random generator of the attack.
+            monitor: receives the progress and the patches of each step; None for no monitor.
+        """
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
         from gear.plugins.attacks.optimisation.loop import batch_of
         from gear.plugins.attacks.optimisation.objectives import default_objective

@@ -90,7 +90,16 @@ class Rp2:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each patch surface of the scene, within the budget."""
+        """Optimises one patch for each patch surface of the scene, within the budget.
+
+        Args:
+            model: the attacked network.
+            dataset: samples on which the patches are optimised.
+            compositor: renderer of patches into the pictures of these samples.
+            budget: number of steps, and of queries for black-box attacks.
+            rng: random generator of the attack.
+            monitor: receives the progress and the patches of each step; None for no monitor.
+        """
         from gear.plugins.attacks.optimisation.loop import Problem, one_gradient, optimise_textures
 
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=self._config)

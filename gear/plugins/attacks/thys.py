@@ -76,6 +76,14 @@ class Thys:
     ) -> tuple[Patch, ...]:
         """Optimises one patch for each patch surface of the scene, within the budget.
 
+        Args:
+            model: the attacked network.
+            dataset: samples on which the patches are optimised.
+            compositor: renderer of patches into the pictures of these samples.
+            budget: number of steps, and of queries for black-box attacks.
+            rng: random generator of the attack.
+            monitor: receives the progress and the patches of each step; None for no monitor.
+
         Raises:
             GearError: the detector has no raw output of objectness or class scores.
         """
@@ -124,7 +132,14 @@ class MaxScoreObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One term, `objectness`: the negative mean over the pictures of the highest detection score."""
+        """One term, `objectness`: the negative mean over the pictures of the highest detection score.
+
+        Args:
+            model: the attacked network.
+            views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+            samples: the B samples with their ground truth.
+            indices: indices of these samples in the dataset.
+        """
         from gear.contracts.attacks import Term
 
         return {"objectness": Term(value=-max_score(model.forward(views)).mean())}

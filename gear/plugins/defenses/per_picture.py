@@ -47,13 +47,27 @@ class PerPicture(ABC):
         model: Model | None,
         rng: np.random.Generator,
     ) -> None:
-        """Does nothing, since these defenses need no calibration."""
+        """Does nothing, since these defenses need no calibration.
+
+        Args:
+            clean: pictures without a patch, (H, W, 3) uint8 by camera name, one mapping per sample.
+            patched: pictures of the same scenes with a patch; [] if there are none.
+            model: the network whose feature maps are read.
+            rng: random generator of the calibration.
+        """
         return
 
     def apply(
         self, views: Mapping[str, UInt8Image], model: Model | None, state: Any, rng: np.random.Generator
     ) -> DefenseResult:
-        """Cleans the picture of each camera; the score is the largest mean of the masks, None without masks."""
+        """Cleans the picture of each camera; the score is the largest mean of the masks, None without masks.
+
+        Args:
+            views: (H, W, 3) uint8 pictures of the sample by camera name.
+            model: the network whose feature maps are read.
+            state: result of the calibration.
+            rng: random generator of the sample.
+        """
         cleaned: dict[str, UInt8Image] = {}
         masks: dict[str, Mask] = {}
         for name, picture in views.items():

@@ -115,6 +115,12 @@ def images_of(frame: Frame) -> dict[str, UInt8Image]:
 def read_rgb(root: Path, relative: str, record: SceneRecord | None = None, view: str = "") -> UInt8Image:
     """Reads a colour picture of a dataset, (H, W, 3) uint8; with a record and a view, its size is checked.
 
+    Args:
+        root: root folder of the dataset.
+        relative: path of the file in the dataset.
+        record: scene record of the sample; None for no check of the size.
+        view: name of the camera.
+
     Raises:
         DatasetError: the file is missing, outside of the dataset, damaged, or of another size than the view.
     """
@@ -150,6 +156,10 @@ def read_map(
 
 def read_plain(root: Path, relative: str) -> npt.NDArray[Any]:
     """Reads a label or depth map of any size and dtype, without conversion.
+
+    Args:
+        root: root folder of the dataset.
+        relative: path of the file in the dataset.
 
     Raises:
         DatasetError: the file is missing, outside of the dataset, or damaged.
@@ -188,7 +198,13 @@ def category_colour(category_id: int) -> Rgb:
 
 
 def draw_surfaces(picture: UInt8Image, sample: Sample, camera: str) -> None:
-    """Draws the outlines of the patch surfaces in one view onto a picture in magenta, in place."""
+    """Draws the outlines of the patch surfaces in one view onto a picture in magenta, in place.
+
+    Args:
+        picture: (H, W, 3) uint8 picture of the view.
+        sample: the sample with its surfaces.
+        camera: name of the view.
+    """
     for truth in sample.surfaces:
         if truth.camera == camera and truth.corners_px is not None:
             draw_polygon(picture, truth.corners_px, (255, 0, 255))
@@ -198,6 +214,11 @@ def draw_polygon(picture: UInt8Image, points_px: Sequence[Sequence[float]], rgb:
     """Draws a closed polygon onto a picture, in place; its corners (x, y) are in index pixels.
 
     The centre of the first pixel is (0, 0) in index pixels.
+
+    Args:
+        picture: (H, W, 3) uint8 picture.
+        points_px: corners (x, y) in order.
+        rgb: colour, 0..255.
     """
     draw_segments(picture, list(zip(points_px, [*points_px[1:], points_px[0]], strict=True)), rgb)
 
@@ -212,6 +233,11 @@ def draw_segments(
     """Draws straight lines onto a picture, in place; their ends (x, y), in index pixels, may be far outside.
 
     The centre of the first pixel is (0, 0) in index pixels.
+
+    Args:
+        picture: (H, W, 3) uint8 picture.
+        segments_px: both ends (x, y) of each line.
+        rgb: colour, 0..255.
     """
     for ends in segments_px:
         (x0, y0), (x1, y1) = (np.round(np.clip(end, -FAR_PX, FAR_PX) * 16).astype(int).tolist() for end in ends)
@@ -244,6 +270,10 @@ def draw_box(
 
 def expect(facts: Any, *keys: str, place: Path) -> Mapping[str, Any]:
     """Returns the metadata in a sample's JSON file (sidecar) after checking that the keys that a task needs exist.
+
+    Args:
+        facts: content of the sidecar that the task wrote.
+        place: path of the sidecar or dataset, for the message.
 
     Raises:
         DatasetError: a key is missing, because the sidecar is that of another task or damaged.

@@ -110,7 +110,12 @@ class DepthTask:
         )
 
     def encode(self, sample: DepthSample, info: SplitInfo) -> Encoded:
-        """Encodes the picture, the depth as KITTI's 16-bit picture, and the depth in metres as a float file."""
+        """Encodes the picture, the depth as KITTI's 16-bit picture, and the depth in metres as a float file.
+
+        Args:
+            sample: the sample with its ground truth.
+            info: names of the split, town and scene, for paths.
+        """
         image, units, metres = _paths(info.split, sample.record.index)
         known = np.isfinite(sample.depth_m)
         files = {
@@ -121,7 +126,12 @@ class DepthTask:
         return Encoded(files=files, facts={"known_px": int(known.sum())})
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """Makes the files of a whole split: the file lists, and the poses that CARLA-GeAR's loader reads."""
+        """Makes the files of a whole split: the file lists, and the poses that CARLA-GeAR's loader reads.
+
+        Args:
+            sidecars: metadata of all samples of the split, in order.
+            info: names of the split, town, scene and patch.
+        """
         paths = [_paths(info.split, index) for index in range(len(sidecars))]
         records = (sidecar.record for sidecar in sidecars)
         poses = billboard_info(records, task="depth", patch_label=info.patch_label, reference=VIEW)
@@ -135,7 +145,13 @@ class DepthTask:
         }
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> DepthSample:
-        """Reads a sample from its files: the picture and the depth in metres."""
+        """Reads a sample from its files: the picture and the depth in metres.
+
+        Args:
+            root: root folder of the dataset.
+            sidecar: metadata of the sample.
+            info: names of the split, town and scene, for paths.
+        """
         image, _, metres = _paths(info.split, sidecar.record.index)
         return DepthSample(
             record=sidecar.record,
@@ -164,6 +180,11 @@ class DepthTask:
         """Encodes a predicted depth map as the devkit's 16-bit picture and as a lossless file in metres.
 
         The 16-bit picture is clipped to 256 m.
+
+        Args:
+            sample: the sample, which gives the file names.
+            prediction: (H, W) predicted depth in metres.
+            info: names of the split, town and scene; not used.
         """
         units, metres = results.kitti_depth_paths(sample.record.index)
         depth_m = np.asarray(prediction, dtype=np.float32)
@@ -172,11 +193,23 @@ class DepthTask:
         )
 
     def decode_prediction(self, root: Path, sample: DepthSample, facts: Json, info: SplitInfo) -> FloatImage:
-        """Reads a stored prediction: (H, W) float32 metres, from the lossless file."""
+        """Reads a stored prediction: (H, W) float32 metres, from the lossless file.
+
+        Args:
+            root: folder of the stored predictions.
+            sample: the sample, which gives the file name.
+            facts: metadata stored with the prediction; not used.
+            info: names of the split, town and scene; not used.
+        """
         return read_plain(root, results.kitti_depth_paths(sample.record.index)[1])
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """Returns no files, because the depth pictures of the samples are complete results."""
+        """Returns no files, because the depth pictures of the samples are complete results.
+
+        Args:
+            facts: scene record and stored metadata of each sample.
+            info: names of the split, town and scene.
+        """
         return {}
 
     def preview(self, sample: DepthSample) -> Mapping[str, UInt8Image]:
@@ -190,7 +223,12 @@ class DepthTask:
         return {"image": picture, "depth": colours}
 
     def prediction_preview(self, sample: DepthSample, prediction: FloatImage) -> Mapping[str, UInt8Image]:
-        """The predicted depth in the colours of the preview `depth`."""
+        """The predicted depth in the colours of the preview `depth`.
+
+        Args:
+            sample: the sample; not used.
+            prediction: (H, W) predicted depth in metres.
+        """
         return {"depth": depth_colours(prediction)}
 
     def legends(self) -> Mapping[str, Legend]:
@@ -268,6 +306,10 @@ def cut_depth(sample: DepthSample, rng: np.random.Generator) -> DepthSample:
     Kim et al., "Global-Local Path Networks for Monocular Depth Estimation with Vertical CutDepth", 2022, section 3.3:
     the band reaches from top to bottom, because depth changes most along columns. It takes at most three quarters of
     the width.
+
+    Args:
+        sample: the sample.
+        rng: random generator of position and width.
     """
     width = sample.depth_m.shape[1]
     left = int(rng.integers(0, width))

@@ -116,7 +116,12 @@ class SemsegTask:
         )
 
     def encode(self, sample: SemsegSample, info: SplitInfo) -> Encoded:
-        """Encodes picture, label map, instance map, colours, polygons (if the option is set) and camera."""
+        """Encodes picture, label map, instance map, colours, polygons (if the option is set) and camera.
+
+        Args:
+            sample: the sample with its ground truth.
+            info: names of the split, town and scene, for paths.
+        """
         record = sample.record
         paths = cityscapes.paths(info.town, info.split, record.sequence, record.frame)
         world_from_vehicle = record.ego.world_from_actor.transform("world", "ego")
@@ -135,13 +140,24 @@ class SemsegTask:
         return Encoded(files=files, facts={"label_px": present})
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """Makes the file of a whole split: the poses that CARLA-GeAR's loader reads."""
+        """Makes the file of a whole split: the poses that CARLA-GeAR's loader reads.
+
+        Args:
+            sidecars: metadata of all samples of the split, in order.
+            info: names of the split, town, scene and patch.
+        """
         records = (sidecar.record for sidecar in sidecars)
         poses = billboard_info(records, task="ss", patch_label=info.patch_label, reference=VIEW)
         return {f"gtFine/{info.split}/camera_billboard_info.json": dump(poses)}
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> SemsegSample:
-        """Reads a sample from its files: the picture, the label map and the instance map."""
+        """Reads a sample from its files: the picture, the label map and the instance map.
+
+        Args:
+            root: root folder of the dataset.
+            sidecar: metadata of the sample.
+            info: names of the split, town and scene, for paths.
+        """
         record = sidecar.record
         paths = cityscapes.paths(info.town, info.split, record.sequence, record.frame)
         return SemsegSample(
@@ -174,18 +190,36 @@ class SemsegTask:
         )
 
     def encode_prediction(self, sample: SemsegSample, prediction: npt.NDArray[np.uint8], info: SplitInfo) -> Encoded:
-        """Encodes predicted label ids as the picture that Cityscapes' evaluation script reads."""
+        """Encodes predicted label ids as the picture that Cityscapes' evaluation script reads.
+
+        Args:
+            sample: the sample, which gives the file name.
+            prediction: (H, W) uint8 predicted label ids.
+            info: names of the split, town and scene, for the path.
+        """
         path = results.cityscapes_path(info.town, sample.record.sequence, sample.record.frame)
         return Encoded(files={path: encode_label_map(prediction.astype(np.uint8))}, facts={})
 
     def decode_prediction(
         self, root: Path, sample: SemsegSample, facts: Json, info: SplitInfo
     ) -> npt.NDArray[np.uint8]:
-        """Reads a stored prediction: (H, W) uint8 label ids."""
+        """Reads a stored prediction: (H, W) uint8 label ids.
+
+        Args:
+            root: folder of the stored predictions.
+            sample: the sample, which gives the file name.
+            facts: metadata stored with the prediction; not used.
+            info: names of the split, town and scene, for the path.
+        """
         return read_plain(root, results.cityscapes_path(info.town, sample.record.sequence, sample.record.frame))
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """Returns no files, because the label pictures of the samples are complete results."""
+        """Returns no files, because the label pictures of the samples are complete results.
+
+        Args:
+            facts: scene record and stored metadata of each sample.
+            info: names of the split, town and scene.
+        """
         return {}
 
     def preview(self, sample: SemsegSample) -> Mapping[str, UInt8Image]:

@@ -54,7 +54,13 @@ def kind_of(sample: Any) -> Kind:
 
 
 def outside(samples: Sequence[Any], view: str, device: torch.device) -> Tensor:
-    """The (B, H, W) bool mask of the pixels in one view that show no patch surface."""
+    """The (B, H, W) bool mask of the pixels in one view that show no patch surface.
+
+    Args:
+        samples: the B samples.
+        view: name of the camera.
+        device: device of the mask.
+    """
     masks = []
     for sample in samples:
         height, width = sample.images[view].shape[:2]
@@ -95,6 +101,12 @@ class SemsegObjective:
         """The terms `correct` (over correctly classified pixels) and `wrong` (over misclassified pixels).
 
         A targeted attack has the single term `target` instead.
+
+        Args:
+            model: the attacked network.
+            views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+            samples: the B samples with their ground truth.
+            indices: indices of these samples in the dataset.
         """
         logits, labels, counts = self._outputs(model, views, samples)
         if self.target is not None:
@@ -114,6 +126,12 @@ class SemsegObjective:
         With a fixed `gamma`, the correctly classified pixels are those of the output on the picture without the patch.
         If they were taken from the current output, the value would fall while the attack succeeds, because every pixel
         that becomes wrong leaves this set.
+
+        Args:
+            model: the attacked network.
+            views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+            samples: the B samples with their ground truth.
+            indices: indices of these samples in the dataset.
         """
         if not self.needs_clean_output:
             terms = [one.weight * one.value for one in self.terms(model, views, samples, indices).values()]
@@ -172,6 +190,12 @@ class DepthObjective:
         """The terms `small` (errors up to `split_m`) and `large` (larger errors).
 
         With a direction there is a single term, named `farther` or `nearer`.
+
+        Args:
+            model: the attacked network.
+            views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+            samples: the B samples with their ground truth.
+            indices: indices of these samples in the dataset.
         """
         depth_m, clean, free = self._outputs(model, views, samples, indices)
         if self._direction != "any":
@@ -185,6 +209,12 @@ class DepthObjective:
 
         A weighted sum of two means would fall when an error grows past `split_m`. One pixel with a large error would
         also count for more than all pixels with small errors.
+
+        Args:
+            model: the attacked network.
+            views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+            samples: the B samples with their ground truth.
+            indices: indices of these samples in the dataset.
         """
         depth_m, clean, free = self._outputs(model, views, samples, indices)
         if self._direction != "any":
@@ -223,7 +253,14 @@ class LossObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One term for each loss of the model with a weight other than 0."""
+        """One term for each loss of the model with a weight other than 0.
+
+        Args:
+            model: the attacked network.
+            views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+            samples: the B samples with their ground truth.
+            indices: indices of these samples in the dataset.
+        """
         losses = model.forward(views, samples)
         signs = {name: self.signs.get(name, 1.0) for name in losses}
         return {name: Term(value=loss, weight=signs[name]) for name, loss in losses.items() if signs[name]}
@@ -240,6 +277,13 @@ def counted(
 
     For each member the harm is the objective's `harm` if it has this method, otherwise its weighted terms. The terms
     against a member's defense are included.
+
+    Args:
+        objective: objective of the attack.
+        model: the attacked network, or a group of networks.
+        views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+        samples: the B samples with their ground truth.
+        indices: indices of these samples in the dataset.
     """
     if isinstance(objective, HarmObjective):
         harms = [objective.harm(member, views, samples, indices) for member in members_of(model).values()]
@@ -257,7 +301,15 @@ def weighted(
     samples: Sequence[Any],
     indices: Sequence[int],
 ) -> list[Tensor]:
-    """The weighted terms of the objective over all members of a group, for attacks that maximise their sum."""
+    """The weighted terms of the objective over all members of a group, for attacks that maximise their sum.
+
+    Args:
+        objective: objective of the attack.
+        model: the attacked network, or a group of networks.
+        views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+        samples: the B samples with their ground truth.
+        indices: indices of these samples in the dataset.
+    """
     return [
         term.weight * term.value
         for member in members_of(model).values()
@@ -272,7 +324,15 @@ def all_terms(
     samples: Sequence[Any],
     indices: Sequence[int],
 ) -> dict[str, Term]:
-    """The objective's terms for one model by name, and the terms against the model's defense if there is one."""
+    """The objective's terms for one model by name, and the terms against the model's defense if there is one.
+
+    Args:
+        objective: objective of the attack.
+        member: the attacked network, or one member of a group.
+        views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+        samples: the B samples with their ground truth.
+        indices: indices of these samples in the dataset.
+    """
     return {**objective.terms(member, views, samples, indices), **defense_terms(member, views, samples)}
 
 
@@ -282,6 +342,11 @@ def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[
     They are the negative mean of the scores, and the negative mean of the unrounded mask over the visible pixels of the
     patch. Both come from the defense-aware attacks of Z-Mask's supplement (Rossolini et al., AAAI 2023). The result is
     empty for a model without a defense, for a defense that returns neither score nor mask, and for weights of 0.
+
+    Args:
+        member: the attacked network, with or without a defense.
+        views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+        samples: the B samples with the position of their patches.
     """
     if not isinstance(member, Defended):
         return {}
@@ -295,7 +360,12 @@ def defense_terms(member: Model, views: Mapping[str, Tensor], samples: Sequence[
 
 
 def not_finite(what: str, indices: Sequence[int]) -> GearError:
-    """Makes the error for a NaN or infinite value; the message names the samples for which the value was computed."""
+    """Makes the error for a NaN or infinite value; the message names the samples for which the value was computed.
+
+    Args:
+        what: the value, for the message, such as `the objective`.
+        indices: indices of the samples.
+    """
     which = f"sample{'s' * (len(indices) > 1)} {', '.join(map(str, indices))}"
     return GearError(
         f"{what} is NaN or infinite, because the model's output for {which} with the patch is; check its weights"

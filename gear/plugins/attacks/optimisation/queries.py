@@ -64,6 +64,9 @@ class BlackBoxObjective:
     def harm(self, textures: Textures, indices: Sequence[int]) -> float:
         """The harm of textures on some samples as one number, from forward passes without gradients.
 
+        Args:
+            indices: indices of these samples in the dataset.
+
         Raises:
             RuntimeError: fewer queries are left than the evaluation costs.
             GearError: the harm is not finite.

@@ -71,6 +71,9 @@ class MaskBlock:
         """The raw score of an attack, 0 or more, as a scalar tensor with gradients with respect to both heat maps.
 
         The formula is that of `score`.
+
+        Args:
+            shallow, deep: (rows, columns) heat maps of the shallow and of the deep layers.
         """
         mask = self.mask(shallow, deep)
         return (deep * shallow * mask).sum() / (1 + mask.sum())

@@ -59,7 +59,12 @@ def mean_of(many: Sequence[ChannelStatistics]) -> ChannelStatistics:
 
 
 def on_grid(features: Tensor, grid: Cells) -> Tensor:
-    """A (C, h, w) tensor resized by nearest neighbour to (C, rows, columns)."""
+    """A (C, h, w) tensor resized by nearest neighbour to (C, rows, columns).
+
+    Args:
+        features: feature maps.
+        grid: numbers of rows and columns.
+    """
     return functional.interpolate(features[None], size=grid, mode="nearest")[0]
 
 

@@ -79,6 +79,12 @@ class Detector:
     ) -> DetectorState:
         """Calibrates the detector: statistics of features and the alarm level, from the clean pictures alone.
 
+        Args:
+            clean: pictures without a patch, (H, W, 3) uint8 by camera name, one mapping per sample.
+            patched: pictures of the same scenes with a patch; [] if there are none.
+            model: the network whose feature maps are read.
+            rng: random generator of the calibration.
+
         Raises:
             GearError: there are too few pictures, they differ in size, or the model has no such feature map.
         """
@@ -99,7 +105,14 @@ class Detector:
         return DetectorState(layer=layer, statistics=statistics, level=level, report=FitReport(values=values))
 
     def apply(self, views: Views, model: Model | None, state: DetectorState, rng: np.random.Generator) -> DefenseResult:
-        """Returns the unchanged pictures of one sample and their score, 0.5 at the alarm level."""
+        """Returns the unchanged pictures of one sample and their score, 0.5 at the alarm level.
+
+        Args:
+            views: (H, W, 3) uint8 pictures of the sample by camera name.
+            model: the network whose feature maps are read.
+            state: result of the calibration.
+            rng: random generator of the sample.
+        """
         assert model is not None
         raw = self._raw(state.statistics, self._numbers(model, views, state.layer))
         return DefenseResult(views=dict(views), score=normalised_score(raw, state.level))
@@ -109,7 +122,13 @@ class Detector:
         return dict(views)
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: DetectorState) -> DefendedBatch:
-        """The unchanged (B, 3, H, W) pictures, and (B,) scores with gradients with respect to the pictures."""
+        """The unchanged (B, 3, H, W) pictures, and (B,) scores with gradients with respect to the pictures.
+
+        Args:
+            views: (B, 3, H, W) pictures by camera name, float in 0..1.
+            model: the network whose feature maps are read.
+            state: result of the calibration.
+        """
         features = tapped(model, views, [state.layer])[state.layer]
         raw = torch.stack([self._aggregate(state.statistics.z_scores(self._compress(one))) for one in features])
         return DefendedBatch(views=dict(views), scores=normalised_score_tensor(raw, state.level))

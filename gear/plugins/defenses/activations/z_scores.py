@@ -137,6 +137,10 @@ def false_alarm_interval(count: int, false_alarms: float) -> tuple[float, float]
 
     The share above the k-th of n scores has the distribution Beta(n + 1 - k, k) over draws of the n calibration
     pictures. Pictures of other scenes may exceed the level more often.
+
+    Args:
+        count: number of clean pictures in the calibration.
+        false_alarms: share of clean pictures that may exceed the level, 0..1.
     """
     from scipy import stats
 

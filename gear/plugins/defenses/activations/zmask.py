@@ -90,6 +90,12 @@ class ZMask:
     ) -> ZMaskState:
         """Computes statistics from clean pictures, and fits the fusion block to the same scenes with patches.
 
+        Args:
+            clean: pictures without a patch, (H, W, 3) uint8 by camera name, one mapping per sample.
+            patched: pictures of the same scenes with a patch; [] if there are none.
+            model: the network whose feature maps are read.
+            rng: random generator of the calibration.
+
         Raises:
             GearError: there are no pictures, clean and patched pictures show different scenes, or no patch is visible.
         """
@@ -122,7 +128,14 @@ class ZMask:
         return ZMaskState(layers=layers, statistics=statistics, block=block, level=level, report=report)
 
     def apply(self, views: Views, model: Model | None, state: ZMaskState, rng: np.random.Generator) -> DefenseResult:
-        """Covers regions of a sample's pictures that over-activate the network; the score is the cameras' maximum."""
+        """Covers regions of a sample's pictures that over-activate the network; the score is the cameras' maximum.
+
+        Args:
+            views: (H, W, 3) uint8 pictures of the sample by camera name.
+            model: the network whose feature maps are read.
+            state: result of the calibration.
+            rng: random generator of the sample.
+        """
         assert model is not None
         masks = {name: np.zeros(picture.shape[:2], np.float32) for name, picture in views.items()}
         score = 0.0
@@ -146,13 +159,24 @@ class ZMask:
         raise ValueError("Z-Mask looks into the model: it has `forward_fitted`")
 
     def forward_fitted(self, views: Mapping[str, Tensor], model: Model, state: ZMaskState) -> Mapping[str, Tensor]:
-        """Cleans (B, 3, H, W) pictures by camera name; masks and scores of `defend_batch` are left out."""
+        """Cleans (B, 3, H, W) pictures by camera name; masks and scores of `defend_batch` are left out.
+
+        Args:
+            views: pictures, float in 0..1.
+            model: the network whose feature maps are read.
+            state: result of the calibration.
+        """
         return self.defend_batch(views, model, state).views
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: ZMaskState) -> DefendedBatch:
         """Cleans (B, 3, H, W) pictures by camera name as `apply` does, and returns masks and scores with gradients.
 
         The gradient of the covered pictures is that of the mask before rounding.
+
+        Args:
+            views: (B, 3, H, W) pictures by camera name, float in 0..1.
+            model: the network whose feature maps are read.
+            state: result of the calibration.
         """
         covers = {name: torch.zeros_like(pictures[:, :1]) for name, pictures in views.items()}
         masks = {name: pictures.new_zeros(pictures[:, 0].shape) for name, pictures in views.items()}
