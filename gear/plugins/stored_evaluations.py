@@ -206,8 +206,8 @@ def read_defended(folder: Path, stored: Mapping[str, Any]) -> dict[str, UInt8Ima
     check_files(folder, hashes)
     pictures = {}
     for name in hashes:
-        stored = cv2.imdecode(np.frombuffer(read_bytes(inside(folder, name)), np.uint8), cv2.IMREAD_COLOR)
-        if stored is None:
+        decoded = cv2.imdecode(np.frombuffer(read_bytes(inside(folder, name)), np.uint8), cv2.IMREAD_COLOR)
+        if decoded is None:
             raise DatasetError(inside(folder, name), "is no picture")
-        pictures[unquote(Path(name).stem.partition("_")[2])] = np.ascontiguousarray(stored[..., ::-1]).astype(np.uint8)
+        pictures[unquote(Path(name).stem.partition("_")[2])] = np.ascontiguousarray(decoded[..., ::-1]).astype(np.uint8)
     return pictures
