@@ -49,12 +49,12 @@ class EvaluatedDataset:
 
     Attributes:
         name: name of the dataset's folder in the evaluation.
-        label: name of the evaluation for people: model and defense.
+        label: title of the evaluation: model and defense.
         root: folder of the evaluation.
         metrics: metrics of the task by name, for each sample in the order of the samples; None if undefined.
         changes: by the name of a twin's folder, the changes of objects against that twin, by index of the
             sample.
-        stored: JSON of the dataset (patch, keys), as `results.json` has it.
+        metadata: JSON of the dataset (patch, keys), as `results.json` has it.
     """
 
     name: str
@@ -62,13 +62,13 @@ class EvaluatedDataset:
     root: Path
     metrics: tuple[Mapping[str, float | None], ...]
     changes: Mapping[str, Mapping[int, list[ObjectChange]]]
-    stored: Json
+    metadata: Json
 
     def is_of(self, dataset: Dataset[Any]) -> bool:
         """Whether this part was computed on a dataset; the dataset may have moved since."""
         plan = dataset.plan
         wanted = (plan.content_key, plan.twin_key, plan.info.patch_label)
-        return wanted == tuple(self.stored.get(key) for key in ("content_key", "twin_key", "patch"))
+        return wanted == tuple(self.metadata.get(key) for key in ("content_key", "twin_key", "patch"))
 
     def prediction(self, dataset: Dataset[Any], sample: Sample) -> Any:
         """Reads the stored prediction of a sample.
@@ -152,7 +152,7 @@ def _parts(root: Path, found: dict[str, Any]) -> tuple[EvaluatedDataset, ...]:
                 root=root,
                 metrics=metrics,
                 changes=changes.get(name, {}),
-                stored=from_json(dict[str, Any], row["dataset"], "dataset"),
+                metadata=from_json(dict[str, Any], row["dataset"], "dataset"),
             )
         )
     return tuple(parts)

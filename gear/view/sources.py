@@ -108,10 +108,10 @@ def open_compared(
 
 
 def _of_evaluation(part: EvaluatedDataset, folder: Path) -> Dataset[Any]:
-    root = Path(str(part.note.get("root", "")))
+    root = Path(str(part.metadata.get("root", "")))
     if not root.is_dir():
         raise DatasetError(folder, f"its dataset {root} is not here; give the dataset and --evaluation {folder}")
-    return open_dataset(root, str(part.note.get("split")))
+    return open_dataset(root, str(part.metadata.get("split")))
 
 
 def _order(dataset: Dataset[Any]) -> tuple[int, str]:

@@ -86,7 +86,7 @@ def check_attack(
     for model in models:
         assert isinstance(model.found.spec, ModelSpec)
         if spec.needs_gradients and not model.found.spec.has_gradients:
-            raise GearError(f"attack {spec.name!r} needs gradients; model {model.plugin.spec.name!r} gives none")
+            raise GearError(f"attack {spec.name!r} needs gradients; model {model.found.spec.name!r} gives none")
     is_counted = not spec.needs_gradients and not spec.is_control
     if queries is not None and not is_counted:
         raise GearError(f"attack {spec.name!r} takes steps; --queries is for attacks without gradients")
