@@ -50,6 +50,11 @@ TOLD: Any = {
 def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
     """Prepares the patch folder of an attack.
 
+    Args:
+        root: the patch folder.
+        plan: all inputs of the attack, as JSON.
+        force: whether patches of another attack are deleted.
+
     Returns:
         The content of `attack.json` if the folder has finished patches of this attack. Otherwise None, after the plan
         (all inputs of the attack) is written.

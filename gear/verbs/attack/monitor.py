@@ -142,7 +142,12 @@ class Recorder:
         return bool(self.stopped)
 
     def tell(self, done: int, queries_left: float | None = None) -> None:
-        """Reports the progress to `on_progress`: in queries if the attack counts them, otherwise in steps."""
+        """Reports the progress to `on_progress`: in queries if the attack counts them, otherwise in steps.
+
+        Args:
+            done: number of finished steps.
+            queries_left: number of remaining queries; None if the attack does not count queries.
+        """
         if self.queries is None:
             self.on_progress(done, self.steps)
         else:

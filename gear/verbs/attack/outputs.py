@@ -24,7 +24,13 @@ BLUE, RED, GREY = "#1f5fa8", "#b3402a", "0.55"
 
 
 def write_patches(root: Path, patches: Sequence[Patch], notes: Json) -> None:
-    """Writes `patch_0.png`, …, then `patch.safetensors`, and last `attack.json`, which marks the folder as complete."""
+    """Writes `patch_0.png`, …, then `patch.safetensors`, and last `attack.json`, which marks the folder as complete.
+
+    Args:
+        root: the patch folder.
+        patches: patches of the attack, one per surface.
+        notes: content of `attack.json`.
+    """
     for patch in patches:
         write_whole(root, f"{patch.name}.png", encode_rgb(as_picture(patch)))
     exact = {patch.name: np.ascontiguousarray(patch.rgb, np.float32) for patch in patches}
@@ -40,7 +46,14 @@ def as_picture(patch: Patch) -> UInt8Image:
 def write_curves(
     root: Path, title: str, curves: Mapping[str, Sequence[float]], judged: Sequence[tuple[int, float]]
 ) -> None:
-    """Writes `figures/curves.png`: every recorded value over the steps, and the harm on the validation samples."""
+    """Writes `figures/curves.png`: every recorded value over the steps, and the harm on the validation samples.
+
+    Args:
+        root: the patch folder.
+        title: title of the figure.
+        curves: recorded values of all steps, by name.
+        judged: step and harm of each validation.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -71,6 +84,10 @@ def write_samples(root: Path, pairs: Sequence[tuple[UInt8Image, UInt8Image]]) ->
     """Writes `figures/samples.png`, one row per sample: the picture without patches and the picture with patches.
 
     Pictures wider than `SHOWN_PX` are resized.
+
+    Args:
+        root: the patch folder.
+        pairs: (H, W, 3) uint8 pictures of each sample, without and with patches.
     """
     rows = [np.concatenate([_shown(picture) for picture in pair], axis=1) for pair in pairs]
     if rows:

@@ -66,7 +66,14 @@ class Scenes:
         return float(np.mean(values))
 
     def value(self, model: Model, objective: Objective, patches: Sequence[Tensor], indices: Sequence[int]) -> Tensor:
-        """Returns the mean objective over the samples in `indices` as a differentiable scalar."""
+        """Returns the mean objective over the samples in `indices` as a differentiable scalar.
+
+        Args:
+            model: the attacked network.
+            objective: objective of the attack.
+            patches: (3, h, w) each, in 0..1, one per surface.
+            indices: indices of the samples.
+        """
         samples = [self.samples[index] for index in indices]
         views = {view: self.compositor.compose(patches, indices, view) for view in samples[0].images}
         numbers = counted(objective, model, views, samples, indices)
@@ -89,6 +96,11 @@ class Scenes:
     def check_adaptive(self, model: Model, surfaces: int, rng: np.random.Generator) -> None:
         """Checks that the pictures, scores and masks of the defenses have a gradient with respect to random
         patches.
+
+        Args:
+            model: the attacked network with its defenses.
+            surfaces: number of surfaces, each of which gets a random patch.
+            rng: random generator of the patches.
 
         Raises:
             GearError: one of these gradients is 0, so the attack would not be adaptive to the defense.

@@ -59,6 +59,10 @@ def verify(request: VerifyRequest, callbacks: Callbacks) -> dict[str, GapReport]
     attacked. The folder `out/verify/<scene>-<split>-<hash>` gets `<model>/gap.json` and `gap.txt` for each model; the
     rendered dataset lies in the folder of the first model.
 
+    Args:
+        request: arguments, which `gear.attack` describes.
+        callbacks: progress and warnings.
+
     Returns:
         One report per model, by the model's name.
 

@@ -45,6 +45,12 @@ class Marker:
 def kept_marker(root: Path, dataset: Dataset[Any], index: int, spec: DefenseSpec[Any]) -> Marker | None:
     """Returns the marker of a cleaned sample; None if there is no marker, the source pictures changed, or a file
     is damaged.
+
+    Args:
+        root: output folder.
+        dataset: dataset with the source pictures.
+        index: index of the sample.
+        spec: spec of the defense.
     """
     path = inside(root, marker_path(dataset.plan.info.split, index))
     if not path.is_file():
@@ -60,7 +66,16 @@ def kept_marker(root: Path, dataset: Dataset[Any], index: int, spec: DefenseSpec
 def write_sample(
     root: Path, dataset: Dataset[Any], index: int, sample: Any, spec: DefenseSpec[Any], result: DefenseResult
 ) -> Marker:
-    """Writes the cleaned pictures and masks of one sample, then its marker, and returns the marker."""
+    """Writes the cleaned pictures and masks of one sample, then its marker, and returns the marker.
+
+    Args:
+        root: output folder.
+        dataset: dataset with the source pictures.
+        index: index of the sample.
+        sample: the sample.
+        spec: spec of the defense.
+        result: pictures, masks and score that the defense returned.
+    """
     info = dataset.plan.info
     cleans = "images" in spec.outputs
     pictures = _picture_files(dataset, dataclasses.replace(sample, images=dict(result.views)) if cleans else sample)
@@ -83,6 +98,10 @@ def write_sample(
 def marker_path(split: str, index: int) -> str:
     """Returns the path of a sample's marker (the JSON record that the sample was cleaned), relative to the output
     folder.
+
+    Args:
+        split: name of the split.
+        index: index of the sample.
     """
     return f"{FOLDER}/{split}/samples/{index:06d}.json"
 

@@ -157,6 +157,11 @@ def suitable(plugin: PluginEntry, task: str) -> DefenseSpec[Any]:
 def begin(root: Path, split: str, plan: Json) -> None:
     """Writes the plan of the run (defense, options, seed, dataset), or checks that an existing plan is equal.
 
+    Args:
+        root: output folder.
+        split: name of the split.
+        plan: inputs of the run, as JSON.
+
     Raises:
         DatasetError: the existing plan differs, or a file cannot be written.
     """

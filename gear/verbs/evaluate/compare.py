@@ -123,6 +123,10 @@ def mask_means(results: Sequence[SampleResult], *, has_patch: bool) -> dict[str,
 
     Metrics of masks are left out if the defense returns no masks, and the alarm if it returns no scores. Without a
     patch, the only metric of masks is `mask_area`, the share of the picture that is masked by mistake.
+
+    Args:
+        results: results of the samples of one dataset.
+        has_patch: whether the dataset contains a patch.
     """
     masks = [result.mask for result in results if result.mask is not None]
     scores = [result.score for result in results if result.score is not None]
@@ -186,6 +190,10 @@ def as_one(name: str, members: Sequence[EvaluatedDataset]) -> EvaluatedDataset:
 def compared(rows: Sequence[EvaluatedDataset], seed: int) -> Iterable[Difference]:
     """Yields the difference between every dataset with a patch and its twins, the same samples without a patch and
     with a random patch.
+
+    Args:
+        rows: all evaluated datasets.
+        seed: seed of the permutation tests.
     """
     for row in rows:
         for control in CONTROLS[: CONTROLS.index(row.patch) if row.patch in CONTROLS else len(CONTROLS)]:

@@ -41,6 +41,11 @@ def check_pools(pools: Pools, roots: Iterable[Path]) -> None:
 def pooled(rows: Sequence[EvaluatedDataset], pools: Pools, seed: int) -> Iterable[Pool]:
     """Yields the results of each pool of datasets, with the differences to the pools `none` and `random` if these
     show the same scenes.
+
+    Args:
+        rows: all evaluated datasets.
+        pools: root folders of the datasets of each pool, by name of the pool.
+        seed: seed of the permutation tests.
     """
     by_root = {row.dataset.root.resolve(): row for row in rows}
     found = {name: [by_root[Path(root).resolve()] for root in members] for name, members in pools.items()}

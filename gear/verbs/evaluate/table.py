@@ -167,7 +167,12 @@ def _objects(report: EvaluateReport, labels: Mapping[str, str], width: int) -> l
 
 
 def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
-    """Returns a metric with its interval as text, such as `0.712 [0.690, 0.734]`; empty if the metric is missing."""
+    """Returns a metric with its interval as text, such as `0.712 [0.690, 0.734]`; empty if the metric is missing.
+
+    Args:
+        one: the metric.
+        is_signed: whether positive values get a plus sign.
+    """
     if one is None:
         return ""
     text = number(one.value, is_signed=is_signed)
@@ -175,7 +180,12 @@ def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
 
 
 def number(value: float | None, *, is_signed: bool = False) -> str:
-    """Returns a number as text, with three decimals, or with one if it is 100 or more; `-` for NaN and None."""
+    """Returns a number as text, with three decimals, or with one if it is 100 or more; `-` for NaN and None.
+
+    Args:
+        value: the number.
+        is_signed: whether positive numbers get a plus sign.
+    """
     if value is None or value != value:
         return "-"
     sign = "+" if is_signed else ""

@@ -86,7 +86,12 @@ def new_package(kind: str, name: str, *, out: str | Path = ".") -> Path:
 
 
 def contents(kind: Kind, words: dict[str, str]) -> dict[str, str]:
-    """Returns the texts of all files of a new plugin package, by path relative to the package's folder."""
+    """Returns the texts of all files of a new plugin package, by path relative to the package's folder.
+
+    Args:
+        kind: kind of the plugin.
+        words: texts that replace the placeholders of the templates, by placeholder, such as `name` and `module`.
+    """
     words = words | {"use": _filled(USE[kind], words)}
     places = {
         "pyproject.toml": "common/pyproject.toml",

@@ -71,7 +71,13 @@ class Canvas:
         return np.asarray(self._origin_px + points * (self.px_per_m, -self.px_per_m))
 
     def fill(self, outline_px: npt.ArrayLike, colour: Colour, opacity: float = 1.0) -> None:
-        """Fills the polygon with the (N, 2) corners `outline_px`."""
+        """Fills the polygon with the (N, 2) corners `outline_px`.
+
+        Args:
+            outline_px: corners in pixels of the finished picture.
+            colour: RGB, 0..255.
+            opacity: 0 (invisible) to 1 (opaque).
+        """
         fixed = _fixed(outline_px)
         if opacity >= 1.0:
             cv2.fillPoly(self._pixels, [fixed], colour, cv2.LINE_AA, SHIFT)
@@ -83,7 +89,15 @@ class Canvas:
     def line(
         self, points_px: npt.ArrayLike, colour: Colour, width_px: float, *, closed: bool = False, opacity: float = 1.0
     ) -> None:
-        """Draws a line of `width_px` through the (N, 2) points; `closed` joins the last point to the first."""
+        """Draws a line of `width_px` through the (N, 2) points; `closed` joins the last point to the first.
+
+        Args:
+            points_px: points in pixels of the finished picture.
+            colour: RGB, 0..255.
+            width_px: width of the line.
+            closed: whether the last point is joined to the first.
+            opacity: 0 (invisible) to 1 (opaque).
+        """
         width = max(1, round(width_px * OVERSAMPLING))
         if opacity >= 1.0:
             cv2.polylines(self._pixels, [_fixed(points_px)], closed, colour, width, cv2.LINE_AA, SHIFT)
@@ -96,7 +110,15 @@ class Canvas:
         self, points_px: npt.ArrayLike, colour: Colour, width_px: float, *, dash_px: float, gap_px: float,
         closed: bool = False,
     ) -> None:  # fmt: skip
-        """Draws a dashed line through the (N, 2) points; `closed` joins the last point to the first."""
+        """Draws a dashed line through the (N, 2) points; `closed` joins the last point to the first.
+
+        Args:
+            points_px: points in pixels of the finished picture.
+            colour: RGB, 0..255.
+            width_px: width of the line.
+            dash_px, gap_px: lengths of dashes and gaps.
+            closed: whether the last point is joined to the first.
+        """
         points = np.asarray(points_px, dtype=np.float64)
         if closed:
             points = np.concatenate([points, points[:1]])
@@ -108,7 +130,13 @@ class Canvas:
             self.line(piece, colour, width_px)
 
     def dot(self, centre_px: npt.ArrayLike, radius_px: float, colour: Colour) -> None:
-        """Draws a filled disc around a point."""
+        """Draws a filled disc around a point.
+
+        Args:
+            centre_px: (x, y) in pixels of the finished picture.
+            radius_px: radius of the disc.
+            colour: RGB, 0..255.
+        """
         (x, y), one = _fixed(np.atleast_2d(centre_px))[0, 0], OVERSAMPLING << SHIFT
         cv2.circle(self._pixels, (int(x), int(y)), round(radius_px * one), colour, -1, cv2.LINE_AA, SHIFT)
 
@@ -136,7 +164,13 @@ class Canvas:
         part[:] = mixed >> 8
 
     def outline(self, mask: Mask, colour: Colour, width_px: float) -> None:
-        """Draws the outlines of all regions of a mask."""
+        """Draws the outlines of all regions of a mask.
+
+        Args:
+            mask: (H, W) bool mask.
+            colour: RGB, 0..255.
+            width_px: width of the outlines.
+        """
         rings, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         cv2.drawContours(self._pixels, rings, -1, colour, max(1, round(width_px * OVERSAMPLING)), cv2.LINE_AA)
 
@@ -177,7 +211,13 @@ class Canvas:
         cv2.putText(self._pixels, words, origin, FONT, scale, colour, thickness, cv2.LINE_AA)
 
     def text_width_px(self, words: str, height_px: float, *, bold: bool = False) -> float:
-        """Returns the width of a line of text in pixels of the finished picture."""
+        """Returns the width of a line of text in pixels of the finished picture.
+
+        Args:
+            words: the text.
+            height_px: height of the letters.
+            bold: whether the text is bold.
+        """
         scale, thickness = _font(height_px, bold)
         return float(cv2.getTextSize(words, FONT, scale, thickness)[0][0]) / OVERSAMPLING
 
@@ -191,7 +231,12 @@ def round_step_m(span_m: float, max_parts: int) -> float:
 
 
 def rectangle(x_px: float, y_px: float, width_px: float, height_px: float) -> Points:
-    """Returns the (4, 2) corners of an axis-parallel rectangle, given by its upper left corner and its size."""
+    """Returns the (4, 2) corners of an axis-parallel rectangle, given by its upper left corner and its size.
+
+    Args:
+        x_px, y_px: upper left corner.
+        width_px, height_px: size.
+    """
     return np.array([x_px, y_px]) + np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * (width_px, height_px)
 
 

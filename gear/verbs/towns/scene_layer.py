@@ -39,7 +39,13 @@ def scene_colours(scenes: Mapping[str, SceneSpec]) -> dict[str, Colour]:
 
 
 def draw_limits(canvas: Canvas, scene: SceneSpec, colour: Colour) -> None:
-    """Outlines the areas in which the ego car, vehicles and people of a scene may be."""
+    """Outlines the areas in which the ego car, vehicles and people of a scene may be.
+
+    Args:
+        canvas: the town map.
+        scene: the scene with its areas.
+        colour: RGB, 0..255.
+    """
     board = scene.boards[0]
     outline = limits_outline_m(board, scene.npc_vehicles)
     if outline is not None:
@@ -55,6 +61,12 @@ def draw_limits(canvas: Canvas, scene: SceneSpec, colour: Colour) -> None:
 
 def draw_boards(canvas: Canvas, library: AssetLibrary, scene: SceneSpec, colour: Colour) -> None:
     """Draws each board of a scene, and a wedge in the direction that the board faces; several boards are numbered.
+
+    Args:
+        canvas: the town map.
+        library: files of the assets.
+        scene: the scene with its boards.
+        colour: RGB, 0..255.
 
     Raises:
         TownError: the file of a board cannot be compiled, or the board has no face (the rectangle for the patch).
@@ -75,7 +87,13 @@ def draw_boards(canvas: Canvas, library: AssetLibrary, scene: SceneSpec, colour:
 
 
 def draw_names(canvas: Canvas, scenes: Mapping[str, SceneSpec], colours: Mapping[str, Colour]) -> None:
-    """Writes the name of each scene near its first board, at a position away from boards and other names."""
+    """Writes the name of each scene near its first board, at a position away from boards and other names.
+
+    Args:
+        canvas: the town map.
+        scenes: scenes by name.
+        colours: RGB, 0..255, of each scene.
+    """
     clear_px = max(12.0, CLEAR_M * canvas.px_per_m)
     boards = [board for name in colours for board in scenes[name].boards]
     taken: list[Box] = [(*canvas.to_px(board.position_m)[0], clear_px, clear_px) for board in boards]

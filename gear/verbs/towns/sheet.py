@@ -83,7 +83,14 @@ def draw_sheet(
 
 
 def thumbnail(town: Town, name: str, scene: SceneSpec, options: SheetOptions) -> tuple[UInt8Image, str]:
-    """Renders one sample of a scene; returns (H, W, 3) uint8 RGB and a line about its patch surfaces and road users."""
+    """Renders one sample of a scene; returns (H, W, 3) uint8 RGB and a line about its patch surfaces and road users.
+
+    Args:
+        town: the town.
+        name: name of the scene.
+        scene: the scene.
+        options: renderer, quality, weather, seed and size of the picture.
+    """
     world = World.build(town=town.library.town, scene_name=name, scene=scene, weather=options.weather)
     rig = Rig(cameras=(CameraMount(name="rgb", width_px=options.width_px, height_px=options.height_px),))
     record = ScenePlanner(world, rig, SplitConfig(seed=options.seed, samples=1), split_name="debug").plan(0)

@@ -23,7 +23,12 @@ STRIPE_EVERY_M = 1.1
 
 
 def draw_traffic(canvas: Canvas, graph: LaneGraph) -> None:
-    """Draws the lanes, sidewalks, crosswalks and parking bays of a town."""
+    """Draws the lanes, sidewalks, crosswalks and parking bays of a town.
+
+    Args:
+        canvas: the town map.
+        graph: lanes, sidewalks, crosswalks and parking bays of the town.
+    """
     for bay in graph.bays:
         _bay(canvas, bay)
     for walk in graph.walks.values():

@@ -120,6 +120,13 @@ def load(
 ) -> tuple[TrainingState, dict[str, Tensor]] | None:
     """Loads the checkpoint in the folder `root` into the network, the averaged weights and the optimiser.
 
+    Args:
+        root: folder of the training.
+        plan: everything on which the weights depend, as JSON.
+        module: the network.
+        mean: moving average of the weights.
+        optimiser: optimiser of the network.
+
     Returns:
         The progress and the extra tensors; None if there is no checkpoint.
 

@@ -22,6 +22,12 @@ BLUE, RED, GREEN = "#1f5fa8", "#b3402a", "#2f7d4f"
 def write_curves(root: Path, spec: TaskSpec, progress: TrainingState, title: str) -> None:  # type: ignore[type-arg]
     """Writes `curves.png`: training and validation loss on the left, the task's metric and the learning rate on
     the right.
+
+    Args:
+        root: folder of the training.
+        spec: spec of the task, which names its metric.
+        progress: recorded steps and validations.
+        title: title of the figure.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

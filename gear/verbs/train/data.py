@@ -26,6 +26,11 @@ def keep_some(samples: Samples, share: float, seed: int) -> tuple[Samples, Sampl
     All samples of a sequence, in every weather and with every patch, go to the same side. Therefore no scene content of
     the validation occurs in training.
 
+    Args:
+        samples: all samples.
+        share: share of the samples that is held out for validation, 0..1.
+        seed: seed of the draw.
+
     Raises:
         GearError: there are too few samples.
     """

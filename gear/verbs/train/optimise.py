@@ -15,6 +15,10 @@ MOMENTUM = 0.9
 def optimiser_of(module: nn.Module, config: TrainConfig) -> torch.optim.Optimizer:
     """Returns AdamW or SGD for the trainable parameters; one-dimensional parameters (biases, normalisation) have
     no weight decay.
+
+    Args:
+        module: the network.
+        config: config of the training, with the optimiser's name, learning rate and weight decay.
     """
     trained = [parameter for parameter in module.parameters() if parameter.requires_grad]
     groups = [

@@ -104,6 +104,12 @@ def command_of(
 ) -> str:
     """Returns the `gear train` command line for the given values; a flag that is True has no value, and None or
     False leaves a flag out.
+
+    Args:
+        task, model: names of the task and of the network.
+        data, val: folders of training and validation data.
+        flags: values of further flags by name.
+        settings: `KEY=VALUE` texts of `--set`.
     """
     words = ["gear", "train", "--task", task, "--model", model, "--data", *data, *(["--val", *val] if val else [])]
     for key, value in flags.items():
@@ -115,7 +121,13 @@ def command_of(
 
 
 def packed(origin: Origin, state: AnyMapping[str, Tensor], progress: TrainingState) -> bytes:
-    """Returns the weights of the last validation as the bytes of a safetensors file, with matrices in float16."""
+    """Returns the weights of the last validation as the bytes of a safetensors file, with matrices in float16.
+
+    Args:
+        origin: network, task, config and data of the training.
+        state: the weights by parameter name.
+        progress: state of the training, with its validations.
+    """
     metrics = metrics_of(progress.validations[-1])
     return serialised(state, origin.metadata(metrics), halves=True)
 
@@ -132,6 +144,10 @@ def is_kept(root: Path, progress: TrainingState) -> bool:
     """Whether the file of the best weights exists and has the recorded hash.
 
     Checkpoints of older versions record no hash; then any file counts.
+
+    Args:
+        root: folder of the training.
+        progress: state of the training, with the recorded hash.
     """
     path = root / WEIGHTS
     return path.is_file() and progress.best_sha256 in ("", sha256(read_bytes(path)))
@@ -139,6 +155,10 @@ def is_kept(root: Path, progress: TrainingState) -> bool:
 
 def check_kept(root: Path, progress: TrainingState) -> None:
     """Checks that the file of the best weights exists and has the recorded hash.
+
+    Args:
+        root: folder of the training.
+        progress: state of the training, with the recorded hash.
 
     Raises:
         DatasetError: the file is missing, or has other content.
@@ -152,7 +172,13 @@ def check_kept(root: Path, progress: TrainingState) -> None:
 
 
 def write_history(root: Path, origin: Origin, progress: TrainingState) -> None:
-    """Writes `train.json`, the history of the training, and `card.md`, the model card, into the folder `root`."""
+    """Writes `train.json`, the history of the training, and `card.md`, the model card, into the folder `root`.
+
+    Args:
+        root: folder of the training.
+        origin: network, task, config and data of the training.
+        progress: final state of the training.
+    """
     config: Any = to_plain(origin.config)
     history = {
         "task": origin.task,

@@ -161,6 +161,12 @@ def train(
 def run_train(request: TrainRequest, callbacks: Callbacks, on_step: OnStep | None = None) -> TrainReport:
     """Trains a network with the arguments in `request`, which `gear.train` describes.
 
+    Args:
+        request: arguments of the training.
+        callbacks: progress and warnings.
+        on_step: called after each step with the state, the finished share of the training (0..1) and the metrics of a
+            validation; None for no calls.
+
     Raises:
         GearError: an error that the user can correct; the message is one line.
     """

@@ -31,6 +31,11 @@ def picture_scale(plugin: PluginEntry, config: TrainConfig, samples: Samples) ->
     with a time budget, without crops and without adversarial patches. The network's weights must be able to record the
     factor, and the task's ground truth must not depend on the principal point, as 3D boxes do.
 
+    Args:
+        plugin: the network's plugin.
+        config: config of the training.
+        samples: training samples.
+
     Raises:
         GearError: smaller pictures are requested together with adversarial patches.
     """

@@ -38,6 +38,10 @@ def check_options(plugin: PluginEntry, config: TrainConfig) -> None:
     Initial weights given as an option would be recorded as random weights, and a precision would also apply to
     validation.
 
+    Args:
+        plugin: the network's plugin.
+        config: config of the training.
+
     Raises:
         GearError: such an option is given.
     """
@@ -51,6 +55,11 @@ def check_options(plugin: PluginEntry, config: TrainConfig) -> None:
 def sizes_note(plugin: PluginEntry, config: TrainConfig, samples: Samples) -> str:
     """Returns a warning if the pictures have several sizes and the weights would record the scale of one size;
     otherwise an empty text.
+
+    Args:
+        plugin: the network's plugin.
+        config: config of the training.
+        samples: training samples.
     """
     widths_px = _widths_px(samples)
     if len(widths_px) == 1 or not _notes_share(plugin, config):
@@ -62,7 +71,12 @@ def sizes_note(plugin: PluginEntry, config: TrainConfig, samples: Samples) -> st
 
 
 def picture_share(samples: Samples, spec: TaskSpec[Any]) -> float:
-    """Returns the width of the pictures divided by the task's default width; 1 if the pictures have several widths."""
+    """Returns the width of the pictures divided by the task's default width; 1 if the pictures have several widths.
+
+    Args:
+        samples: training samples.
+        spec: spec of the task.
+    """
     usual = getattr(spec.config(), "width_px", None)
     widths_px = _widths_px(samples)
     return width_share(widths_px.pop(), usual) if usual and len(widths_px) == 1 else 1.0
@@ -148,6 +162,10 @@ def precision_of(plugin: PluginEntry, config: TrainConfig) -> Literal["float32",
     It is the requested precision. For `auto` it is bfloat16 if there is a time budget and the device is faster in
     bfloat16, else float32. Without a time budget the same command gives the same weights, so `auto` then does not
     depend on the device.
+
+    Args:
+        plugin: the network's plugin.
+        config: config of the training.
     """
     if config.precision != "auto":
         return config.precision
@@ -161,6 +179,11 @@ def build_network(plugin: PluginEntry, config: TrainConfig, *, precision: str) -
     """Builds the network on its device, with random weights drawn from the seed.
 
     The options `weights`, `seed`, `device` and `precision` are set only if the network has them.
+
+    Args:
+        plugin: the network's plugin.
+        config: config of the training.
+        precision: `float32` or `bfloat16`.
 
     Raises:
         ConfigError: an option does not fit.
@@ -181,6 +204,10 @@ def freeze_pretrained(model: Any, init: str) -> None:
     """Freezes the parts of a network that are not trained further after published weights are loaded.
 
     A network with random weights, or with weights loaded by `trunk:`, is trained as a whole.
+
+    Args:
+        model: the built network.
+        init: the initial weights, as in `TrainConfig.init`.
     """
     if init not in ("", NONE) and not init.startswith(TRUNK):
         freeze_trunks(model.module())

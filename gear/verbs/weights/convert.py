@@ -58,7 +58,13 @@ class ConvertReport:
 
     @classmethod
     def of(cls, model: str, path: Path, tensors: int) -> ConvertReport:
-        """Returns the report on a weights file that was just written."""
+        """Returns the report on a weights file that was just written.
+
+        Args:
+            model: name of the network.
+            path: path of the written file.
+            tensors: number of its tensors.
+        """
         data = read_bytes(path)
         return cls(model=model, path=path, sha256=sha256(data), size_mb=len(data) / 1e6, tensors=tensors)
 
