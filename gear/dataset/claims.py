@@ -169,6 +169,10 @@ class Claims:
 def clear_claims(root: Path, split: str) -> None:
     """Removes claims that killed runs have left, and the folder of claims if it is empty.
 
+    Args:
+        root: root folder of the dataset.
+        split: name of the split.
+
     Raises:
         DatasetError: there is a link in the path of a claim.
     """

@@ -39,6 +39,10 @@ def note_failure(root: Path, split: str, outcome: Outcome, tries: int) -> None:
 def noted_failures(root: Path, split: str) -> set[int]:
     """The indices of the samples that have a note, because an earlier run could not make them.
 
+    Args:
+        root: root folder of the dataset.
+        split: name of the split.
+
     Raises:
         DatasetError: the folder of the notes is a link.
     """

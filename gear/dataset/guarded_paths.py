@@ -190,6 +190,10 @@ def refuse_shared(descriptor: int, path: Path) -> None:
 
     A file that another run has removed meanwhile has none, and passes.
 
+    Args:
+        descriptor: descriptor of the open file.
+        path: path of the file, for the message.
+
     Raises:
         DatasetError: the file has several hard links, or is no regular file.
     """

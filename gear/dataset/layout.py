@@ -26,12 +26,23 @@ def sidecar_path(split: str, index: int) -> str:
     files.
 
     The sidecar is written last, so a sample that has a sidecar is complete.
+
+    Args:
+        split: name of the split.
+        index: index of the sample.
     """
     return f"{split_folder(split)}/samples/{index:06d}.json"
 
 
 def auxiliary_path(split: str, kind: str, index: int, name: str) -> str:
-    """The path of an additional file of a sample; `kind` is its folder, such as `probes` or `scans`."""
+    """The path of an additional file of a sample; `kind` is its folder, such as `probes` or `scans`.
+
+    Args:
+        split: name of the split.
+        kind: folder of the file, such as `probes` or `scans`.
+        index: index of the sample.
+        name: name of the file after the index.
+    """
     return f"{split_folder(split)}/{kind}/{index:06d}_{name}"
 
 
@@ -61,12 +72,22 @@ def begun_path(split: str, what: str) -> str:
 
 
 def claim_path(split: str, index: int) -> str:
-    """The path of the claim on a sample, a locked file that exists while a run makes the sample."""
+    """The path of the claim on a sample, a locked file that exists while a run makes the sample.
+
+    Args:
+        split: name of the split.
+        index: index of the sample.
+    """
     return f"{split_folder(split)}/claims/{index:06d}.claim"
 
 
 def failed_path(split: str, index: int) -> str:
-    """The path of the note on a sample that could not be made; the note is deleted when the sample is made."""
+    """The path of the note on a sample that could not be made; the note is deleted when the sample is made.
+
+    Args:
+        split: name of the split.
+        index: index of the sample.
+    """
     return f"{split_folder(split)}/failed/{index:06d}.json"
 
 
@@ -76,5 +97,10 @@ def manifest_path(split: str) -> str:
 
 
 def patch_path(label: str, name: str) -> str:
-    """The path of the dataset's own copy of a patch picture, relative to the dataset's root."""
+    """The path of the dataset's own copy of a patch picture, relative to the dataset's root.
+
+    Args:
+        label: name of the patch set.
+        name: name of the patch in the set.
+    """
     return f"{GEAR}/patches/{label}/{name}"

@@ -207,6 +207,10 @@ def _copy_sample(parts: Parts, out: Path, hashes: dict[str, str], index: int) ->
 def sidecar_of(parts: Parts, index: int) -> bytes:
     """The bytes of a sample's sidecar (JSON file of the sample), which must be equal in all folders that have it.
 
+    Args:
+        parts: the folders that are merged, by what they hold.
+        index: index of the sample.
+
     Raises:
         DatasetError: two folders have different ones, or one cannot be read.
     """
@@ -222,6 +226,11 @@ def sidecar_of(parts: Parts, index: int) -> bytes:
 
 def files_of(parts: Parts, root: Path, index: int) -> Mapping[str, str]:
     """The hashes of a sample's files by path, as its sidecar (JSON file of the sample) in a folder names them.
+
+    Args:
+        parts: the folders that are merged, by what they hold.
+        root: folder whose sidecar is read.
+        index: index of the sample.
 
     Raises:
         DatasetError: the sidecar is damaged, or names a file that is no file of a sample.

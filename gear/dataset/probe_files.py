@@ -92,6 +92,11 @@ def crop_probe(surface: str, view: str, black: UInt16Image, white: UInt16Image, 
 def probe_files(probes: Sequence[Probe], split: str, index: int) -> AuxiliaryFiles:
     """Encodes each probe as two 16-bit RGB PNG files; returns them by name in the sidecar (the JSON file of the
     sample).
+
+    Args:
+        probes: probes of the sample, one per surface and view.
+        split: name of the split.
+        index: index of the sample.
     """
     files = {}
     for probe in probes:
@@ -121,6 +126,11 @@ def probes_of(dataset: Dataset[Any], index: int, view: str) -> tuple[Probe, ...]
     """Reads the probes of one sample in one view, in the order of the surfaces.
 
     A surface that changes no pixel of the view has no probe.
+
+    Args:
+        dataset: the split.
+        index: index of the sample.
+        view: name of the camera.
 
     Raises:
         DatasetError: the split was collected without probes, or a file is missing or damaged.

@@ -171,6 +171,10 @@ def check_hash(root: Path, relative: str, digest: str) -> bytes:
 def read_manifest(root: Path, plan: Plan) -> Json:
     """Reads the manifest of a finished split: JSON with metadata and the hashes of all files.
 
+    Args:
+        root: root folder of the dataset.
+        plan: plan of the split.
+
     Raises:
         DatasetError: the split is not finished (it has no manifest, or more samples than the manifest lists), or the
             manifest is damaged or lists no files.
@@ -255,6 +259,9 @@ class Twins(Sequence[tuple[SampleT, SampleT]], Generic[SampleT]):
 
 def pair_twins(first: Dataset[Sample], second: Dataset[Sample]) -> Twins[Sample]:
     """Pairs the samples of two splits that differ only in their patch, by index.
+
+    Args:
+        first, second: the two splits.
 
     Raises:
         DatasetError: the splits differ in more than their patch.

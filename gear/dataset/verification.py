@@ -77,7 +77,13 @@ class SplitCheck:
     findings: list[Finding] = field(default_factory=list)
 
     def found(self, path: str, problem: Problem, detail: str = "") -> None:
-        """Adds a file that is damaged, missing or unexpected to the result."""
+        """Adds a file that is damaged, missing or unexpected to the result.
+
+        Args:
+            path: path of the file relative to the dataset's root.
+            problem: kind of the problem.
+            detail: explanation for the message; "" for none.
+        """
         self.findings.append(Finding(path=path, problem=problem, detail=detail))
 
 

@@ -62,6 +62,10 @@ def entries_of(content: Any, path: Path) -> list[Candidate]:
     """The mappings in a checkpoint that hold tensors, the most likely network first. Keys are unchanged; no prefix
     is removed.
 
+    Args:
+        content: content of the checkpoint, as torch reads it.
+        path: path of the checkpoint, for the message.
+
     Raises:
         GearError: the checkpoint holds no tensors.
     """

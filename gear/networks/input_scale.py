@@ -18,7 +18,12 @@ NEGLIGIBLE = 0.02
 
 
 def width_share(width_px: int, usual_px: int) -> float:
-    """Width of the pictures divided by the task's default width; 1 if the difference is negligible."""
+    """Width of the pictures divided by the task's default width; 1 if the difference is negligible.
+
+    Args:
+        width_px: width of the pictures.
+        usual_px: the task's default width.
+    """
     share = width_px / usual_px
     return 1.0 if abs(share - 1) <= NEGLIGIBLE else share
 

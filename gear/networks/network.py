@@ -135,7 +135,12 @@ class Network(nn.Module, ABC):
 
     @abstractmethod
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """Scalar losses by name; training minimises their sum. Subclasses implement this."""
+        """Scalar losses by name; training minimises their sum. Subclasses implement this.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B samples.
+            targets: the B samples with their ground truth.
+        """
 
     @abstractmethod
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
@@ -170,6 +175,11 @@ def as_batch(
     """Stacks pictures of one size into the input of `Model.forward`: (B, 3, H, W) float32 in 0..1 by camera name.
 
     If `device` is not None, the pictures are copied to this device as bytes and converted to float32 there.
+
+    Args:
+        samples: (H, W, 3) uint8 pictures by camera name, one mapping per sample.
+        views: names of the cameras.
+        device: device of the batch; None for the CPU.
     """
     stacked = {name: _channels_first([sample[name] for sample in samples]) for name in views}
     return {name: torch.from_numpy(one).to(device).float().div_(255) for name, one in stacked.items()}

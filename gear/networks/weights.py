@@ -153,7 +153,14 @@ def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
 
 
 def write(path: str | Path, state: Mapping[str, Tensor], metadata: Mapping[str, str], *, halves: bool = False) -> None:
-    """Writes a weights file; the file appears whole or not at all. `serialised` documents the arguments."""
+    """Writes a safetensors file; the file appears whole or not at all.
+
+    Args:
+        path: path of the file.
+        state: tensors by parameter name.
+        metadata: texts by key.
+        halves: whether tensors of two and more dimensions are stored in float16.
+    """
     write_alone(Path(path), serialised(state, metadata, halves=halves))
 
 

@@ -137,13 +137,27 @@ class AttackContract:
         seed: int = SEED,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Runs a new attack with `TinyCompositor`, and returns its patches."""
+        """Runs a new attack with `TinyCompositor`, and returns its patches.
+
+        Args:
+            model: the attacked model, which counts its calls.
+            dataset: samples on which the patches are optimised.
+            steps: number of steps.
+            seed: seed of the attack.
+            monitor: receives the progress of each step; None for no monitor.
+        """
         compositor = TinyCompositor(dataset)
         rng = derive_rng(seed, "attack")
         return self.make().optimise(model, dataset, compositor, budget=self.budget(steps), rng=rng, monitor=monitor)
 
     def harm(self, model: Counted, dataset: Sequence[Any], patches: Sequence[Patch]) -> float:
-        """The harm that the attack maximises: the sum of the model's losses. Override it for another objective."""
+        """The harm that the attack maximises: the sum of the model's losses. Override it for another objective.
+
+        Args:
+            model: the attacked model.
+            dataset: the samples.
+            patches: patches, one per surface.
+        """
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
         (view,) = TINY[self.task].views
         with torch.no_grad():

@@ -129,7 +129,13 @@ class ControllerContract:
         return [freeze(frame) for frame in frames]
 
     def drive(self, task: str | None, controller: Any = None, seed: int = 3) -> list[Action]:
-        """The actions of a controller over one drive."""
+        """The actions of a controller over one drive.
+
+        Args:
+            task: task whose pictures the controller gets; None for no pictures.
+            controller: the controller; None builds a new one.
+            seed: seed of the drive.
+        """
         controller = controller or self.make()
         controller.reset(seed)
         return [controller.act(observation) for observation in self.observations(task)]

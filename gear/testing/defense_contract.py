@@ -29,7 +29,12 @@ SEED = 7
 
 
 def street_picture(width_px: int, height_px: int, seed: int) -> UInt8Image:
-    """A (H, W, 3) uint8 picture of a simple street: sky, road, and six rectangles as buildings."""
+    """A (H, W, 3) uint8 picture of a simple street: sky, road, and six rectangles as buildings.
+
+    Args:
+        width_px, height_px: size of the picture.
+        seed: seed of colours and buildings.
+    """
     rng = derive_rng(SEED, "picture", seed)
     rows = np.linspace(0, 1, height_px)[:, None, None]
     columns = np.linspace(0, 1, width_px)[None, :, None]
@@ -75,7 +80,12 @@ class DefenseContract:
         return self.spec.build(self.spec.config(**self.options))
 
     def pictures(self, seed: int = 0, *, is_patched: bool = True) -> dict[str, UInt8Image]:
-        """The (H, W, 3) uint8 pictures of one sample by camera name, with or without noise patches."""
+        """The (H, W, 3) uint8 pictures of one sample by camera name, with or without noise patches.
+
+        Args:
+            seed: seed of the pictures.
+            is_patched: whether the pictures contain noise patches.
+        """
         plain = {name: street_picture(*self.size_px, seed * 10 + i) for i, name in enumerate(self.views)}
         return {name: noisy_patch(p, seed)[0] for name, p in plain.items()} if is_patched else plain
 
@@ -86,7 +96,12 @@ class DefenseContract:
         return defense.fit(clean, patched, self.model(), derive_rng(SEED, "fit"))
 
     def result(self, pictures: Mapping[str, UInt8Image], seed: int = SEED) -> DefenseResult:
-        """The result of a new, fitted defense for one sample."""
+        """The result of a new, fitted defense for one sample.
+
+        Args:
+            pictures: (H, W, 3) uint8 pictures by camera name.
+            seed: seed of the defense.
+        """
         defense = self.make()
         return defense.apply(pictures, self.model(), self.state(defense), derive_rng(seed, "apply"))
 

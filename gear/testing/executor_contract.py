@@ -16,7 +16,14 @@ from gear.values.errors import GearError
 
 
 def write_items(folder: str, failing: tuple[int, ...], indices: Iterator[int], report: Report) -> None:
-    """Work for tests: writes one file per item and reports the item; items in `failing` are reported as failed."""
+    """Work for tests: writes one file per item and reports the item; items in `failing` are reported as failed.
+
+    Args:
+        folder: folder of the written files.
+        failing: items that are reported as failed.
+        indices: the items of this worker.
+        report: called with the outcome of each item.
+    """
     in_row = 0
     for index in indices:
         if index in failing:
@@ -33,6 +40,10 @@ def write_items(folder: str, failing: tuple[int, ...], indices: Iterator[int], r
 
 def cannot_start(indices: Iterator[int], report: Report) -> None:
     """Work for tests that fails before its first item.
+
+    Args:
+        indices: the items of this worker; not used.
+        report: not used.
 
     Raises:
         GearError: always.

@@ -68,7 +68,12 @@ class MetricContract:
         return found.build(found.config(**self.task_options))
 
     def pairs(self, task: str, *, spoilt: bool = False) -> list[tuple[Any, Any]]:
-        """Pairs of a sample and a prediction, perfect or clearly worse, of synthetic streets; arrays are read-only."""
+        """Pairs of a sample and a prediction, perfect or clearly worse, of synthetic streets; arrays are read-only.
+
+        Args:
+            task: name of the task.
+            spoilt: whether the predictions are clearly worse than the ground truth.
+        """
         builder, found = self.task(task), []
         for index in range(SAMPLES):
             sample = builder.ground_truth(*synthetic_frame(builder.rig(), index=index, seed=5))

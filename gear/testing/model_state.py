@@ -25,7 +25,11 @@ def state_of(model: Any) -> dict[str, str]:
 
 
 def changes(before: dict[str, str], after: dict[str, str]) -> list[str]:
-    """The sorted names of the entries that differ between two snapshots of `state_of`."""
+    """The sorted names of the entries that differ between two snapshots of `state_of`.
+
+    Args:
+        before, after: hashes of the entries by name, as `state_of` returns them.
+    """
     return sorted(name for name in before.keys() | after.keys() if before.get(name) != after.get(name))
 
 

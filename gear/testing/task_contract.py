@@ -82,7 +82,12 @@ class TaskContract:
         return Sidecar(record=from_json(SceneRecord, record), surfaces=truths, facts=facts, files={})
 
     def write(self, root: Path, indices: Sequence[int] = (0, 1)) -> list[Sidecar]:
-        """Writes a small split to disk as `gear collect` does, and returns the samples' metadata (sidecars)."""
+        """Writes a small split to disk as `gear collect` does, and returns the samples' metadata (sidecars).
+
+        Args:
+            root: root folder of the new dataset.
+            indices: indices of the samples.
+        """
         task, sidecars = self.task(), []
         for index in indices:
             sample = self.sample(index)
@@ -270,7 +275,12 @@ class TaskContract:
             assert picture.dtype == np.uint8 and picture.ndim == 3 and picture.shape[2] == 3
 
     def evaluate(self, indices: Sequence[int], *, spoilt: bool = False) -> Mapping[str, float]:
-        """The metrics of synthetic samples with the ground truth as the prediction, unchanged or made clearly worse."""
+        """The metrics of synthetic samples with the ground truth as the prediction, unchanged or made clearly worse.
+
+        Args:
+            indices: indices of the samples.
+            spoilt: whether the predictions are made clearly worse.
+        """
         result: Mapping[str, float] = self._gather(self.task().evaluator(), indices, spoilt=spoilt).result()
         return result
 

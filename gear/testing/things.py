@@ -53,7 +53,12 @@ class Thing:
 
 
 def box_part(label: str, length_m: float, width_m: float, height_m: float) -> Part:
-    """A box whose bottom face is centred at the origin of the object's frame."""
+    """A box whose bottom face is centred at the origin of the object's frame.
+
+    Args:
+        label: class name of the part.
+        length_m, width_m, height_m: size along x, y and z.
+    """
     return Part(label=label, centre_m=(0.0, 0.0, height_m / 2), size_m=(length_m, width_m, height_m))
 
 

@@ -95,7 +95,12 @@ class TinyNetwork(nn.Module, ABC):
 
     @abstractmethod
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
-        """The scalar training loss from the head's (B, C, H, W) map and the batch's samples."""
+        """The scalar training loss from the head's (B, C, H, W) map and the batch's samples.
+
+        Args:
+            raw: (B, C, H, W) output of the head.
+            targets: the B samples with their ground truth.
+        """
 
     @abstractmethod
     def answer(self, outputs: Mapping[str, Tensor]) -> Any:
@@ -113,7 +118,12 @@ class TinySegmenter(TinyNetwork):
         return {"logits": raw}
 
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
-        """The cross-entropy of the logits with each sample's `label_ids`."""
+        """The cross-entropy of the logits with each sample's `label_ids`.
+
+        Args:
+            raw: (B, C, H, W) output of the head.
+            targets: the B samples with their ground truth.
+        """
         labels = torch.from_numpy(np.stack([sample.label_ids for sample in targets])).long()
         return functional.cross_entropy(raw, labels)
 
@@ -136,7 +146,12 @@ class TinyDepth(TinyNetwork):
         return {"depth_m": 10 * functional.softplus(raw[:, 0]) + self.LEAST_M}
 
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
-        """The mean absolute difference of log depth, over the pixels whose `depth_m` is known."""
+        """The mean absolute difference of log depth, over the pixels whose `depth_m` is known.
+
+        Args:
+            raw: (B, C, H, W) output of the head.
+            targets: the B samples with their ground truth.
+        """
         depth_m = torch.from_numpy(np.stack([sample.depth_m for sample in targets]))
         is_known = torch.isfinite(depth_m)
         known_m = torch.where(is_known, depth_m, torch.ones_like(depth_m))

@@ -72,6 +72,12 @@ def unusable(town: TownUnderTest, names: Sequence[str], samples: int, min_visibl
     """One line for each scene that cannot be composed or planned, and for each board hidden in a planned sample.
 
     A board is hidden if less than the share `min_visible` is visible.
+
+    Args:
+        town: the town.
+        names: names of the scenes.
+        samples: number of planned samples of each scene.
+        min_visible: smallest visible share of a board, 0..1.
     """
     problems = []
     for name in names:
@@ -155,6 +161,10 @@ def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:
     """One line if too few pixels of a rendered sample have the id and depth of a ray through their centre.
 
     Up to 400 random pixels away from edges are compared.
+
+    Args:
+        town: the town.
+        min_agreement: smallest share of the pixels that must agree, 0..1.
     """
     world, _ = town.first_world
     record = _planner(world, 1).plan(0)

@@ -69,7 +69,13 @@ def kinks(graph: LaneGraph, most_deg: float) -> list[str]:
 
 
 def odd_sizes(graph: LaneGraph, width_m: tuple[float, float], speed_mps: tuple[float, float]) -> list[str]:
-    """One line for each lane or walk that is too narrow or too wide, and for each lane that is too slow or too fast."""
+    """One line for each lane or walk that is too narrow or too wide, and for each lane that is too slow or too fast.
+
+    Args:
+        graph: lanes and walks of the town.
+        width_m: smallest and largest width.
+        speed_mps: smallest and largest speed.
+    """
     problems = []
     for lane in graph.lanes.values():
         if not width_m[0] <= lane.width_m <= width_m[1]:
@@ -164,7 +170,12 @@ def idle_crosswalks(graph: LaneGraph) -> list[str]:
 
 
 def bad_bays(town: TownUnderTest, tolerance_m: float) -> list[str]:
-    """One line for each parking bay that is above or below the ground, has an obstacle inside, or lies on a lane."""
+    """One line for each parking bay that is above or below the ground, has an obstacle inside, or lies on a lane.
+
+    Args:
+        town: the town.
+        tolerance_m: largest height difference between a bay and the ground.
+    """
     lanes = np.concatenate([np.array([p for p, _ in _along(lane.line)]) for lane in town.graph.lanes.values()])
     problems = []
     for bay in town.graph.bays:

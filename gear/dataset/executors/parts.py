@@ -64,6 +64,13 @@ def report_part(result: list[Outcome] | str, report: Report) -> bool:
 
 
 def report_lost(indices: Sequence[int], problem: str, report: Report, *, trace: str = "") -> None:
-    """Reports the items of a part as failed, whose worker was lost."""
+    """Reports the items of a part as failed, whose worker was lost.
+
+    Args:
+        indices: items of the part.
+        problem: why the worker was lost.
+        report: called with the outcome of each item.
+        trace: text of the traceback; "" if there is none.
+    """
     for index in indices:
         report(Outcome(index=index, kind="failed", error=problem, trace=trace))

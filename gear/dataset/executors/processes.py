@@ -95,6 +95,12 @@ def executor(*, workers: int, backend: str, address: str | None, needs: Needs) -
     """Opens the engine `processes`; `address` must be None, because this engine uses no cluster. It reserves no
     graphics cards.
 
+    Args:
+        workers: number of workers.
+        backend: name of the renderer.
+        address: address of the cluster; None for the default.
+        needs: longest time without a message, and graphics cards, of each worker.
+
     Raises:
         GearError: an address is given.
     """

@@ -127,6 +127,12 @@ class OnRay:
 def executor(*, workers: int, backend: str, address: str | None, needs: Needs) -> Executor:
     """Opens the engine `ray`; `backend` is not used.
 
+    Args:
+        workers: number of workers.
+        backend: name of the renderer.
+        address: address of the cluster; None for the default.
+        needs: longest time without a message, and graphics cards, of each worker.
+
     Raises:
         GearError: Ray is not installed.
     """

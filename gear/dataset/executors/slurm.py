@@ -47,7 +47,14 @@ class OnSlurm:
     gpus: int = 0
 
     def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
-        """As `Executor.run`. After `MOST_FAILURES` jobs in a row that made nothing, the others are cancelled.
+        """Makes the items with the given indices in SLURM jobs, and reports the outcome of each item.
+
+        After `MOST_FAILURES` jobs in a row that made nothing, the other jobs are cancelled.
+
+        Args:
+            work: called in each job with a part of the items.
+            indices: indices of the missing items.
+            report: called with one outcome for each item, in any order.
 
         Raises:
             GearError: a job ended with an error that does not concern a single item, or SLURM is not installed on this
@@ -134,6 +141,12 @@ def _cause(text: str) -> str:
 
 def executor(*, workers: int, backend: str, address: str | None, needs: Needs) -> Executor:
     """Opens the engine `slurm`; `backend` is not used.
+
+    Args:
+        workers: number of workers.
+        backend: name of the renderer.
+        address: address of the cluster; None for the default.
+        needs: longest time without a message, and graphics cards, of each worker.
 
     Raises:
         GearError: submitit is not installed.

@@ -95,6 +95,10 @@ class RemoteFolder:
     def write(self, relative: str, data: bytes) -> None:
         """Writes a file.
 
+        Args:
+            relative: path of the file in the folder.
+            data: bytes of the file.
+
         Raises:
             DatasetError: the file cannot be written, or its path leads outside the folder.
         """

@@ -50,6 +50,10 @@ class AdaBins(DepthNetwork):
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
         """The two losses of the AdaBins paper: scale-invariant error of the depth, and Chamfer distance between
         bin centres and true depths.
+
+        Args:
+            outputs: outputs of `forward` by name; the depth is (B, H, W) in metres.
+            depth_m: (B, H, W) true depth in metres; NaN where unknown.
         """
         max_depth_m = self.options.max_depth_m
         return {

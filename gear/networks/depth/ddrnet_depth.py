@@ -64,6 +64,10 @@ class DdrnetDepth(DepthNetwork):
         (`RMS_UNIT_M`).
 
         The scale-invariant error is dominated by outliers; the mean relative error is robust to them.
+
+        Args:
+            outputs: outputs of `forward` by name; the depth is (B, H, W) in metres.
+            depth_m: (B, H, W) true depth in metres; NaN where unknown.
         """
         max_depth_m = self.options.max_depth_m
         return {

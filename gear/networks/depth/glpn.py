@@ -43,7 +43,12 @@ class Glpn(DepthNetwork):
         return {DEPTH: self.options.max_depth_m * shares[:, top : top + height, left : left + width].float()}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """The scale-invariant logarithmic loss of the GLPDepth paper (equation 3)."""
+        """The scale-invariant logarithmic loss of the GLPDepth paper (equation 3).
+
+        Args:
+            outputs: outputs of `forward` by name; the depth is (B, H, W) in metres.
+            depth_m: (B, H, W) true depth in metres; NaN where unknown.
+        """
         return {"silog": silog(outputs[DEPTH], depth_m, max_depth_m=self.options.max_depth_m)}
 
     def taps(self) -> Mapping[str, nn.Module]:

@@ -63,6 +63,11 @@ def adabins_silog(predicted_m: Tensor, depth_m: Tensor, *, max_depth_m: float | 
 
     Depths are (B, H, W) metres, NaN where the truth is unknown. `max_depth_m` is the greatest true depth that
     counts; None for no limit.
+
+    Args:
+        predicted_m: (B, H, W) predicted depth, above 0.
+        depth_m: (B, H, W) ground truth, NaN where unknown.
+        max_depth_m: greatest true depth that counts; None for no limit.
     """
     return silog(predicted_m, depth_m, balance=0.85, scale=10.0, max_depth_m=max_depth_m)
 
@@ -72,6 +77,11 @@ def log_l1(predicted_m: Tensor, depth_m: Tensor, *, max_depth_m: float | None = 
 
     Depths are (B, H, W) metres, NaN where the truth is unknown. `max_depth_m` is the greatest true depth that
     counts; None for no limit.
+
+    Args:
+        predicted_m: (B, H, W) predicted depth, above 0.
+        depth_m: (B, H, W) ground truth, NaN where unknown.
+        max_depth_m: greatest true depth that counts; None for no limit.
     """
     mask = valid_mask(depth_m, max_depth_m)
     return _log_errors(predicted_m, depth_m, mask).abs().sum() / mask.sum().clamp_min(1)

@@ -57,12 +57,22 @@ class DepthNetwork(Network):
         return outputs
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The scalar losses by name, computed from the network's outputs and the samples' ground truth `depth_m`."""
+        """The scalar losses by name, computed from the network's outputs and the samples' ground truth `depth_m`.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B samples.
+            targets: the B samples with their ground truth.
+        """
         depth_m = torch.from_numpy(np.stack([target.depth_m for target in targets])).to(outputs[DEPTH])
         return self.depth_losses(outputs, depth_m)
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
-        """The predicted depth of each picture: (H, W) float32 in metres."""
+        """The predicted depth of each picture: (H, W) float32 in metres.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B pictures.
+            size_px: height and width of the pictures.
+        """
         return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
 
     def _seen(self, side_px: int) -> int:

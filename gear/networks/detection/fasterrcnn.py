@@ -98,6 +98,10 @@ class FasterRcnnDetector(Detector):
 
         Anchors and proposals are sampled with `options.seed`, so each call samples the same ones. In training mode,
         torch's own generator samples them.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B samples.
+            targets: the B samples with their ground truth.
         """
         wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
         graph: Any = self.graph
@@ -108,7 +112,12 @@ class FasterRcnnDetector(Detector):
             return self._box_losses(outputs, proposals, wanted) | proposal_losses
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
-        """Detections of each picture, highest score first."""
+        """Detections of each picture, highest score first.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B pictures.
+            size_px: height and width of the pictures.
+        """
         heads: Any = self.graph.get_submodule("roi_heads")
         answers = []
         for proposals, logits, deltas in zip(outputs[PROPOSALS], outputs[LOGITS], outputs[DELTAS], strict=True):

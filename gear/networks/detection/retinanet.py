@@ -63,6 +63,10 @@ class RetinaNetDetector(Detector):
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         """The two losses of torchvision by name; background anchors that lie mostly inside ignored objects do not
         count.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B samples.
+            targets: the B samples with their ground truth.
         """
         wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
         graph: Any = self.graph
@@ -78,7 +82,12 @@ class RetinaNetDetector(Detector):
         return losses
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
-        """Detections of each picture, highest score first."""
+        """Detections of each picture, highest score first.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B pictures.
+            size_px: height and width of the pictures.
+        """
         graph: Any = self.graph
         size = (size_px[0], size_px[1])
         counts = self._counts(size)

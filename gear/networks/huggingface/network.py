@@ -164,7 +164,12 @@ class FolderSegmenter(FolderNetwork):
         return logits
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The loss by name: the mean cross-entropy over the pixels whose true class the network has."""
+        """The loss by name: the mean cross-entropy over the pixels whose true class the network has.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B samples.
+            targets: the B samples with their ground truth.
+        """
         ids = train_ids(targets, self.device)
         known = torch.tensor([train_id for train_id, indices in enumerate(self._indices) if indices])
         is_known = torch.isin(ids, known.to(self.device))
@@ -172,7 +177,12 @@ class FolderSegmenter(FolderNetwork):
         return {"cross_entropy": (each * is_known).sum() / is_known.sum().clamp_min(1)}
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
-        """The predicted (H, W) uint8 Cityscapes label ids of each picture."""
+        """The predicted (H, W) uint8 Cityscapes label ids of each picture.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B pictures.
+            size_px: height and width of the pictures.
+        """
         labels = np.array(LABEL_ID_OF_TRAIN_ID, dtype=np.uint8)
         return [labels[best_class(logits)] for logits in outputs[LOGITS]]
 
@@ -209,6 +219,10 @@ class FolderDepth(FolderNetwork):
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         """The loss by name: the mean absolute difference between the logarithms of predicted and true depth, over
         the pixels with ground truth.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B samples.
+            targets: the B samples with their ground truth.
         """
         truth = torch.from_numpy(np.stack([sample.depth_m for sample in targets])).to(self.device)
         is_known = torch.isfinite(truth)
@@ -216,7 +230,12 @@ class FolderDepth(FolderNetwork):
         return {"log_l1": (error * is_known).sum() / is_known.sum().clamp_min(1)}
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
-        """The predicted depth of each picture: (H, W) float32 in metres."""
+        """The predicted depth of each picture: (H, W) float32 in metres.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B pictures.
+            size_px: height and width of the pictures.
+        """
         return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
 
 
@@ -251,6 +270,10 @@ class FolderDetector(FolderNetwork):
         """The set loss that transformers defines for this network, computed in float32.
 
         Only objects of classes that the network has are targets; other objects are ignored.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B samples.
+            targets: the B samples with their ground truth.
         """
         height, width = outputs[PICTURE][0].tolist()
         labels = [self._labels(sample, torch.tensor([width, height] * 2)) for sample in targets]
@@ -258,7 +281,12 @@ class FolderDetector(FolderNetwork):
             return {"set_loss": self.run_graph(outputs["network_input"], labels=labels).loss}
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
-        """Detections of COCO classes whose score is at least `score_threshold`, highest score first."""
+        """Detections of COCO classes whose score is at least `score_threshold`, highest score first.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B pictures.
+            size_px: height and width of the pictures.
+        """
         scale = torch.tensor([size_px[1], size_px[0]] * 2, device=self.device)
         answers = []
         for logits, boxes in zip(outputs[LOGITS], outputs[BOXES], strict=True):

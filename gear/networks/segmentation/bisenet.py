@@ -70,7 +70,12 @@ class FeatureFusion(nn.Module):
         )
 
     def forward(self, spatial: Tensor, context: Tensor) -> Tensor:
-        """Joins two feature maps (B, 128, H, W) to one (B, 256, H, W)."""
+        """Joins two feature maps (B, 128, H, W) to one (B, 256, H, W).
+
+        Args:
+            spatial: feature maps of the spatial path.
+            context: feature maps of the context path.
+        """
         fused: Tensor = self.conv_1x1(torch.cat([spatial, context], dim=1))
         weights: Tensor = self.channel_attention(fused)
         return fused + fused * weights

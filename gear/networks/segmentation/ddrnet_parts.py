@@ -10,12 +10,23 @@ from torch.nn import functional
 
 
 def conv3x3(inputs: int, outputs: int, stride: int = 1, *, bias: bool = False) -> nn.Conv2d:
-    """A 3x3 convolution with padding 1."""
+    """A 3x3 convolution with padding 1.
+
+    Args:
+        inputs, outputs: numbers of channels.
+        stride: stride in both directions.
+        bias: whether the layer has a bias.
+    """
     return nn.Conv2d(inputs, outputs, 3, stride, padding=1, bias=bias)
 
 
 def conv1x1(inputs: int, outputs: int, stride: int = 1) -> nn.Conv2d:
-    """A 1x1 convolution without bias."""
+    """A 1x1 convolution without bias.
+
+    Args:
+        inputs, outputs: numbers of channels.
+        stride: stride in both directions.
+    """
     return nn.Conv2d(inputs, outputs, 1, stride, bias=False)
 
 
@@ -81,7 +92,13 @@ def shortcut(inputs: int, outputs: int, stride: int) -> nn.Sequential | None:
 
 
 def stage(inputs: int, planes: int, stride: int = 1) -> nn.Sequential:
-    """A stage of the network: two basic blocks; no ReLU follows the second one."""
+    """A stage of the network: two basic blocks; no ReLU follows the second one.
+
+    Args:
+        inputs: number of input channels.
+        planes: number of channels of the blocks.
+        stride: stride of the first block.
+    """
     return nn.Sequential(BasicBlock(inputs, planes, stride), BasicBlock(planes, planes, rectify=False))
 
 

@@ -100,11 +100,21 @@ class SemsegNetwork(Network):
         return {LOGITS: main} | {f"{AUXILIARY}_{index}": other for index, other in enumerate(others)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The scalar losses by name, from the loss function with which the network was built."""
+        """The scalar losses by name, from the loss function with which the network was built.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B samples.
+            targets: the B samples with their ground truth.
+        """
         return self._losses(outputs, targets)
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[Any]:
-        """The predicted (H, W) uint8 Cityscapes label ids of each picture."""
+        """The predicted (H, W) uint8 Cityscapes label ids of each picture.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B pictures.
+            size_px: height and width of the pictures.
+        """
         if LOGITS in outputs:
             return [LABEL_IDS[best_class(logits)] for logits in outputs[LOGITS]]
         align = bool(self.graph.align_corners)

@@ -58,7 +58,13 @@ class StereoCentreShape:
 
 
 def conv(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential:
-    """A layer: convolution without bias, then batch normalisation."""
+    """A layer: convolution without bias, then batch normalisation.
+
+    Args:
+        inputs, outputs: numbers of channels.
+        size: side length of the kernel.
+        stride: stride in both directions.
+    """
     return nn.Sequential(
         nn.Conv2d(inputs, outputs, size, stride, size // 2, bias=False),
         nn.BatchNorm2d(outputs),
@@ -66,7 +72,13 @@ def conv(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential
 
 
 def conv_relu(inputs: int, outputs: int, size: int, stride: int = 1) -> nn.Sequential:
-    """A layer: convolution without bias, batch normalisation, then ReLU."""
+    """A layer: convolution without bias, batch normalisation, then ReLU.
+
+    Args:
+        inputs, outputs: numbers of channels.
+        size: side length of the kernel.
+        stride: stride in both directions.
+    """
     return nn.Sequential(conv(inputs, outputs, size, stride), nn.ReLU(inplace=True))
 
 

@@ -59,6 +59,10 @@ class StereoCentreLite0(CentreGraph, OnLite0):
     def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
         """The left feature maps at strides 4, 8, 16 and 32: the input of the third stage, and the last map of each
         later level.
+
+        Args:
+            coarse: (B, C, H / 4, W / 4) left feature maps at stride 4.
+            volume: (B, C, H / 4, W / 4) features of the correlation volume, at stride 4.
         """
         maps = [coarse + self.fuse(volume)]
         for level in LEVELS[2:]:

@@ -80,6 +80,9 @@ class Grid:
     def cell_of(self, u_px: float, v_px: float) -> tuple[float, float]:
         """Column and row, as fractions, of the cell that contains a point (index pixels); the middle of the first
         cell is (0, 0).
+
+        Args:
+            u_px, v_px: column and row of the point in index pixels of the picture.
         """
         return (u_px + 0.5) / self.cell_px[0] - 0.5, (v_px + 0.5) / self.cell_px[1] - 0.5
 

@@ -62,6 +62,10 @@ class StereoCentreNetwork(Network):
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[LabelledPair]) -> Mapping[str, Tensor]:
         """The scalar losses by name: heat, 2D box, centre, size, heading, occlusion and disparity
         (`gear.networks.stereo.centre_losses.centre_losses`).
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B samples.
+            targets: the B samples with their ground truth.
         """
         intrinsics = targets[0].calibration.intrinsics
         ratio = self._ratio((intrinsics.height_px, intrinsics.width_px))
@@ -71,7 +75,12 @@ class StereoCentreNetwork(Network):
         return centre_losses(outputs, centre_targets(targets, KINDS, grid), bins_px=bins_px, cell_px=grid.cell_px)
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
-        """The detections of each picture, as KITTI labels with scores."""
+        """The detections of each picture, as KITTI labels with scores.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B pictures.
+            size_px: height and width of the pictures.
+        """
         ratio = self._ratio(size_px)
         cell_px = (STRIDE * ratio[0], STRIDE * ratio[1])
         peaks = Peaks(score_threshold=self.options.score_threshold)

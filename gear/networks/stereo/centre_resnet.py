@@ -81,6 +81,10 @@ class StereoCentre(CentreGraph):
     def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
         """The left feature maps at strides 4, 8, 16 and 32: the input of the second stage, and the outputs of the
         later stages.
+
+        Args:
+            coarse: (B, C, H / 4, W / 4) left feature maps at stride 4.
+            volume: (B, C, H / 4, W / 4) features of the correlation volume, at stride 4.
         """
         maps = [self.fuse(torch.cat([coarse, volume], dim=1))]
         for layer in (self.layer2, self.layer3, self.layer4):

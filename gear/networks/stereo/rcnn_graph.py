@@ -96,6 +96,9 @@ class StereoRpn(nn.Module):
 
         The authors' softmax pairs channel c with channel c + 3, although anchor a was trained with channels 2 a and 2 a
         + 1. The published weights rely on this pairing, so this module ranks proposals by the same objectness.
+
+        Args:
+            left, right: feature maps P2 to P6 of the left and of the right pictures.
         """
         logits, chances, codes = [], [], []
         for one, two in zip(left, right, strict=True):

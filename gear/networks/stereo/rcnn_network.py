@@ -92,6 +92,10 @@ class StereoRcnnNetwork(Network):
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[KittiLabel, ...]]:
         """The detected cars, computed from 2D boxes and corners alone. `predict` also has the pictures and refines
         depth by photometric alignment.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B pictures.
+            size_px: height and width of the pictures.
         """
         return self._placed(outputs, size_px, None)
 
