@@ -73,6 +73,12 @@ def augment(sample: SampleT, how: Augmentation, framing: Framing, rng: np.random
     The logarithm of the scale factor is drawn uniformly. Mirrored, cropped or resized samples have no `surfaces`, and
     their `record` still describes the rendered scene.
 
+    Args:
+        sample: the sample.
+        how: probabilities and ranges of the changes.
+        framing: size of crops and range of scale factors.
+        rng: random generator.
+
     Raises:
         GearError: crops or scales are requested for a sample of a class without registered functions.
     """

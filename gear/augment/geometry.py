@@ -164,6 +164,10 @@ def flip_box(box_px: BoxPx, width_px: int) -> BoxPx:
 def clipped(box_px: BoxPx, frame_px: BoxPx) -> BoxPx:
     """Intersection of two boxes. For boxes that do not intersect, the result has a right side left of its left
     side, or a bottom above its top.
+
+    Args:
+        box_px: left, top, right and bottom of the first box.
+        frame_px: left, top, right and bottom of the second box.
     """
     return (
         max(box_px[0], frame_px[0]),

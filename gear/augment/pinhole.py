@@ -39,5 +39,9 @@ def cut_index_box(box_px: BoxPx, window: Window) -> BoxPx:
 
 
 def index_frame(width_px: int, height_px: int) -> BoxPx:
-    """The outer borders of a picture as a box in index pixels: left and top are -0.5."""
+    """The outer borders of a picture as a box in index pixels: left and top are -0.5.
+
+    Args:
+        width_px, height_px: size of the picture.
+    """
     return (-0.5, -0.5, width_px - 0.5, height_px - 0.5)

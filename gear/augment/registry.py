@@ -17,6 +17,10 @@ def register(kind: type[SampleT], geometry: Geometry[SampleT]) -> None:
 
     Call `register` in the module that defines the class; the functions are then known wherever such samples exist.
 
+    Args:
+        kind: class of the samples.
+        geometry: functions that mirror, crop and resize a sample.
+
     Raises:
         ValueError: other functions are already registered for the class.
     """

@@ -214,7 +214,11 @@ class ContactShadows:
     ) -> FloatImage | None:
         """The (H, W) float32 factors 0..1 by which contact shadows darken a frame; None if no pixel is darkened.
 
-        `ContactShadows.apply` explains the arguments.
+        Args:
+            depth_m: (H, W) planar depth in metres.
+            is_ground: (H, W) bool mask of the ground.
+            camera: camera of the frame.
+            record: scene record with the road users.
         """
         left: FloatImage | None = None
         world_from_camera = camera.world_from_camera_transform

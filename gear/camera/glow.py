@@ -57,6 +57,11 @@ class LitWindows:
 
         A pixel shows a window if it has the window's geom id and its world position lies in the window's plane. The
         geom id alone is not sufficient, because one geom may contain many houses, and one house may hide another.
+
+        Args:
+            geom_id: (H, W) geom ids; -1 for none.
+            depth_m: (H, W) planar depth in metres.
+            camera: camera of the frame.
         """
         pose = camera.world_from_camera_transform
         found = np.full(geom_id.shape, -1, np.int32)

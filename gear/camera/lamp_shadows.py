@@ -106,6 +106,10 @@ class RoadUserCaster:
 
         It may if its bounding sphere is within the share `WORTH` of the lamp's range, and in the field of view of the
         lamp's shadow map.
+
+        Args:
+            lamp_frame: position and axes of the lamp.
+            reach_m: range of the lamp in metres.
         """
         away = self.middle_m - lamp_frame.place_m
         distance_m = float(np.linalg.norm(away))

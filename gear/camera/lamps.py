@@ -83,6 +83,9 @@ def street_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatI
 
     Arguments and result are those of `Lamps.beam`: components of unit vectors from the lamp, and shares of its
     intensity.
+
+    Args:
+        along, across, up: components of unit vectors from the lamp, along its axis, to the side and upwards.
     """
     return np.asarray(np.clip(along * 3.5, 0, 1) * (1 + 1.6 * (1 - along * along)))
 
@@ -92,6 +95,9 @@ def globe_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatIm
 
     Arguments and result are those of `Lamps.beam`: components of unit vectors from the lamp, and shares of its
     intensity.
+
+    Args:
+        along, across, up: components of unit vectors from the lamp, along its axis, to the side and upwards.
     """
     return np.asarray(np.clip(1 - 0.9 * up, 0.1, 1), dtype=np.float32)
 
@@ -101,6 +107,9 @@ def low_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImag
 
     Arguments and result are those of `Lamps.beam`: components of unit vectors from the lamp, and shares of its
     intensity.
+
+    Args:
+        along, across, up: components of unit vectors from the lamp, along its axis, to the side and upwards.
     """
     ahead = np.maximum(along, 1e-3)
     side, rise = across / ahead, up / ahead + np.float32(HEAD_DIP)

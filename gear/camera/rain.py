@@ -90,8 +90,13 @@ class Rain:
     def cover(
         self, depth_m: FloatImage, camera: CameraRecord, velocity_world_mps: Vec3, rng: np.random.Generator
     ) -> FloatImage:
-        """The share of each pixel that falling drops cover: (H, W) float32 in 0..1. `Rain.apply` explains the
-        arguments.
+        """The share of each pixel that falling drops cover: (H, W) float32 in 0..1.
+
+        Args:
+            depth_m: (H, W) planar depth in metres.
+            camera: camera of the frame.
+            velocity_world_mps: velocity of the camera in world coordinates.
+            rng: random generator of the drops.
         """
         falling = np.array([*self.wind_world_mps[:2], -FALL_MPS]) - np.asarray(velocity_world_mps)
         motion = camera.world_from_camera_transform.rotation.T @ falling * SHUTTER_S

@@ -104,7 +104,12 @@ def _resolved(patch: str, surfaces: int, seed: int) -> PatchSet:
 
 
 def random_patch(seed: int, index: int) -> UInt8Image:
-    """A (H, W, 3) uint8 patch of `RANDOM_SIZE_PX`; every pixel and channel is drawn uniformly from 0..255."""
+    """A (H, W, 3) uint8 patch of `RANDOM_SIZE_PX`; every pixel and channel is drawn uniformly from 0..255.
+
+    Args:
+        seed: seed of the dataset.
+        index: number of the surface.
+    """
     width, height = RANDOM_SIZE_PX
     rng = derive_rng(seed, "patch", "random", index)
     return rng.integers(0, 256, (height, width, 3), dtype=np.uint8)

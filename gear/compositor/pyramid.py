@@ -181,7 +181,12 @@ class Pyramid:
 
 @lru_cache(maxsize=16)
 def pyramid_of(height_px: int, width_px: int, halving: Halving = "middles") -> Pyramid:
-    """The mip levels (pyramid) for patches of one size; cached."""
+    """The mip levels (pyramid) for patches of one size; cached.
+
+    Args:
+        height_px, width_px: size of the patches.
+        halving: rule by which a level with an odd number of texels is halved.
+    """
     rows = list(axis_matrices(height_px, FACE_SIZE_PX[1], halving))
     columns = list(axis_matrices(width_px, FACE_SIZE_PX[0], halving))
     # The shorter axis keeps one texel while the longer one is halved further.

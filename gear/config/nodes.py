@@ -129,6 +129,10 @@ def parse_value(text: str, name: str) -> Node:
     """Parses one value of the command line, such as `12`, `fog`, `[1, 2]` or `{a: 1}`.
 
     A `#` after a bare word does not begin a comment. Positions have no line and column.
+
+    Args:
+        text: the value.
+        name: name of the option, for messages.
     """
     if "#" in text and text.strip()[0] not in MARKS:
         return Scalar(text.strip(), False, Place(name))

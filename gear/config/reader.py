@@ -69,6 +69,10 @@ def expand_shorthand(kind: Any, node: Node) -> Node:
     """Expands shorthands in the YAML tree of a dataclass, so that further keys can be set.
 
     For example, `weather: ClearNoon` becomes `weather: {preset: ClearNoon}`.
+
+    Args:
+        kind: class of the dataclass.
+        node: the YAML tree.
     """
     if not isinstance(node, Mapping):
         return node

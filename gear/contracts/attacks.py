@@ -181,6 +181,12 @@ class HarmObjective(Protocol):
     def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]) -> Tensor:
         """Scalar tensor that grows with the harm of the patch to a batch; the arguments are those of
         `Objective.terms`.
+
+        Args:
+            model: the attacked network.
+            views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
+            samples: the B samples with their ground truth.
+            indices: indices of these samples in the dataset.
         """
         ...
 

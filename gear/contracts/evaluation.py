@@ -44,7 +44,14 @@ class KeepsPredictions(Protocol):
         ...
 
     def decode_prediction(self, root: Path, sample: Any, facts: Json, info: SplitInfo) -> Any:
-        """Reads a stored prediction from the folder `root`: the exact inverse of `encode_prediction`."""
+        """Reads a stored prediction from the folder `root`: the exact inverse of `encode_prediction`.
+
+        Args:
+            root: folder of the stored predictions.
+            sample: the sample.
+            facts: metadata that `encode_prediction` returned.
+            info: names of the split, town, scene and patch.
+        """
         ...
 
     def finalise_predictions(self, facts: Sequence[tuple[Any, Json]], info: SplitInfo) -> Mapping[str, bytes]:

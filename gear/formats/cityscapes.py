@@ -124,7 +124,13 @@ class Paths:
 
 
 def paths(town: str, split: str, sequence: int, frame: int) -> Paths:
-    """The paths of the files that belong to one picture in the Cityscapes layout, relative to the dataset's root."""
+    """The paths of the files that belong to one picture in the Cityscapes layout, relative to the dataset's root.
+
+    Args:
+        town: name of the town, which Cityscapes calls the city.
+        split: name of the split.
+        sequence, frame: number of the sequence, and of the picture in it.
+    """
     city, name = city_name(town), stem(town, sequence, frame)
     fine = f"gtFine/{split}/{city}/{name}_gtFine"
     return Paths(

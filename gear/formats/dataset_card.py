@@ -67,7 +67,14 @@ class SplitFacts:
 
     @staticmethod
     def of(info: SplitInfo, task: str, samples: int, manifest: Json) -> SplitFacts:
-        """The metadata of a split for its dataset card. A value that the manifest lacks becomes "unknown"."""
+        """The metadata of a split for its dataset card. A value that the manifest lacks becomes "unknown".
+
+        Args:
+            info: names of the split, town, scene and patch.
+            task: name of the task.
+            samples: number of samples.
+            manifest: JSON of the manifest.
+        """
 
         def at(key: str, inner: str) -> str:
             entry = manifest.get(key) if isinstance(manifest, dict) else None

@@ -131,7 +131,12 @@ def parse_labels(text: str) -> tuple[KittiLabel, ...]:
 
 
 def clip_box(box_px: BoxPx, intrinsics: Intrinsics) -> BoxPx | None:
-    """Clips a box in index pixels to the picture; None if the box lies outside the picture."""
+    """Clips a box in index pixels to the picture; None if the box lies outside the picture.
+
+    Args:
+        box_px: left, top, right and bottom in index pixels.
+        intrinsics: camera, which gives the size of the picture.
+    """
     left, top = max(0.0, box_px[0]), max(0.0, box_px[1])
     right, bottom = min(intrinsics.width_px - 1.0, box_px[2]), min(intrinsics.height_px - 1.0, box_px[3])
     return (left, top, right, bottom) if right > left and bottom > top else None
@@ -140,6 +145,10 @@ def clip_box(box_px: BoxPx, intrinsics: Intrinsics) -> BoxPx | None:
 def from_edge_pixels(box_px: BoxPx, intrinsics: Intrinsics) -> BoxPx:
     """Converts a box from edge pixels to the index pixels of KITTI labels, clipped to the centres of the outermost
     pixels.
+
+    Args:
+        box_px: left, top, right and bottom in edge pixels.
+        intrinsics: camera, which gives the size of the picture.
     """
     left, top, right, bottom = (side - 0.5 for side in box_px)
     most_x, most_y = intrinsics.width_px - 1.0, intrinsics.height_px - 1.0
@@ -153,7 +162,12 @@ def to_edge_pixels(box_px: BoxPx) -> BoxPx:
 
 
 def truncation(box_px: BoxPx, clipped_px: BoxPx) -> float:
-    """KITTI's truncation: the share, 0..1, of a projected box that lies outside the picture."""
+    """KITTI's truncation: the share, 0..1, of a projected box that lies outside the picture.
+
+    Args:
+        box_px: the projected box, before clipping.
+        clipped_px: the same box clipped to the picture.
+    """
     whole = (box_px[2] - box_px[0]) * (box_px[3] - box_px[1])
     inside = (clipped_px[2] - clipped_px[0]) * (clipped_px[3] - clipped_px[1])
     return min(1.0, max(0.0, 1.0 - inside / whole)) if whole > 0 else 0.0

@@ -81,6 +81,12 @@ def encode_deep(values: npt.NDArray[np.uint16]) -> bytes:
 def whole(width: int, height: int, depth_bits: int, colour: int, deflated: bytes) -> bytes:
     """A complete PNG file, as bytes, from filtered and deflated rows; `colour` is the colour type of the PNG
     specification.
+
+    Args:
+        width, height: size of the picture.
+        depth_bits: bits per channel.
+        colour: colour type of the PNG specification.
+        deflated: zlib stream of the filtered rows.
     """
     header = struct.pack(">IIBBBBB", width, height, depth_bits, colour, 0, 0, 0)
     return SIGNATURE + b"".join(

@@ -12,7 +12,12 @@ from gear.formats.kitti_object import KittiLabel
 
 
 def cityscapes_path(town: str, sequence: int, frame: int) -> str:
-    """Path of a predicted picture of label ids. The benchmark's script finds the file by its name in any subfolder."""
+    """Path of a predicted picture of label ids. The benchmark's script finds the file by its name in any subfolder.
+
+    Args:
+        town: name of the town.
+        sequence, frame: number of the sequence, and of the picture in it.
+    """
     return f"cityscapes/{city_name(town)}/{stem(town, sequence, frame)}_predLabelIds.png"
 
 

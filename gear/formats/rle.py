@@ -18,6 +18,11 @@ Mask = npt.NDArray[np.bool_]
 def encode_crop(mask: Mask, left: int, top: int, height_px: int, width_px: int) -> str:
     """Encodes a mask of a whole picture as an RLE string. The picture is empty except for the crop `mask`, whose first
     pixel is at (left, top).
+
+    Args:
+        mask: (h, w) bool mask.
+        left, top: column and row of the first pixel of `mask` in the picture.
+        height_px, width_px: size of the picture.
     """
     rows, columns = mask.shape
     if left < 0 or top < 0 or left + columns > width_px or top + rows > height_px:
@@ -45,6 +50,10 @@ def encode(mask: Mask) -> str:
 def check(counts: str, height_px: int, width_px: int) -> None:
     """Checks that a string is a valid RLE of a mask of this size. This takes a fraction of the time of decoding.
 
+    Args:
+        counts: the string.
+        height_px, width_px: size of the picture.
+
     Raises:
         ValueError: the string is no RLE, or its runs do not fill a picture of this size.
     """
@@ -53,6 +62,10 @@ def check(counts: str, height_px: int, width_px: int) -> None:
 
 def decode(counts: str, height_px: int, width_px: int) -> Mask:
     """Decodes an RLE string to an (H, W) bool mask.
+
+    Args:
+        counts: the string.
+        height_px, width_px: size of the picture.
 
     Raises:
         ValueError: the string is no RLE, or its runs do not fill a picture of this size.
@@ -64,6 +77,11 @@ def decode(counts: str, height_px: int, width_px: int) -> Mask:
 
 def decode_crop(counts: str, height_px: int, width_px: int, box_px: tuple[int, int, int, int]) -> Mask:
     """Decodes the part of an RLE mask inside a box (left, top, right, bottom), which must lie inside the picture.
+
+    Args:
+        counts: the string.
+        height_px, width_px: size of the picture.
+        box_px: left, top, right and bottom in edge pixels, right and bottom excluded.
 
     Raises:
         ValueError: the string is no RLE, or its runs do not fill a picture of this size.

@@ -31,6 +31,10 @@ class Part:
 def parts_of(sidecar: Sidecar, split: str) -> list[Part]:
     """The files of a sample with their short names, sorted by name and suffix. Auxiliary files, such as probes, are
     left out.
+
+    Args:
+        sidecar: metadata of the sample.
+        split: name of the split.
     """
     auxiliary = {file.path for file in sidecar.auxiliary.values()}
     return parts([path for path in sidecar.files if path not in auxiliary], split)

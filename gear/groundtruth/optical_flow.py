@@ -60,7 +60,12 @@ class Flow:
 
 
 def object_ids(geom_id: IdImage, id_of_geom: npt.NDArray[np.int32]) -> IdImage:
-    """(H, W) int32 object ids of a picture from its geom ids; -1 where no geom was hit."""
+    """(H, W) int32 object ids of a picture from its geom ids; -1 where no geom was hit.
+
+    Args:
+        geom_id: (H, W) geom ids; -1 where no geom was hit.
+        id_of_geom: (ngeom,) object id of each geom.
+    """
     return np.where(geom_id >= 0, id_of_geom[geom_id], np.int32(-1)).astype(np.int32)
 
 

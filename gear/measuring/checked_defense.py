@@ -54,6 +54,11 @@ class CheckedDefense:
     def apply(self, views: Mapping[str, UInt8Image], rng: np.random.Generator, index: int) -> DefenseResult:
         """Applies the defense to the pictures of one sample and checks the result.
 
+        Args:
+            views: (H, W, 3) uint8 pictures by camera name.
+            rng: random generator of the sample.
+            index: index of the sample.
+
         Raises:
             PluginError: the defense fails, or returns something that its contract does not allow.
         """

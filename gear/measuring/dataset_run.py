@@ -52,6 +52,14 @@ def evaluate_row(
     With several lanes, each lane processes its batches completely, from reading to metrics, and further threads write
     the files. With one lane, other threads decode pictures, compute metrics and write files. The number of waiting
     samples is bounded, so memory does not grow with the dataset.
+
+    Args:
+        dataset: the dataset.
+        scorer: computes metrics and stores results.
+        guarded: the model with its defense.
+        batch: number of samples per batch.
+        workers: number of threads that decode, score and write.
+        done: called after each sample, when its files are written.
     """
     items = TorchDataset(dataset)
     with ThreadPoolExecutor(workers) as scorers:

@@ -37,6 +37,12 @@ class Guard:
     ) -> Guard | None:
         """Makes the request for a defense from the arguments of a verb such as `evaluate`; None without a defense.
 
+        Args:
+            defense: name of the defense; None for no defense.
+            settings: `KEY=VALUE` options of the defense.
+            calibration: clean dataset for the calibration.
+            calibration_patched: the same samples with a patch.
+
         Raises:
             GearError: options or calibration data are given without a defense.
         """

@@ -15,6 +15,11 @@ from gear.plugins.catalogue import PluginEntry
 def check_patches(patches: Any, surfaces: int, found: PluginEntry) -> None:
     """Checks that an attack returned one patch per surface, each (H, W, 3) float32 in 0..1.
 
+    Args:
+        patches: value that the attack returned.
+        surfaces: number of surfaces of the scene.
+        found: plugin of the attack.
+
     Raises:
         PluginError: the attack returned something else; the error names the attack.
     """

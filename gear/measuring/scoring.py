@@ -126,7 +126,13 @@ class Scorer:
         return {int(p.stem) for p in folder.glob("*.json") if p.stem.isdecimal() and int(p.stem) < len(self._dataset)}
 
     def score(self, index: int, sample: Sample, timed: TimedPrediction) -> UnsavedResult:
-        """Computes the metrics of a prediction and encodes it as files, which are not written yet."""
+        """Computes the metrics of a prediction and encodes it as files, which are not written yet.
+
+        Args:
+            index: index of the sample.
+            sample: the sample with its ground truth.
+            timed: the prediction, with the outputs of the defense and the computing time.
+        """
         with self._blamed(index):
             metrics, parts = self._measure(sample, timed.prediction)
             encoded = self._keeper and check_encoded(
@@ -157,7 +163,13 @@ class Scorer:
         return result
 
     def score_new(self, index: int, sample: Sample, timed: TimedPrediction) -> SampleResult:
-        """Computes the metrics of a new prediction and writes its files."""
+        """Computes the metrics of a new prediction and writes its files.
+
+        Args:
+            index: index of the sample.
+            sample: the sample with its ground truth.
+            timed: the prediction, with the outputs of the defense and the computing time.
+        """
         return self.write(self.score(index, sample, timed))
 
     def rescore_stored(self, index: int) -> SampleResult | DatasetError:

@@ -86,6 +86,10 @@ def difference_interval(one: Metrics, other: Metrics, name: str) -> Interval | N
     Each jackknife replicate leaves the same cluster out of both datasets, so the interval is that of the paired
     difference. If one of the metrics is a share of exactly 0 or 1, its replicates show no spread, and the interval is
     combined from the intervals of both.
+
+    Args:
+        one, other: metrics of the two datasets with their jackknife replicates.
+        name: name of the metric.
     """
     if name not in one.replicates or name not in other.replicates:
         return None

@@ -160,7 +160,12 @@ class NearDepth(DepthEvaluator):
         super().__init__(max_depth_m=80.0, crop="none")
 
     def update(self, sample: DepthTruth, prediction: FloatImage) -> Mapping[str, float]:
-        """Adds a predicted (H, W) depth map in metres; returns the metrics of this picture."""
+        """Adds a predicted (H, W) depth map in metres; returns the metrics of this picture.
+
+        Args:
+            sample: the sample with its true depth.
+            prediction: (H, W) predicted depth in metres.
+        """
         return _renamed(super().update(sample, prediction))
 
     def result(self) -> Mapping[str, float]:

@@ -95,6 +95,12 @@ class Display:
 def displayed(callbacks: Callbacks, verb: str, *, progress: bool, unit: str = "sample") -> Iterator[Callbacks]:
     """Yields the caller's callbacks; if `progress` is True, they also update a progress display, which is closed
     at the end.
+
+    Args:
+        callbacks: the caller's callbacks.
+        verb: name of the verb, such as `collect`.
+        progress: whether a display is shown.
+        unit: counted unit in the singular.
     """
     if not progress:
         yield callbacks

@@ -27,7 +27,13 @@ class Pace:
     warm_s: float | None = None
 
     def report(self, done: int, total: int, now_s: float) -> None:
-        """Records the number of finished items and of all items at the time `now_s` in seconds."""
+        """Records the number of finished items and of all items at the time `now_s` in seconds.
+
+        Args:
+            done: number of finished items.
+            total: number of all items; 0 if it is unknown.
+            now_s: time in seconds.
+        """
         if self.warm_s is None and done > self.first_done:
             self.warm_done, self.warm_s = done, now_s
         self.done, self.total = done, total

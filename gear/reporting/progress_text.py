@@ -6,7 +6,12 @@ from gear.reporting.pace import Pace
 
 
 def progress_line(pace: Pace, now_s: float) -> str:
-    """Returns a line for a log, such as `120 of 2000 samples, 3.1 per second, 10 minutes left`."""
+    """Returns a line for a log, such as `120 of 2000 samples, 3.1 per second, 10 minutes left`.
+
+    Args:
+        pace: progress of the job.
+        now_s: time in seconds.
+    """
     count = f"{pace.done} of {pace.total}" if pace.total else str(pace.done)
     parts = [f"{count} {plural(pace.unit, pace.total or pace.done)}"]
     rate, left_s = pace.rate(now_s), pace.left_s(now_s)

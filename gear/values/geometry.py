@@ -61,7 +61,14 @@ class RigidTransform:
 
     @staticmethod
     def from_parts(dst: str, src: str, rotation: npt.ArrayLike, translation_m: npt.ArrayLike) -> RigidTransform:
-        """Makes a transform from a (3, 3) rotation and a (3,) translation in metres."""
+        """Makes a transform from a (3, 3) rotation and a (3,) translation in metres.
+
+        Args:
+            dst: name of the target frame.
+            src: name of the source frame.
+            rotation: (3, 3) rotation matrix.
+            translation_m: (3,) origin of `src` in the frame `dst`, in metres.
+        """
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
         matrix[:3, 3] = translation_m
@@ -131,7 +138,12 @@ class Intrinsics:
 
     @staticmethod
     def from_hfov(width_px: int, height_px: int, hfov_rad: float) -> Intrinsics:
-        """Makes the intrinsics of a symmetric pinhole from the horizontal field of view in radians."""
+        """Makes the intrinsics of a symmetric pinhole from the horizontal field of view in radians.
+
+        Args:
+            width_px, height_px: size of the picture.
+            hfov_rad: horizontal field of view in radians.
+        """
         return Intrinsics(width_px, height_px, width_px / (2 * math.tan(hfov_rad / 2)))
 
     @property

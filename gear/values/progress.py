@@ -44,6 +44,11 @@ class Callbacks:
     ) -> Callbacks:
         """Makes callbacks from the arguments of a verb; None stands for a callback that does nothing. A repeated
         warning is passed on only once.
+
+        Args:
+            on_progress: gets the numbers of finished and of all items.
+            on_fit_progress: gets the same numbers during the calibration of a defense.
+            on_warning: gets one line per warning.
         """
         warned: set[str] = set()
 

@@ -32,5 +32,8 @@ def check_mix(name: str, mix: Mapping[str, float]) -> None:
 def product_of(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
     """Combines two vehicle mixes (factors on frequencies, by kind): the products of their factors, for every kind
     that either mix names.
+
+    Args:
+        first, second: the two mixes, factors by kind of vehicle.
     """
     return {kind: first.get(kind, 1.0) * second.get(kind, 1.0) for kind in VEHICLES if kind in {*first, *second}}

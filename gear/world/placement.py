@@ -193,6 +193,11 @@ class PlacementSpace:
     def occluders(self, eye_m: Array, targets_m: Array, poses: Mapping[str, RigidTransform]) -> list[str | None]:
         """The names of the actors' bodies that hide points from `eye_m`, (3,): one name for each of (N, 3) points; None
         for a point that no actor hides.
+
+        Args:
+            eye_m: (3,) position of the camera in world coordinates.
+            targets_m: (N, 3) points in world coordinates.
+            poses: world pose of each actor, by name of its body.
         """
         self._pose(poses)
         geoms = self._rays(eye_m, targets_m, _ACTORS)[0]

@@ -133,7 +133,13 @@ class ScenePlanner:
 
 
 def actor_record(number: int, spawn: Spawn, world_from_actor: RigidTransform) -> ActorRecord:
-    """The record of a road user with the id `number`, at its pose on the ground."""
+    """The record of a road user with the id `number`, at its pose on the ground.
+
+    Args:
+        number: id of the road user.
+        spawn: asset, colour and role of the road user.
+        world_from_actor: pose on the ground.
+    """
     velocity = world_from_actor.rotation[:, 0] * spawn.speed_mps
     rounded = [round(float(v), POSE_DIGITS) + 0.0 for v in velocity]
     velocity_mps: Vec3 = (rounded[0], rounded[1], rounded[2])

@@ -14,7 +14,7 @@ def gathered(owner: list[int], hit: list[list[int]], counts: list[list[int]], wa
         owner=np.array(owner, np.int64),
         hit=np.array(hit, np.bool_),
         counts=np.array(counts, np.bool_),
-        wanted=np.array(wanted, np.int64),
+        label_counts=np.array(wanted, np.int64),
     )
 
 

@@ -86,8 +86,12 @@ class LensDistortion(Effect):
         return distort(view, self.lens, exposure.camera.intrinsics)
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """Distorts (B, 3, H, W) linear light in torch, differentiable and without rounding; `Effect.apply_torch`
-        explains the arguments.
+        """Distorts (B, 3, H, W) linear light in torch, differentiable and without rounding.
+
+        Args:
+            light: (B, 3, H, W) float, linear, 1.0 is full scale; B versions of one picture.
+            truth: depth and ids of the picture; its colour is not used.
+            exposure: camera and scene of the picture.
         """
         found = lens_map(self.lens, exposure.camera.intrinsics)
         return read_bilinear(light, found.x.astype(np.float64), found.y.astype(np.float64))
@@ -95,6 +99,10 @@ class LensDistortion(Effect):
     def trace(self, samples: PixelSamples, exposure: Exposure) -> PixelSamples:
         """Replaces (N, 1) whole pixels of the distorted picture by the (N, 4) pixels of the pinhole picture that are
         interpolated for them.
+
+        Args:
+            samples: pixels of the distorted picture.
+            exposure: camera and scene of the picture.
         """
         found = lens_map(self.lens, exposure.camera.intrinsics)
         at = (samples.y[:, 0].astype(int), samples.x[:, 0].astype(int))

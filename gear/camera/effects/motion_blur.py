@@ -65,8 +65,12 @@ class MotionBlur(Effect):
         return replace(view, linear_rgb=np.asarray(total / np.float32(MOMENTS) + np.float32(0.5), dtype=np.uint16))
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """Blurs (B, 3, H, W) linear light in torch, differentiable and without rounding; `Effect.apply_torch` explains
-        the arguments.
+        """Blurs (B, 3, H, W) linear light in torch, differentiable and without rounding.
+
+        Args:
+            light: (B, 3, H, W) float, linear, 1.0 is full scale; B versions of one picture.
+            truth: depth and ids of the picture; its colour is not used.
+            exposure: camera and scene of the picture.
         """
         total = light * 0
         for from_x, from_y in self._paths(truth, exposure):

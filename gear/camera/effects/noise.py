@@ -59,14 +59,22 @@ class Noise(Effect):
         return replace(view, linear_rgb=clipped.astype(np.uint16))
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """Adds noise to (B, 3, H, W) linear light in torch, differentiable, without rounding and clipping;
-        `Effect.apply_torch` explains the arguments.
+        """Adds noise to (B, 3, H, W) linear light in torch, differentiable, without rounding and clipping.
+
+        Args:
+            light: (B, 3, H, W) float, linear, 1.0 is full scale; B versions of one picture.
+            truth: depth and ids of the picture; its colour is not used.
+            exposure: camera and scene of the picture.
         """
         return self._noisy(light, light.new_tensor(_draws(exposure).transpose(2, 0, 1)))
 
     def torch_at(self, pixels: tuple[Pixels, Pixels], exposure: Exposure, like: Tensor) -> Callable[[Tensor], Tensor]:
-        """The noise on selected pixels, as a differentiable function of their (N, 3) linear light, without clipping;
-        `Effect.torch_at` explains the arguments.
+        """The noise on selected pixels, as a differentiable function of their (N, 3) linear light, without clipping.
+
+        Args:
+            pixels: (N,) rows and (N,) columns of the pixels.
+            exposure: camera and scene of the picture.
+            like: tensor whose dtype and device the result uses.
         """
         normal = like.new_tensor(_draws(exposure)[pixels])
         return lambda light: self._noisy(light, normal)

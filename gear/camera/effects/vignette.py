@@ -48,8 +48,12 @@ class Vignette(Effect):
         return replace(view, linear_rgb=np.asarray(dimmed, dtype=np.uint16))
 
     def apply_torch(self, light: Tensor, truth: RawView, exposure: Exposure) -> Tensor:
-        """Darkens the corners of (B, 3, H, W) linear light in torch, differentiable and without rounding;
-        `Effect.apply_torch` explains the arguments.
+        """Darkens the corners of (B, 3, H, W) linear light in torch, differentiable and without rounding.
+
+        Args:
+            light: (B, 3, H, W) float, linear, 1.0 is full scale; B versions of one picture.
+            truth: depth and ids of the picture; its colour is not used.
+            exposure: camera and scene of the picture.
         """
         return light * light.new_tensor(vignette_map(self.vignette, light.shape[-1], light.shape[-2]))
 
@@ -58,6 +62,10 @@ class Vignette(Effect):
 def vignette_map(strength: float, width_px: int, height_px: int) -> FloatImage:
     """The (H, W) float32 factors on light of a vignette, read-only: 1 in the middle of the picture, 1 - `strength` in
     the corners.
+
+    Args:
+        strength: darkening of the corners, 0..1.
+        width_px, height_px: size of the picture.
     """
     x, y = np.meshgrid(np.linspace(-1, 1, width_px), np.linspace(-1, 1, height_px))
     aspect = height_px / width_px

@@ -177,6 +177,11 @@ def attack_per_scene(args: argparse.Namespace, request: AttackRequest) -> int:
 def check_rendered(args: argparse.Namespace, request: AttackRequest, facts: Json) -> None:
     """Renders the optimised patches in samples that the attack did not use (`--verify`), and prints a
     comparison with composed patches.
+
+    Args:
+        args: parsed arguments of the command.
+        request: arguments of the attack.
+        facts: content of `attack.json`.
     """
     import json
 

@@ -47,7 +47,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def show_all(catalogue: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> int:
-    """Prints the working plugins, the broken plugins, and the names that several plugins share; returns exit code 0."""
+    """Prints the working plugins, the broken plugins, and the names that several plugins share; returns exit code 0.
+
+    Args:
+        catalogue: all plugins.
+        kinds: kinds of plugins to print.
+        as_json: whether JSON is printed.
+    """
     from gear.plugins.describe import summary
 
     rows = [summary(plugin) for kind in kinds for plugin in catalogue.of_kind(kind)]
@@ -72,7 +78,13 @@ def show_all(catalogue: Catalogue, kinds: tuple[Kind, ...], as_json: bool) -> in
 
 
 def show(catalogue: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace) -> int:
-    """Prints one plugin with its source, capabilities and options; returns exit code 0."""
+    """Prints one plugin with its source, capabilities and options; returns exit code 0.
+
+    Args:
+        catalogue: all plugins.
+        kinds: kinds in which the name is looked up.
+        args: parsed arguments of the command, with the name.
+    """
     from gear.plugins.describe import options, source_of, summary, training
 
     plugin = the_one(catalogue, kinds, args.name)

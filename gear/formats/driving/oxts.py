@@ -81,7 +81,12 @@ def _longitude_deg(east_m: float) -> float:
 
 
 def timestamps(day: datetime.date, times_s: Array) -> bytes:
-    """The bytes of a file `timestamps.txt`: date and time of each frame, to the nanosecond; sequences start at noon."""
+    """The bytes of a file `timestamps.txt`: date and time of each frame, to the nanosecond; sequences start at noon.
+
+    Args:
+        day: date of the drive.
+        times_s: (N,) times of the frames in seconds from the first frame.
+    """
     lines = []
     for time_s in times_s:
         seconds, nanoseconds = divmod(round(float(time_s) * 1e9), 1_000_000_000)

@@ -69,6 +69,11 @@ class Effect:
     def of(request: GapRequest, dataset: Dataset[Any], callbacks: Callbacks) -> Effect:
         """Opens the model and the defense of a request, and warns about settings that may be unintended.
 
+        Args:
+            request: arguments, which `gear.gap` describes.
+            dataset: the rendered dataset with patches.
+            callbacks: progress and warnings.
+
         Raises:
             UnknownNameError: there is no such model or defense.
             GearError: the model is for another task, or the defense does not fit it.

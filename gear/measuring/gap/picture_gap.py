@@ -41,7 +41,13 @@ class PictureGap:
 
 
 def visible_mask(surfaces: Sequence[SurfaceTruth], view: str, height_px: int, width_px: int) -> Mask:
-    """The (H, W) bool mask of the pixels in one view that show a patch surface, decoded from the ground truth."""
+    """The (H, W) bool mask of the pixels in one view that show a patch surface, decoded from the ground truth.
+
+    Args:
+        surfaces: ground truth of the surfaces in all views.
+        view: name of the camera.
+        height_px, width_px: size of the picture.
+    """
     mask = np.zeros((height_px, width_px), np.bool_)
     for surface in surfaces:
         if surface.camera == view and surface.visible_px:
@@ -52,6 +58,11 @@ def visible_mask(surfaces: Sequence[SurfaceTruth], view: str, height_px: int, wi
 def picture_gap(digital: UInt8Image, rendered: UInt8Image, mask: Mask) -> PictureGap:
     """Compares two (H, W, 3) uint8 pictures inside and outside a (H, W) bool mask of the patch, which must not be
     empty.
+
+    Args:
+        digital: picture with composed patches.
+        rendered: picture with rendered patches.
+        mask: pixels that show a patch.
     """
     difference = np.abs(digital.astype(np.int16) - rendered)
     inside, outside = difference[mask], difference[~mask]

@@ -92,6 +92,10 @@ class ActorType:
 def body_tree(model: mujoco.MjModel, body_id: int) -> list[int]:
     """The ids of a body and of all its descendants. The ids are consecutive, because MuJoCo numbers bodies depth
     first.
+
+    Args:
+        model: the compiled model.
+        body_id: id of the body.
     """
     outside = np.flatnonzero(model.body_parentid[body_id + 1 :] < body_id)
     return list(range(body_id, body_id + 1 + int(outside[0]) if len(outside) else model.nbody))
@@ -100,6 +104,11 @@ def body_tree(model: mujoco.MjModel, body_id: int) -> list[int]:
 def visible_geoms(model: mujoco.MjModel, body_id: int, label_code: npt.NDArray[np.uint8]) -> list[int]:
     """The ids of the visible geoms of a body and of its descendants. `label_code` is the (ngeom,) uint8 array of label
     codes.
+
+    Args:
+        model: the compiled model.
+        body_id: id of the body.
+        label_code: (ngeom,) uint8 label code of each geom.
     """
     owners = np.isin(model.geom_bodyid, body_tree(model, body_id))
     return [int(geom) for geom in np.flatnonzero(owners & (label_code != HIDDEN_CODE))]

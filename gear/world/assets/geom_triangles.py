@@ -21,6 +21,10 @@ ROUND_SEGMENTS = 24
 def geom_triangles(model: mujoco.MjModel, geom_id: int) -> Triangles:
     """The triangles of one geom's surface, in the geom's frame.
 
+    Args:
+        model: the compiled model.
+        geom_id: id of the geom.
+
     Returns:
         (N, 3) float64 vertices in metres, and (M, 3) int32 vertex indices of the triangles, counter-clockwise as seen
         from outside.

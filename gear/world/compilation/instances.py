@@ -170,6 +170,11 @@ class AssetInstances:
     def add_surface_instance(self, file: AssetFile, body: Any, *, is_carried: bool) -> FaceNames:
         """Adds an instance of an asset to a body. Its face gets a texture of its own, so that it can show a patch.
 
+        Args:
+            file: file of the asset, a board or a truck.
+            body: body of dm_control to which the instance is attached.
+            is_carried: whether an actor carries the surface.
+
         Raises:
             TownError: the asset does not have exactly one face, or the face has no material or no site `surface`.
         """

@@ -41,6 +41,11 @@ class WorldPlan:
 def plan_world(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> WorldPlan:
     """Plans a world: reads the assets of a scene and decides its pool of actors.
 
+    Args:
+        library: files of the town's assets.
+        scene: the scene with its boards and trucks.
+        weather: the weather.
+
     Raises:
         UnknownNameError: the town has no such board or truck, or no ego car.
         TownError: an actor's file breaks the conventions.

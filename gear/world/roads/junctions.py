@@ -38,6 +38,9 @@ class Junctions:
         """Whether two lanes, given by name, are in conflict: they come nearer to each other than `CLEARANCE_M`.
 
         Lanes that branch off the same lane are never in conflict, because their vehicles follow each other.
+
+        Args:
+            first, second: names of the lanes.
         """
         key = (min(first, second), max(first, second))
         if key not in self._conflicts:

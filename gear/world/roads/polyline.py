@@ -68,6 +68,10 @@ class Polyline:
     def sample(self, s_m: Array, lateral_m: float = 0.0) -> tuple[Array, Array]:
         """The points beside the line at several arc lengths (N,), and the headings there: (N, 3) points in metres and
         (N,) headings in radians.
+
+        Args:
+            s_m: (N,) arc lengths in metres.
+            lateral_m: distance to the left of the line in metres.
         """
         index = np.clip(np.searchsorted(self.s_m, s_m, side="right") - 1, 0, len(self.s_m) - 2)
         steps = self.points_m[index + 1] - self.points_m[index]

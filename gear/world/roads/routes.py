@@ -74,6 +74,12 @@ def extend_route(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Ge
     `length_m` long unless the road ends before.
 
     At each branch the next lane is drawn at random.
+
+    Args:
+        graph: the lanes of the town.
+        lane: name of the first lane.
+        length_m: smallest length of the route.
+        rng: random generator.
     """
     names = [lane]
     total_m = graph.lanes[lane].line.length_m
@@ -134,6 +140,11 @@ def offset_left(point_m: Array, yaw_rad: float, lateral_m: float) -> Array:
 
     The heading must be that of the road user, which changes steadily. With the heading of a line's segment the point
     would jump where two segments meet, and move backwards on the inside of a turn.
+
+    Args:
+        point_m: (3,) point in world coordinates.
+        yaw_rad: heading of the road user, counter-clockwise from east.
+        lateral_m: distance in metres.
     """
     return point_m + lateral_m * np.array([-math.sin(yaw_rad), math.cos(yaw_rad), 0.0])
 

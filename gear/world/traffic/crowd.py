@@ -271,6 +271,10 @@ class OcclusionTest:
     def occluders(self, space: PlacementSpace, poses: Mapping[str, RigidTransform]) -> set[str]:
         """The names of the actors' bodies that hide a face, for faces of which actors together hide more than
         allowed.
+
+        Args:
+            space: collision model in which rays are cast.
+            poses: world pose of each actor, by name of its body.
         """
         found: set[str] = set()
         for grid_m in self.grids_m:

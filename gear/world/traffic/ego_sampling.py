@@ -215,7 +215,14 @@ class EgoSampler:
         return float(table.s_m[first]), float(table.s_m[last])
 
     def ego_on_lane(self, road_users: RoadUsers, lane: str, s_m: float, rng: np.random.Generator) -> Spawn:
-        """Draws the ego car at arc length `s_m` on a lane, and marks its entry in the pool of actors as used."""
+        """Draws the ego car at arc length `s_m` on a lane, and marks its entry in the pool of actors as used.
+
+        Args:
+            road_users: the road users of the sample.
+            lane: name of the lane.
+            s_m: arc length on the lane in metres.
+            rng: random generator.
+        """
         return self.spawner.on_lane(self.ego_type, road_users.free.take(EGO_ASSET), "ego", lane, s_m, rng)
 
     def _draw_behind_truck(self, road_users: RoadUsers, rng: np.random.Generator) -> list[Spawn] | str:

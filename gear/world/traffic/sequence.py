@@ -203,7 +203,12 @@ class SequenceSimulator:
 
 
 def moving_person(lanes: LaneGraph, spawn: Spawn) -> MovingPedestrian:
-    """The motion of a person who was drawn on a walk of a town."""
+    """The motion of a person who was drawn on a walk of a town.
+
+    Args:
+        lanes: the lanes and walks of the town.
+        spawn: the person, with walk, position and speed.
+    """
     assert spawn.walk is not None
     walk = lanes.walks[spawn.walk.walk]
     return MovingPedestrian(
@@ -225,7 +230,14 @@ def standing_discs(spawn: Spawn) -> list[tuple[float, float, float, float]]:
 
 
 def moved(spawn: Spawn, point_m: Array, yaw_rad: float, speed_mps: float) -> Spawn:
-    """The same road user at another place: (3,) point on the ground, heading in radians and speed."""
+    """The same road user at another place: (3,) point on the ground, heading in radians and speed.
+
+    Args:
+        spawn: the road user.
+        point_m: (3,) point on the ground in world coordinates.
+        yaw_rad: heading, counter-clockwise from east.
+        speed_mps: speed in metres per second.
+    """
     return replace(
         spawn,
         x_m=float(point_m[0]),

@@ -126,6 +126,11 @@ class FreeSlots:
     def draw(self, types: Mapping[str, ActorType], rng: np.random.Generator, *, people: bool) -> ActorType | None:
         """Draws a random asset that has a free slot; probabilities are proportional to the weights of the assets. None
         if no slot is free.
+
+        Args:
+            types: assets by name.
+            rng: random generator.
+            people: whether a person is drawn; otherwise a vehicle.
         """
         kinds = [
             actor_type
@@ -139,7 +144,12 @@ class FreeSlots:
 
 
 def draw_paint(actor_type: ActorType, rng: np.random.Generator) -> Vec3 | None:
-    """Draws a random colour from an asset's palette, as linear albedo 0..1; None for an asset without a palette."""
+    """Draws a random colour from an asset's palette, as linear albedo 0..1; None for an asset without a palette.
+
+    Args:
+        actor_type: the asset.
+        rng: random generator.
+    """
     palette = actor_type.facts.palette
     total = sum(weight for _, weight in palette)
     if total <= 0:
@@ -222,7 +232,14 @@ class Spawner:
         )
 
     def in_bay(self, actor_type: ActorType, body: str, bay: ParkingBay, rng: np.random.Generator) -> Spawn | None:
-        """Draws a parked vehicle in a parking bay; None if the bay is too small for the vehicle."""
+        """Draws a parked vehicle in a parking bay; None if the bay is too small for the vehicle.
+
+        Args:
+            actor_type: asset of the vehicle.
+            body: name of the vehicle's body in the pool of actors.
+            bay: the parking bay.
+            rng: random generator.
+        """
         spare_m = bay.length_m / 2 - actor_type.half_length_m, bay.width_m / 2 - actor_type.half_width_m
         if min(spare_m) < 0:
             return None

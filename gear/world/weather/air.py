@@ -108,7 +108,13 @@ def camera_pipeline(
 
 
 def contact_shadows_of(weather: Weather, renderer_name: str, shapes: Mapping[str, Shape]) -> ContactShadows:
-    """The contact shadows that assets cast on the ground in the light of a weather."""
+    """The contact shadows that assets cast on the ground in the light of a weather.
+
+    Args:
+        weather: the weather.
+        renderer_name: name of the renderer.
+        shapes: triangles of the assets by name.
+    """
     light = lighting_of(weather, sky_face_px=SHADE_SKY_FACE_PX)
     return ContactShadows(shapes=shapes, even_share=even_share(weather, light), is_display=renderer_name == "classic")
 
