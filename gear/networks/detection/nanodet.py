@@ -111,7 +111,7 @@ class NanoDetDetector(Detector):
         edges = torch.tensor([size[1], size[0]] * 2, dtype=torch.float32, device=self.device)
         answers = []
         for logits, sides, centres in zip(outputs[LOGITS], outputs[SIDES], outputs[CENTRES_PX], strict=True):
-            cells, labels = (logits.sigmoid() >= self.options.least_score).nonzero(as_tuple=True)
+            cells, labels = (logits.sigmoid() >= self.options.score_threshold).nonzero(as_tuple=True)
             scores = logits[cells, labels].sigmoid()
             boxes = _boxes(centres, _distances(sides) * strides)[cells] / self.shrinkage(size)
             boxes = boxes.clamp(min=0).minimum(edges)
