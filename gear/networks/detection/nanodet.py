@@ -74,7 +74,7 @@ class NanoDetDetector(Detector):
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The outputs by name; the network reads blue, green, red."""
         picture = pictures[VIEW]
-        logits, sides = self.graph(self.seen(picture).flip(1))
+        logits, sides = self.graph(self.preprocess(picture).flip(1))
         centres = self._centres(size_of(picture)).expand(len(picture), -1, -1)
         return {LOGITS: logits, SIDES: sides, CENTRES_PX: centres}
 
@@ -148,7 +148,7 @@ class NanoDetDetector(Detector):
         return focal[counts].sum(), giou.sum(), distribution.sum(), weights.sum(), is_object.sum().float()
 
     def _grids(self, picture_px: Size) -> list[Size]:
-        height, width = self.seen_px(picture_px)
+        height, width = self.input_px(picture_px)
         return [(height // stride, width // stride) for stride in STRIDES_PX]
 
     def _counts(self, picture_px: Size) -> list[int]:
