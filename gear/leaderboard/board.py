@@ -55,7 +55,7 @@ class Table:
     Attributes:
         benchmark, data_key: name of the benchmark, and hash of its scenes, weathers and numbers of pictures.
         task, metric: the task and its ranked metric.
-        less_is_better: whether the metric is an error.
+        lower_is_better: whether the metric is an error.
         rows: ranked rows, best first, followed by the other rows.
     """
 
@@ -63,7 +63,7 @@ class Table:
     data_key: str
     task: str
     metric: str
-    less_is_better: bool
+    lower_is_better: bool
     rows: tuple[Row, ...]
 
 
@@ -80,30 +80,30 @@ def tables(records: Iterable[Filed], verdicts: Mapping[str, Verdict]) -> list[Ta
         grouped.setdefault((one.record.benchmark.data_key, entry.task, entry.metric), []).append(one)
     found = []
     for (data_key, task, metric), members in sorted(grouped.items(), key=lambda item: item[0]):
-        less = members[0].record.entry.less_is_better
+        less = members[0].record.entry.lower_is_better
         rows: dict[tuple[object, ...], list[Filed]] = {}
         for one in members:
             rows.setdefault(one.record.entry.row, []).append(one)
-        made = [row for one in rows.values() if (row := _row(one, verdicts, less_is_better=less)) is not None]
+        made = [row for one in rows.values() if (row := _row(one, verdicts, lower_is_better=less)) is not None]
         found.append(
             Table(
                 benchmark=members[0].record.benchmark.name,
                 data_key=data_key,
                 task=task,
                 metric=metric,
-                less_is_better=less,
-                rows=tuple(sorted(made, key=lambda row: _order(row, less_is_better=less))),
+                lower_is_better=less,
+                rows=tuple(sorted(made, key=lambda row: _order(row, lower_is_better=less))),
             )
         )
     return found
 
 
-def _order(row: Row, *, less_is_better: bool) -> tuple[bool, float, str]:
+def _order(row: Row, *, lower_is_better: bool) -> tuple[bool, float, str]:
     value = 0.0 if row.worst is None or row.worst[0].value is None else row.worst[0].value
-    return not row.is_ranked, value if less_is_better else -value, row.first.sha256
+    return not row.is_ranked, value if lower_is_better else -value, row.first.sha256
 
 
-def _row(members: Sequence[Filed], verdicts: Mapping[str, Verdict], *, less_is_better: bool) -> Row | None:
+def _row(members: Sequence[Filed], verdicts: Mapping[str, Verdict], *, lower_is_better: bool) -> Row | None:
     """Makes the row of records with the same network and defense; None if there are only attacks of other people."""
 
     def state(one: Filed) -> str:
@@ -118,7 +118,7 @@ def _row(members: Sequence[Filed], verdicts: Mapping[str, Verdict], *, less_is_b
     foreign = [one for one in members if one.record.entry.kind == "attack"]
     attacks = [one for one in foreign if state(one) == "reproduced"]
     figures = [(figure, one) for one in [*counted, *attacks] for figure in robust_figures(one.record)]
-    lowest = worst([figure for figure, _ in figures], less_is_better=less_is_better)
+    lowest = worst([figure for figure, _ in figures], lower_is_better=lower_is_better)
     found = next(((figure, one) for figure, one in figures if figure is lowest), None)
     is_broken = not standing or (found is not None and found[1] in attacks and _gains_nothing(found, counted[0]))
     return Row(
@@ -136,5 +136,5 @@ def _gains_nothing(found: tuple[Figure, Filed], own: Filed) -> bool:
     """Whether an attack leaves the defended network no better than the network alone is under its own patch."""
     alone = [one for one in own.record.reference if one.name == own.record.entry.metric and one.value is not None]
     attacked = [one for one in alone if one.patch not in ("none", "random")]
-    lowest = worst(attacked, less_is_better=own.record.entry.less_is_better)
+    lowest = worst(attacked, lower_is_better=own.record.entry.lower_is_better)
     return lowest is not None and harm(own.record, found[0], lowest) >= 0

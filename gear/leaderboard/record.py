@@ -135,7 +135,7 @@ class Entry:
         kind: what the record claims.
         task: name of the task plugin.
         metric: metric by which rows are ranked, such as `miou`.
-        less_is_better: whether the metric is an error.
+        lower_is_better: whether the metric is an error.
         network, defense: the plugins; `defense` is None for a network alone.
         gradient: how gradients pass the defense; None without a defense.
         is_random: whether the defense gives other pictures, masks or scores for another state of its random generator.
@@ -145,7 +145,7 @@ class Entry:
     kind: Kind
     task: str
     metric: str
-    less_is_better: bool
+    lower_is_better: bool
     network: Plugin
     defense: Plugin | None
     gradient: Gradient | None

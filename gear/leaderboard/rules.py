@@ -29,26 +29,26 @@ def robust_figures(record: Record) -> list[Figure]:
     return [figure for kind in kinds if (figure := record.figure(kind)) is not None]
 
 
-def worst(figures: Sequence[Figure], *, less_is_better: bool) -> Figure | None:
+def worst(figures: Sequence[Figure], *, lower_is_better: bool) -> Figure | None:
     """The figure that is worst for the network; None without figures."""
     known = [one for one in figures if one.value is not None]
-    sign = -1.0 if less_is_better else 1.0
+    sign = -1.0 if lower_is_better else 1.0
     return min(known, key=lambda one: sign * (one.value or 0.0), default=None)
 
 
 def harm(record: Record, one: Figure, other: Figure) -> float:
     """How much worse `one` is than `other` for the network; negative if it is better."""
     assert one.value is not None and other.value is not None
-    return (one.value - other.value) if record.entry.less_is_better else (other.value - one.value)
+    return (one.value - other.value) if record.entry.lower_is_better else (other.value - one.value)
 
 
 def is_clearly_worse(record: Record, one: Figure, other: Figure) -> bool:
     """Whether `one` is worse than `other`, and the value of `other` lies outside the interval of `one`."""
     assert other.value is not None
-    near = one.low if record.entry.less_is_better else one.high
+    near = one.low if record.entry.lower_is_better else one.high
     if near is None:
         return harm(record, one, other) > 0
-    return other.value < near if record.entry.less_is_better else other.value > near
+    return other.value < near if record.entry.lower_is_better else other.value > near
 
 
 def clean_loss(record: Record) -> float | None:
@@ -59,7 +59,7 @@ def clean_loss(record: Record) -> float | None:
     if here is None or there is None or there.value is None:
         return None
     loss = harm(record, here, there)
-    return loss / there.value if record.entry.less_is_better and there.value else loss
+    return loss / there.value if record.entry.lower_is_better and there.value else loss
 
 
 def faults(records: Sequence[Record]) -> list[str]:
@@ -125,8 +125,8 @@ def _between(records: Sequence[Record]) -> Iterator[str]:
     """Compares records of one row that were attacked in different ways."""
     for one in records:
         for other in records:
-            here = worst(robust_figures(one), less_is_better=one.entry.less_is_better)
-            there = worst(robust_figures(other), less_is_better=other.entry.less_is_better)
+            here = worst(robust_figures(one), lower_is_better=one.entry.lower_is_better)
+            there = worst(robust_figures(other), lower_is_better=other.entry.lower_is_better)
             if one is other or here is None or there is None:
                 continue
             black = one.attack.knowledge == "black-box" and other.attack.knowledge == "white-box"

@@ -57,7 +57,7 @@ def benchmark(**changes: Any) -> Benchmark:
 def record(values: dict[str, float] = VALUES, **changes: Any) -> Record:
     """A record of a defense; `changes` replace fields of the record, of its entry (`entry=`) or attack (`attack=`)."""
     entry: dict[str, Any] = {
-        "kind": "defense", "task": "semseg", "metric": "miou", "less_is_better": False,
+        "kind": "defense", "task": "semseg", "metric": "miou", "lower_is_better": False,
         "network": plugin("net", weights_sha256=sha("weights")), "defense": plugin("guard"),
         "gradient": "differentiable", "is_random": False,
     } | changes.pop("entry", {})  # fmt: skip

@@ -49,7 +49,7 @@ def test_a_query_attack_suffices_without_a_gradient() -> None:
 def test_the_clean_loss_of_an_error_is_relative() -> None:
     less = record(
         {"none": 5.05, "random": 5.1, "patch": 6.0, "adaptive patch": 7.0},
-        reference=figures({"none": 5.0}), entry={"less_is_better": True},
+        reference=figures({"none": 5.0}), entry={"lower_is_better": True},
     )  # fmt: skip
     assert clean_loss(less) == pytest.approx(0.01)
     assert warnings([less]) == []

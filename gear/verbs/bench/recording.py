@@ -187,7 +187,7 @@ def _entry(task: TaskResult, one: Result, match: Match, kind: Kind | None, *, ra
         kind=kind or ("model" if defense is None else "defense"),
         task=task.name,
         metric=task.metric.title,
-        less_is_better=task.metric.less_is_better,
+        lower_is_better=task.metric.lower_is_better,
         network=network,
         defense=defense,
         gradient=None if spec is None else spec.gradient,

@@ -1,7 +1,7 @@
 """Distributes the datasets of an evaluation over the workers of an engine: processes, Ray or SLURM.
 
-The workers write the predictions and notes of all samples. The process of the command then computes the results from
-the notes, as it does after an interrupted run.
+The workers write the predictions and results of all samples. The process of the command then computes the results from
+the results, as it does after an interrupted run.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from gear.measuring.scoring import Scorer
 from gear.values.errors import GearError
 from gear.values.progress import Callbacks
 from gear.values.serial import Json
-from gear.verbs.evaluate.compare import Measured, streets_of
+from gear.verbs.evaluate.compare import EvaluatedDataset, streets_of
 from gear.verbs.evaluate.request import EvaluateRequest
 
 FIT = "fit.json"
@@ -51,17 +51,17 @@ class Predicted:
 
 def measure_dataset(
     request: EvaluateRequest, dataset: Dataset[Any], name: str, guarded: GuardedModel, done: SampleDone
-) -> Measured:
+) -> EvaluatedDataset:
     """Runs the model over one dataset, and returns the scores of its samples."""
     scorer = Scorer(dataset, request.folder(dataset.plan.task["name"]), name, request.reports, guarded.plugin)
     batch = request.batch or guarded.usual_batch(dataset)
     row = evaluate_row(dataset, scorer, guarded, batch=batch, workers=request.workers, done=done)
-    scorer.finish(row.notes)
-    return Measured(
+    scorer.finish(row.results)
+    return EvaluatedDataset(
         name=name,
         dataset=dataset,
         scorer=scorer,
-        notes=row.notes,
+        results=row.results,
         streets=streets_of(dataset),
         made=row.made,
         damaged=tuple(str(problem) for problem in row.damaged),

@@ -22,9 +22,9 @@ from gear.dataset.reading import Dataset
 from gear.dataset.store import check_output
 from gear.measuring.guard import Guard, open_guard
 from gear.measuring.guarded_model import GuardedModel
+from gear.measuring.notes import grouped
 from gear.measuring.open_datasets import opened, row_names
 from gear.measuring.plugin_selection import chosen_model
-from gear.measuring.results import grouped
 from gear.measuring.shown_size import size_note
 from gear.reporting.display import displayed
 from gear.values.errors import DatasetError
@@ -215,7 +215,7 @@ def _measured(
 ) -> list[EvaluatedDataset]:
     """Runs the model over the datasets, and returns their samples' scores.
 
-    If an engine is requested, its workers predict the samples; the scores are then read from their notes.
+    If an engine is requested, its workers predict the samples; the scores are then read from the stored results.
     """
     predicted = predict_in_workers(request, datasets, guarded, callbacks) if request.is_distributed else None
     done = _counter(callbacks.on_progress, sum(len(one) for one in datasets))

@@ -99,7 +99,7 @@ def compare_fresh(record: Record, fresh: Sequence[Again], seed: int) -> Iterator
         numbers = [number for number, data in enumerate(record.data) if data.patch == patch]
         chosen = {numbers[place] for place in places}
         there = [one for one in record.samples if one.data in chosen]
-        sign = -1.0 if record.entry.less_is_better and record.sample_metric == record.entry.metric else 1.0
+        sign = -1.0 if record.entry.lower_is_better and record.sample_metric == record.entry.metric else 1.0
         new, old = ([sign * one.value for one in every if one.value is not None] for every in (here, there))
         yield from _shifted(f"{patch}: {record.sample_metric or 'metric'}", new, old, seed)
         towards = -1.0 if patch in (NONE, RANDOM) else 1.0
@@ -151,7 +151,7 @@ def compare_withheld(record: Record, defended: Sequence[Again], alone: Sequence[
         ]
         if not pairs:
             continue
-        sign = -1.0 if record.entry.less_is_better and record.sample_metric == record.entry.metric else 1.0
+        sign = -1.0 if record.entry.lower_is_better and record.sample_metric == record.entry.metric else 1.0
         gains = sign * np.array([one - other for one, other in pairs])
         p = float(paired_p(gains[:, None], seed)[0])
         text = f"withheld scenes, {patch}: the defense gains {gains.mean():+.4f} {record.sample_metric} (p = {p:.2g})"
@@ -166,4 +166,4 @@ def _claimed_gain(record: Record, patch: str) -> float | None:
         there = record.figure("patch", is_reference=True)
     if here is None or there is None or here.value is None or there.value is None:
         return None
-    return (there.value - here.value) if record.entry.less_is_better else (here.value - there.value)
+    return (there.value - here.value) if record.entry.lower_is_better else (here.value - there.value)

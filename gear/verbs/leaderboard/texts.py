@@ -98,7 +98,7 @@ def knowledge_rows(table: Table) -> list[list[str]]:
                 for kind in filed.record.kinds()
                 if kind not in (NONE, RANDOM) and (figure := filed.record.figure(kind)) is not None
             ]
-            sign = -1.0 if table.less_is_better else 1.0
+            sign = -1.0 if table.lower_is_better else 1.0
             cells.append(shown(min(found, key=lambda one: sign * (one.value or 0.0), default=None)))
         lines.append([named(record.entry.network), named(record.entry.defense), *cells])
     return lines
@@ -120,7 +120,7 @@ def board_json(tables: Sequence[Table], refused: Sequence[str]) -> Json:
                 "data_key": table.data_key,
                 "task": table.task,
                 "metric": table.metric,
-                "less_is_better": table.less_is_better,
+                "lower_is_better": table.lower_is_better,
                 "rows": [_row_json(row) for row in table.rows],
             }
             for table in tables
