@@ -1,7 +1,7 @@
 """Distributes the datasets of an evaluation over the workers of an engine: processes, Ray or SLURM.
 
-The workers write the predictions and results of all samples. The process of the command then computes the results from
-the results, as it does after an interrupted run.
+The workers write the predictions and results of all samples. The process of the command then computes the metrics from
+these results, as it does after an interrupted run.
 """
 
 from __future__ import annotations

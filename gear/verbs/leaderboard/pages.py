@@ -46,7 +46,7 @@ def index_page(tables: Sequence[Table], refused: Sequence[str], commitment: str 
     if commitment is not None:
         parts.append(f'<p class="dim">Salted hash of the withheld scenes: {_safe(commitment)}</p>')
     for table in tables:
-        better = "less" if table.lower_is_better else "more"
+        better = "lower" if table.lower_is_better else "higher"
         title = f"{table.task}: {table.metric} ({better} is better), benchmark {table.benchmark} {table.data_key[:8]}"
         parts += [f"<h2>{_safe(title)}</h2>", _defenses(table), _notes(table)]
         parts += [_titled("Attacks", ATTACKS, attack_rows(table))]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import gear
-from gear.dataset.locks import turn
+from gear.dataset.locks import dataset_lock
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from tests.shared import shared_folder
 from tests.verbs.bench.conftest import FEW, plugins, write
@@ -29,7 +29,7 @@ HERE = (
 def records(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, plugins: None) -> Path:
     """A copy of the folder of records of the tiny benchmark."""
     folder = shared_folder(tmp_path_factory, "benches/recorded")
-    with turn(folder):
+    with dataset_lock(folder):
         if not (folder / "whole").exists():
             gear.bench(write(folder, ADAPTIVE), out=folder / "out", record=True)
             (folder / "whole").touch()
