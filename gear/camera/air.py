@@ -144,6 +144,10 @@ class Air:
     def transmittance(self, depth_m: FloatImage, camera: CameraRecord) -> FloatImage:
         """The transmittance of the air between surface and camera: (H, W, 3) float32, 0..1, the share of a surface's
         light that reaches the camera, for each pixel and channel.
+
+        Args:
+            depth_m: (H, W) planar depth in metres.
+            camera: camera of the frame.
         """
         strips = [slice(top, top + _COARSE_PX) for top in range(0, len(depth_m), _COARSE_PX)]
         return np.concatenate([np.stack(through, axis=-1) for _, through in self._through(depth_m, camera, strips)])

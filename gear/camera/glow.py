@@ -137,6 +137,9 @@ class LampGlare:
     def spots(self, size_px: tuple[int, ...]) -> FloatImage:
         """The spots of all lamps as a picture: (height, width) float32 light, equal for all channels. Each spot is the
         sum of a narrow Gaussian and a wide, faint Gaussian.
+
+        Args:
+            size_px: height and width of the picture.
         """
         result = np.zeros(size_px, np.float32)
         for place, size, strength in zip(self.places_px, self.size_px, self.strength, strict=True):

@@ -63,6 +63,9 @@ class NightLight:
     def apply(self, linear_rgb: UInt16Image) -> UInt16Image:
         """Converts a frame under even light to night: a new (H, W, 3) uint16 array, rounded with a fixed dither
         pattern.
+
+        Args:
+            linear_rgb: (H, W, 3) uint16 frame under even light.
         """
         result = np.empty_like(linear_rgb)
         for rows in _bands(len(linear_rgb)):

@@ -70,6 +70,12 @@ class Probe:
 def crop_probe(surface: str, view: str, black: UInt16Image, white: UInt16Image, response: Response) -> Probe | None:
     """Crops two (H, W, 3) uint16 views, with a surface black and white, to the pixels in which they differ.
 
+    Args:
+        surface: name of the surface.
+        view: name of the camera.
+        black, white: views with the black and with the white surface.
+        response: exposure and tone curve of the camera.
+
     Returns:
         The smallest crop with all differing pixels; None if the views are equal.
     """

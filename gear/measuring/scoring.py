@@ -67,7 +67,7 @@ class SampleResult:
     defended: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> Json:
-        """The result as JSON, which is written next to the predictions."""
+        """The result as JSON: the content of the file that marks the sample as finished."""
         return {
             "index": self.index,
             "metrics": {name: known_json(one) for name, one in self.metrics.items()},

@@ -77,7 +77,11 @@ class Network(nn.Module, ABC):
         return {}
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """The prediction for one sample, in the form that the task defines."""
+        """The prediction for one sample, in the form that the task defines.
+
+        Args:
+            views: (H, W, 3) uint8 pictures of the sample by camera name.
+        """
         return self.predict_many([views])[0]
 
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[Any]:
@@ -124,12 +128,19 @@ class Network(nn.Module, ABC):
         """The outputs by name for (B, 3, H, W) pictures in 0..1 on the network's device; subclasses implement this."""
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `losses`: the outputs, and further tensors of networks with heads that only training uses."""
+        """The input of `losses`: the outputs, and further tensors of networks with heads that only training uses.
+
+        Args:
+            pictures: (B, 3, H, W) pictures by camera name, float in 0..1.
+        """
         return self.run(pictures)
 
     def run_for_predictions(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """The input of `predictions`: the outputs, or a smaller intermediate result for networks that predict
         faster from it.
+
+        Args:
+            pictures: (B, 3, H, W) pictures by camera name, float in 0..1.
         """
         return self.run(pictures)
 

@@ -87,6 +87,10 @@ class NanoDetDetector(Detector):
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
         """The three losses by name, summed over the objects' cells of all pictures and divided as in the training
         code; background cells that lie mostly inside ignored objects do not count.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B samples.
+            targets: the B samples with their ground truth.
         """
         size = picture_size(outputs)
         wanted = [self.targets(sample, size) for sample in targets]
@@ -103,7 +107,12 @@ class NanoDetDetector(Detector):
         }
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[tuple[Detection, ...]]:
-        """Detections of each picture, highest score first."""
+        """Detections of each picture, highest score first.
+
+        Args:
+            outputs: outputs of `forward` by name, for a batch of B pictures.
+            size_px: height and width of the pictures.
+        """
         from torchvision.ops import batched_nms
 
         size = (size_px[0], size_px[1])

@@ -51,6 +51,10 @@ class StereoRcnnNetwork(Network):
         Each loss L is weighted by its learned logarithm s of a variance: L exp(-s) + s. Anchors and box pairs for the
         losses are sampled with `options.seed`, so each call samples the same ones. In training mode torch's own
         generator samples them anew for every picture.
+
+        Args:
+            views: (B, 3, H, W) pictures `left` and `right`, float in 0..1.
+            targets: the B samples with their ground truth; None for outputs instead of losses.
         """
         if targets is None:
             return super().forward(views)

@@ -155,9 +155,10 @@ def load(
 
 
 def begun_config(root: Path) -> Json:
-    """Returns the config of the training whose checkpoint is in the folder, as JSON.
+    """Returns the config, as JSON, of the training whose checkpoint is in the folder `root`.
 
-    The result is None if there is no checkpoint or if it cannot be read; `load` reports the latter.
+    The result is None if the folder has no checkpoint, or a checkpoint that cannot be read; `load` raises an error for
+    the second case.
     """
     path = root / FILE
     if not path.exists():

@@ -65,7 +65,9 @@ class Route:
         return max(0, int(np.searchsorted(self.starts_m, s_m, side="right")) - 1)
 
     def speed_at(self, s_m: float) -> float:
-        """The lowest usual speed in m/s between an arc length and `BRAKING_WAY_M` ahead of it."""
+        """The lowest usual speed, in m/s, on the part of the route that begins at arc length `s_m` (metres) and is
+        `BRAKING_WAY_M` long.
+        """
         return min(self.speeds_mps[self.lane_at(s_m) : self.lane_at(s_m + BRAKING_WAY_M) + 1])
 
 
