@@ -214,15 +214,15 @@ class Rerun:
             sample = dataset[index]
             self.pictures = sample.images
             (answer,) = guarded.predict([sample.images], [index])
-            note = scorer.measured(index, sample, answer).note
-            value = note.metrics.get(TASK, {}).get(self.record.sample_metric)
+            result = scorer.score(index, sample, answer).result
+            value = result.metrics.get(TASK, {}).get(self.record.sample_metric)
             found.append(
                 Again(
                     patch=patch,
                     place=place,
                     index=index,
                     content_key=dataset.plan.content_key,
-                    sha256=files_sha256(note.sha256),
+                    sha256=files_sha256(result.sha256),
                     value=None if value is None or value != value else value,
                     score=note.score,
                 )
