@@ -26,7 +26,7 @@ from gear.compositor.cache import Cache
 from gear.config.overrides import with_overrides
 from gear.contracts.models import Model
 from gear.plugins.attacks.optimisation.frozen_model import frozen
-from gear.plugins.attacks.optimisation.loop import Problem, Seen, TextureOptimiser, batch_of, unit_gradients
+from gear.plugins.attacks.optimisation.loop import PatchedBatch, Problem, TextureOptimiser, batch_of, unit_gradients
 from gear.plugins.attacks.scene_specific import SceneSpecific, SceneSpecificConfig
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.readers import open_all
@@ -52,19 +52,19 @@ def main() -> None:
     ascend = unit_gradients(problem, objective, config)
     optimiser = TextureOptimiser(problem.surfaces(), problem.settings, derive_rng(0, "benchmark"), None)
 
-    def seen(step: int) -> Seen:
+    def seen(step: int) -> PatchedBatch:
         textures = optimiser.textures.clone().requires_grad_(True)
         indices = batch_of(step, len(scenes.samples), args.batch, optimiser.seed)
-        return problem.seen(textures, indices, step, optimiser.seed)
+        return problem.compose_batch(textures, indices, step, optimiser.seed)
 
     def attack_step(step: int) -> int:
         textures = optimiser.textures.clone().requires_grad_(True)
         indices = batch_of(step, len(scenes.samples), args.batch, optimiser.seed)
-        direction, values = ascend(textures, problem.seen(textures, indices, step, optimiser.seed))
+        direction, values = ascend(textures, problem.compose_batch(textures, indices, step, optimiser.seed))
         optimiser.step(direction, 1.0)
         return len(values)
 
-    def bare_step(batch: Seen) -> int:
+    def bare_step(batch: PatchedBatch) -> int:
         views = {name: picture.detach().requires_grad_(True) for name, picture in batch.views.items()}
         outputs = model.forward(views) if args.task in ("semseg", "depth") else model.forward(views, batch.samples)
         terms = objective.terms(model, batch.views, batch.samples, batch.indices) if not counts else {}

@@ -176,7 +176,7 @@ class MeanAp:
         surest = np.argsort(order, kind="stable")
         places, order = places[surest], order[surest]
         counts = np.ones((1, len(order)), np.bool_)
-        return Matches(owner=places, hit=is_hit[order][None], counts=counts, wanted=wanted[chosen])
+        return Matches(owner=places, hit=is_hit[order][None], counts=counts, label_counts=wanted[chosen])
 
     def measure(self, chosen: Indices, draws: Draws) -> tuple[float, Values, float]:
         """See `Kind`."""

@@ -84,7 +84,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             scorer = Scorer(dataset, Path(folder), "row", (), model.found)
             begun = time.perf_counter()
-            notes = evaluate_row(dataset, scorer, guarded, batch=batch, workers=args.workers, done=lambda: None).notes
+            notes = evaluate_row(dataset, scorer, guarded, batch=batch, workers=args.workers, done=lambda: None).results
             scorer.finish(notes)
             spent["evaluate"].append((time.perf_counter() - begun) / len(pictures))
         print(", ".join(f"{name} {seconds[-1]:.3f} s" for name, seconds in spent.items()), flush=True)

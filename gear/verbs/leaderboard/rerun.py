@@ -224,7 +224,7 @@ class Rerun:
                     content_key=dataset.plan.content_key,
                     sha256=files_sha256(result.sha256),
                     value=None if value is None or value != value else value,
-                    score=note.score,
+                    score=result.score,
                 )
             )
         return found
