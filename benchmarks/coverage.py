@@ -244,7 +244,7 @@ def _kitti_picture(rng: Rng, share: float, rate: float, ease: float) -> Chosen:
         scores=rng.normal(np.where(np.arange(count) < hits, 1.0, -0.8), 1.2),
         overlaps=overlaps,
         angle_gain=np.ones((labels, count)),
-        excused=np.zeros(count, np.bool_),
+        is_ignored=np.zeros(count, np.bool_),
         min_overlap=0.7,
     )
 
