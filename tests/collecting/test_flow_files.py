@@ -55,6 +55,7 @@ def test_flow_leads_from_picture_to_picture(tmp_path: Path, collect_small: Colle
     opened = gear.open_dataset(tmp_path / "a")
     assert opened.verify() == []
     samples = list(opened)
+    assert len({tuple((actor.id, actor.asset) for actor in sample.record.actors) for sample in samples}) == 1
     assert [bool(opened.sidecar(index).auxiliary) for index in range(4)] == [True, True, True, False]
     for index, (now, after) in enumerate(pairwise(samples)):
         files = opened.sidecar(index).auxiliary
