@@ -37,9 +37,9 @@ _FULL = 65535
 _AROUND = np.ones((3, 3), np.uint8)
 _SHIFT = 4
 _DISPLAYED = Response(exposure=4.5, contrast=1.43).apply(
-    np.round(np.arange((_FULL >> _SHIFT) + 1) * (LINEAR_FULL_SCALE / (_FULL >> _SHIFT))).astype(np.uint16)
+    np.round((np.arange(_FULL + 1) >> _SHIFT) * (LINEAR_FULL_SCALE / (_FULL >> _SHIFT))).astype(np.uint16)
 )
-"""Display values 0..255 of light in 4096 steps, with the camera's response for a clear day."""
+"""Display values 0..255 of light 0..65535 in 4096 steps, with the camera's response for a clear day."""
 
 
 def at_edges_and_faces(geom_id: IdImage, depth_m: FloatImage, faces: Iterable[int]) -> Mask:
@@ -64,5 +64,5 @@ def at_contrasts(light: UInt16Image) -> Mask:
     Args:
         light: (H, W, 3) uint16, one sample per pixel; 65535 is full scale.
     """
-    shown = _DISPLAYED[light[..., 1] >> _SHIFT]
+    shown = cv2.LUT(cv2.extractChannel(light, 1), _DISPLAYED[None])
     return np.asarray(cv2.morphologyEx(shown, cv2.MORPH_GRADIENT, _AROUND) > CONTRAST)
