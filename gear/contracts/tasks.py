@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from gear.values.frames import Frame, UInt8Image
 from gear.values.ground_truth import SurfaceTruth
@@ -180,4 +180,26 @@ class Task(Protocol[SampleT, PredictionT]):
 
     def preview(self, sample: SampleT) -> Mapping[str, UInt8Image]:
         """Returns pictures of a sample to look at, by name: (H, W, 3) uint8, with labels, boxes or depth drawn in."""
+        ...
+
+
+Indexes = Mapping[str, bytes]
+"""Bytes of the index files of a split by path."""
+
+
+@runtime_checkable
+class ExtendsIndexes(Protocol):
+    """A task that can extend the index files of a split without reading all sidecars (JSON files of the samples)."""
+
+    def extend(self, before: Indexes, start: int, sidecars: Sequence[Sidecar], info: SplitInfo) -> Indexes:
+        """Makes the index files of a split from those of its first samples.
+
+        The result equals `Task.finalise(sidecars, info)`, byte for byte.
+
+        Args:
+            before: bytes of the index files, by path, that the task made when the split had `start` samples.
+            start: number of samples in these files.
+            sidecars: the sidecars of all samples; each that is accessed is read from disk.
+            info: names and seed of the split.
+        """
         ...

@@ -1,17 +1,79 @@
-"""Reads the sidecars (JSON files of the samples) of a split one at a time and collects the manifest's entries."""
+"""Reads the sidecars (JSON files of the samples) of a split one at a time and collects the manifest's entries.
+
+When a split is extended, the part that was closed is taken from the old manifest and index files. Its sidecars are
+hashed, but not parsed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
 from pathlib import Path
 from typing import overload
 
 from gear.contracts.tasks import Sidecar
 from gear.dataset.files import inside, read_bytes, sha256
-from gear.dataset.layout import sidecar_path
+from gear.dataset.hashing import file_hash, in_threads
+from gear.dataset.json_text import dump_json
+from gear.dataset.layout import manifest_path, sidecar_path
+from gear.dataset.sealed_json import load_sealed
 from gear.dataset.sidecar import no_sidecar, read_sidecar
-from gear.values.errors import FieldError
+from gear.values.errors import DatasetError, FieldError
 from gear.values.serial import Json
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ClosedPart:
+    """The first samples of a split, which an earlier run closed and which have not changed since.
+
+    Attributes:
+        entries: the manifest's entries of the samples.
+        hashes: hashes of their sidecars.
+        indexes: bytes of the index files by path.
+    """
+
+    entries: Sequence[Json]
+    hashes: Sequence[str]
+    indexes: Mapping[str, bytes]
+
+
+def closed_part(root: Path, split: str, samples: int, facts: Mapping[str, Json]) -> ClosedPart | None:
+    """The part of a split that an earlier run closed.
+
+    Args:
+        root: root of the dataset.
+        split: name of the split.
+        samples: number of samples of the extended split.
+        facts: entries that the old manifest must have: the same configuration, versions and keys.
+
+    Returns:
+        The part, or None if there is no manifest, it is of another configuration, or a sidecar or an index file has
+        changed.
+    """
+    try:
+        there = load_sealed(inside(root, manifest_path(split)))
+        entries, sidecars, indexes = there["samples"], there["sidecars"], there["indexes"]
+        hashes = [sidecars[sidecar_path(split, index)] for index in range(len(entries))]
+        is_ours = all(dump_json(there[name]) == dump_json(value) for name, value in facts.items())
+        if not is_ours or not 0 < len(entries) <= samples or len(sidecars) != len(entries):
+            return None
+        files = {name: read_bytes(inside(root, name)) for name in indexes}
+        paths = [inside(root, sidecar_path(split, index)) for index in range(len(entries))]
+        if any(sha256(files[name]) != digest for name, digest in indexes.items()):
+            return None
+        if any(found != digest for found, digest in zip(in_threads(file_hash, paths), hashes, strict=True)):
+            return None
+    except (DatasetError, KeyError, TypeError, AttributeError):  # missing, damaged, or edited
+        return None
+    return ClosedPart(entries=entries, hashes=hashes, indexes=files)
+
+
+def can_extend(task: type) -> bool:
+    """Whether the class that defines a task's `extend` also defines its `finalise`; a subclass may have replaced one of
+    them only.
+    """
+    owners = [next((owner for owner in task.__mro__ if name in vars(owner)), None) for name in ("extend", "finalise")]
+    return owners[0] is owners[1]
 
 
 class SidecarStream(Sequence[Sidecar]):
@@ -21,16 +83,20 @@ class SidecarStream(Sequence[Sidecar]):
     files and hashes.
     """
 
-    def __init__(self, root: Path, split: str, samples: int, views: Set[str]) -> None:
+    def __init__(self, root: Path, split: str, samples: int, views: Set[str], closed: ClosedPart | None = None) -> None:
         """Args:
         root: root of the dataset.
         split: name of the split.
         samples: number of samples.
         views: names of the cameras that each record must have.
+        closed: the part of the split that was closed before; None for no such part.
         """
         self._root, self._split, self._views = root, split, views
         self._entries: list[Json] = [None] * samples
         self._hashes: list[str] = [""] * samples
+        if closed is not None:
+            self._entries[: len(closed.entries)] = closed.entries
+            self._hashes[: len(closed.hashes)] = closed.hashes
 
     def __len__(self) -> int:
         return len(self._entries)

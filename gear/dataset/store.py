@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gear.contracts.tasks import Auxiliary, Encoded, Sample, Sidecar, Task
+from gear.contracts.tasks import Auxiliary, Encoded, ExtendsIndexes, Sample, Sidecar, Task
 from gear.dataset.cards import write_cards
 from gear.dataset.claims import clear_claims
-from gear.dataset.closing import SidecarStream
+from gear.dataset.closing import ClosedPart, SidecarStream, can_extend, closed_part
 from gear.dataset.failures import clear_failures
 from gear.dataset.files import clear_scratch, inside, read_bytes, sha256, sync_folder, write_whole
 from gear.dataset.guarded_paths import owned, refuse_links, remove_empty_folders, remove_file, remove_files
@@ -280,9 +280,11 @@ class Store:
         if there is not None and there.samples > self.plan.samples:
             return
         views = {camera.name for camera in task.rig().cameras}
-        sidecars = SidecarStream(self.root, self.split, self.plan.samples, views)
+        keys = {"twin_key": self.plan.twin_key, "content_key": self.plan.content_key}
+        closed = closed_part(self.root, self.split, self.plan.samples, {**keys, **facts})
+        sidecars = SidecarStream(self.root, self.split, self.plan.samples, views, closed)
         indexes: dict[str, str] = {}
-        files = sorted(self._indexes(task, sidecars).items())
+        files = sorted(self._indexes(task, sidecars, closed).items())
         begun = begun_path(self.split, "indexes")
         if not inside(self.root, manifest_path(self.split)).exists():
             write_whole(self.root, begun, dump_json([relative for relative, _ in files]))
@@ -295,8 +297,7 @@ class Store:
         manifest = {
             "format": "gear-dataset",
             "version": 1,
-            "twin_key": self.plan.twin_key,
-            "content_key": self.plan.content_key,
+            **keys,
             **facts,
             "samples": listed["samples"],
             "indexes": indexes,
@@ -316,13 +317,17 @@ class Store:
         clear_scratch(self.root)
         sync_folder(target.parent)
 
-    def _indexes(self, task: Task[Any, Any], sidecars: Sequence[Sidecar]) -> Mapping[str, bytes]:
-        """The index files of the format, by path.
+    def _indexes(
+        self, task: Task[Any, Any], sidecars: Sequence[Sidecar], closed: ClosedPart | None
+    ) -> Mapping[str, bytes]:
+        """The index files of the format, by path. A task that can extend them reads only the sidecars of new samples.
 
         Raises:
             DatasetError: a sidecar lacks something that the task needs.
         """
         try:
+            if closed is not None and isinstance(task, ExtendsIndexes) and can_extend(type(task)):
+                return task.extend(closed.indexes, len(closed.entries), sidecars, self.plan.info)
             return task.finalise(sidecars, self.plan.info)
         except FieldError:  # facts are the task's own, which reads them with `from_json`
             for sidecar in sidecars:

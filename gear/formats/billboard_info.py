@@ -8,6 +8,7 @@ position of the patch from this origin. They ignore roll and pitch, so records o
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Sequence
 
@@ -27,7 +28,13 @@ LEVEL_RAD = 1e-4
 
 
 def billboard_info(
-    records: Iterable[SceneRecord], *, task: str, patch_label: str, reference: str, second: str | None = None
+    records: Iterable[SceneRecord],
+    *,
+    task: str,
+    patch_label: str,
+    reference: str,
+    second: str | None = None,
+    before: bytes | None = None,
 ) -> Json:
     """The JSON content of `camera_billboard_info.json` for one split: camera and billboard poses of all samples.
 
@@ -39,13 +46,19 @@ def billboard_info(
         reference: name of the camera whose pictures the loader reads.
         second: name of the second camera of a stereo pair. Without a second camera, the file repeats the reference
             camera.
+        before: bytes of the file for the samples before `records`; None if `records` are all samples.
     """
     second = second or reference
     is_patched = patch_label != "none"
     entries: list[Json] = []
     boards, is_level, is_symmetric = 0, True, True
     params: dict[str, Json] = {reference: {}, second: {}}
-    for index, record in enumerate(records):
+    if before is not None:
+        there = json.loads(before)
+        entries, info = there["camera_billboard_positions"], there["info"]
+        boards, is_level, is_symmetric = info["num_billboards"], info["level"], info["symmetric"]
+        params = {second: there["camera_dx_params"], reference: there["camera_params"]}
+    for index, record in enumerate(records, len(entries)):
         entries.append(_entry(index, record, reference, second))
         boards = max(boards, len(record.surfaces))
         is_level &= _is_level(record, (reference, second))

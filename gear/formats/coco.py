@@ -119,23 +119,51 @@ def dataset_json(pictures: Sequence[Picture], *, description: str, created: str)
     }
 
 
+BETWEEN = b'],"annotations":['
+"""Bytes between the pictures and the annotations of an annotation file."""
+
+
 class DatasetWriter:
     """Writes a COCO annotation file picture by picture, so that only its encoded bytes are in memory.
 
     The bytes equal `dump(dataset_json(...))` for all pictures.
     """
 
-    def __init__(self, *, description: str, created: str) -> None:
-        """Starts an annotation file without pictures.
+    def __init__(self, *, description: str, created: str, before: bytes | None = None) -> None:
+        """Starts an annotation file without pictures, or continues one.
 
         Args:
             description: one line that describes the split.
             created: ISO date.
+            before: bytes of a file that another writer made with the same description and date; None to start one.
+
+        Raises:
+            ValueError: `before` is no such file.
         """
         self._description, self._created = description, created
         self._images: list[bytes] = []
         self._annotations: list[bytes] = []
         self._count = 0
+        if before is not None:
+            self._resume(before)
+
+    def _resume(self, data: bytes) -> None:
+        """Takes over the pictures and annotations of a file."""
+        head, tail = self._ends()
+        if not (data.startswith(head) and data.endswith(tail)):
+            raise ValueError("is not an annotation file of this split")
+        images, found, annotations = data[len(head) : -len(tail)].partition(BETWEEN)
+        if not found:
+            raise ValueError("has no annotations")
+        self._images = [images] if images else []
+        self._annotations = [annotations] if annotations else []
+        self._count = annotations.count(b',"iscrowd":')
+
+    def _ends(self) -> tuple[bytes, bytes]:
+        """The bytes before the first picture and after the last annotation."""
+        head = dump(_head(self._description, self._created)).rstrip(b"\n")[:-1]
+        categories = dump(list(CATEGORIES)).rstrip(b"\n")
+        return head + b',"images":[', b'],"categories":' + categories + b"}\n"
 
     def add(self, picture: Picture) -> None:
         """Appends the next picture and its annotations to the file."""
@@ -147,11 +175,8 @@ class DatasetWriter:
 
     def data(self) -> bytes:
         """The bytes of the complete annotation file with all pictures added so far."""
-        head = dump(_head(self._description, self._created)).rstrip(b"\n")[:-1]
-        images, annotations = b",".join(self._images), b",".join(self._annotations)
-        categories = dump(list(CATEGORIES)).rstrip(b"\n")
-        parts = (head, b',"images":[', images, b'],"annotations":[', annotations, b'],"categories":', categories)
-        return b"".join((*parts, b"}\n"))
+        head, tail = self._ends()
+        return b"".join((head, b",".join(self._images), BETWEEN, b",".join(self._annotations), tail))
 
 
 def _head(description: str, created: str) -> dict[str, Json]:

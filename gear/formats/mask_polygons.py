@@ -8,9 +8,12 @@ through the hole.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+
+from gear.formats import coco, rle
 
 Mask = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
@@ -142,3 +145,12 @@ def joined_polygons(polygons: Sequence[Sequence[int]]) -> list[int]:
         here, there = divmod(int(distances.argmin()), len(piece))
         ring = np.concatenate([ring[: here + 1], np.roll(piece, -there, axis=0), piece[there : there + 1], ring[here:]])
     return [int(value) for value in ring.reshape(-1)]
+
+
+def with_polygons(item: coco.Annotation, picture: coco.Picture) -> coco.Annotation:
+    """An annotation of a picture with its mask as polygons; that of a crowd is not changed."""
+    if item.is_crowd:
+        return item
+    left, top, width, height = (round(side) for side in item.box_xywh)
+    mask = rle.decode_crop(item.rle, picture.height_px, picture.width_px, (left, top, left + width, top + height))
+    return replace(item, polygons=mask_polygons(mask, left, top))

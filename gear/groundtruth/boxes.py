@@ -138,3 +138,9 @@ def _in_front(corners_m: Array) -> Array:
             cut[2] = NEAR_M
             points.append(cut)
     return np.array(points)
+
+
+def box_of(sides: Array) -> BoxPx:
+    """The box with the given left, top, right and bottom side, a (4,) array in pixels."""
+    left, top, right, bottom = (float(side) for side in sides)
+    return (left, top, right, bottom)

@@ -26,7 +26,7 @@ import numpy as np
 
 from gear.contracts.evaluation import KeepsPredictions, Maskable, Reports, WithObjects
 from gear.contracts.specs import TaskSpec
-from gear.contracts.tasks import Encoded, Sample, Sidecar, SplitInfo, Task
+from gear.contracts.tasks import Encoded, ExtendsIndexes, Sample, Sidecar, SplitInfo, Task
 from gear.metrics.object_matching import outcomes
 from gear.metrics.patch_distance import PatchArea
 from gear.testing.compare import difference, freeze
@@ -175,6 +175,15 @@ class TaskContract:
         first, second = self.task().finalise(sidecars, INFO), self.task().finalise(sidecars, INFO)
         assert first == second
         assert {name: (tmp_path / name).read_bytes() for name in first} == dict(first)
+
+    def test_extended_index_files_are_those_of_the_whole_split(self, tmp_path: Path) -> None:
+        """If the task has `extend`, its files for a split that grew are those that `finalise` makes."""
+        task, sidecars = self.task(), freeze(self.write(tmp_path))
+        whole = dict(task.finalise(sidecars, INFO))
+        if isinstance(task, ExtendsIndexes):
+            for start in range(1, len(sidecars) + 1):
+                before = task.finalise(sidecars[:start], INFO)
+                assert dict(task.extend(before, start, sidecars, INFO)) == whole
 
     def test_finalise_takes_an_empty_split(self) -> None:
         """`finalise` accepts a split without samples."""

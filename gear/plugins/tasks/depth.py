@@ -17,7 +17,7 @@ from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.legends import ColourBar, Legend
 from gear.contracts.specs import TaskSpec
-from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
+from gear.contracts.tasks import Encoded, Evaluator, Indexes, Sample, Sidecar, SplitInfo
 from gear.formats import kitti_depth, results
 from gear.formats.billboard_info import billboard_info
 from gear.formats.jsontext import dump
@@ -132,16 +132,23 @@ class DepthTask:
             sidecars: metadata of all samples of the split, in order.
             info: names of the split, town, scene and patch.
         """
+        return self.extend({}, 0, sidecars, info)
+
+    def extend(self, before: Indexes, start: int, sidecars: Sequence[Sidecar], info: SplitInfo) -> Indexes:
+        """Makes the files of a whole split from those of its first samples, as `ExtendsIndexes` describes."""
+        place = f"gtFine/{info.split}/camera_billboard_info.json"
+        records = (sidecars[index].record for index in range(start, len(sidecars)))
+        poses = billboard_info(
+            records, task="depth", patch_label=info.patch_label, reference=VIEW, before=before.get(place)
+        )
         paths = [_paths(info.split, index) for index in range(len(sidecars))]
-        records = (sidecar.record for sidecar in sidecars)
-        poses = billboard_info(records, task="depth", patch_label=info.patch_label, reference=VIEW)
         return {
             # CARLA-GeAR's loader takes the file's numbers for metres, so its list names the float pictures.
             f"filenames/{info.split}_list.txt": kitti_depth.file_list([(image, metres) for image, _, metres in paths]),
             f"filenames/{info.split}_list_kitti.txt": kitti_depth.file_list(
                 [(image, units) for image, units, _ in paths]
             ),
-            f"gtFine/{info.split}/camera_billboard_info.json": dump(poses),
+            place: dump(poses),
         }
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> DepthSample:
@@ -327,6 +334,7 @@ def _with_band(picture: UInt8Image, depth_m: FloatImage, left: int, right: int) 
 
 
 register(DepthSample, Geometry(flip=flip, cut=cut, shrink=shrink, cut_depth=cut_depth))
+
 
 depth: TaskSpec[DepthConfig] = TaskSpec(
     name="depth",

@@ -25,11 +25,11 @@ from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.legends import ColourNames, Legend, Rgb
 from gear.contracts.specs import TaskSpec
-from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
+from gear.contracts.tasks import Encoded, Evaluator, Indexes, Sample, Sidecar, SplitInfo
 from gear.formats import coco, results, rle
 from gear.formats.billboard_info import billboard_info
 from gear.formats.jsontext import dump
-from gear.formats.mask_polygons import mask_polygons
+from gear.formats.mask_polygons import with_polygons
 from gear.formats.png import encode_rgb
 from gear.groundtruth.boxes import box_in_camera, middle_in_camera
 from gear.groundtruth.objects import observe_objects
@@ -178,20 +178,28 @@ class Detect2dTask:
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
         """Makes the files of a whole split: annotations under both usual names, and poses for CARLA-GeAR's loader."""
+        return self.extend({}, 0, sidecars, info)
+
+    def extend(self, before: Indexes, start: int, sidecars: Sequence[Sidecar], info: SplitInfo) -> Indexes:
+        """Makes the files of a whole split from those of its first samples, as `ExtendsIndexes` describes."""
+        place = f"annotations/{info.split}/camera_billboard_info.json"
+        instances = f"annotations/instances_{info.split}.json"
         description = f"gear {info.town} {info.scene} {info.split}, patch: {info.patch_label}"
-        writer = coco.DatasetWriter(description=description, created=info.created)
+        writer = coco.DatasetWriter(description=description, created=info.created, before=before.get(instances))
 
         def records() -> Iterator[SceneRecord]:
-            for sidecar in sidecars:
+            for sidecar in (sidecars[index] for index in range(start, len(sidecars))):
                 writer.add(self._picture(sidecar))
                 yield sidecar.record
 
-        poses = billboard_info(records(), task="2dod", patch_label=info.patch_label, reference=VIEW)
+        poses = billboard_info(
+            records(), task="2dod", patch_label=info.patch_label, reference=VIEW, before=before.get(place)
+        )
         annotations = writer.data()
         return {
             f"annotations/{info.split}/coco_annotations.json": annotations,
-            f"annotations/instances_{info.split}.json": annotations,
-            f"annotations/{info.split}/camera_billboard_info.json": dump(poses),
+            instances: annotations,
+            place: dump(poses),
         }
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Detect2dSample:
@@ -317,7 +325,7 @@ class Detect2dTask:
         picture = self._as_picture(sidecar.record, _objects(sidecar, Path()))
         if self.config.masks == "rle":
             return picture
-        return replace(picture, annotations=tuple(_with_polygons(one, picture) for one in picture.annotations))
+        return replace(picture, annotations=tuple(with_polygons(one, picture) for one in picture.annotations))
 
     def _as_shown(self, sample: Detect2dSample) -> coco.Picture:
         """The COCO entry of a sample whose picture may be smaller than the rendered one."""
@@ -339,14 +347,6 @@ class Detect2dTask:
 def _image_id(record: SceneRecord) -> int:
     """COCO's picture id of a sample, counted from 1, because some readers take 0 for "none"."""
     return record.index + 1
-
-
-def _with_polygons(item: coco.Annotation, picture: coco.Picture) -> coco.Annotation:
-    if item.is_crowd:
-        return item
-    left, top, width, height = (round(side) for side in item.box_xywh)
-    mask = rle.decode_crop(item.rle, picture.height_px, picture.width_px, (left, top, left + width, top + height))
-    return replace(item, polygons=mask_polygons(mask, left, top))
 
 
 def _name(index: int) -> str:
@@ -480,6 +480,7 @@ def _inside(box_px: BoxPx, height: int, width: int) -> BoxPx:
 
 
 register(Detect2dSample, Geometry(flip=flip, cut=cut))
+
 
 detect2d: TaskSpec[Detect2dConfig] = TaskSpec(
     name="detect2d",

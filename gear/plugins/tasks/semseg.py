@@ -17,7 +17,7 @@ from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.legends import ColourNames, Legend
 from gear.contracts.specs import TaskSpec
-from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
+from gear.contracts.tasks import Encoded, Evaluator, Indexes, Sample, Sidecar, SplitInfo
 from gear.formats import cityscapes, results
 from gear.formats.billboard_info import billboard_info
 from gear.formats.cityscapes_polygons import polygons_json
@@ -146,9 +146,16 @@ class SemsegTask:
             sidecars: metadata of all samples of the split, in order.
             info: names of the split, town, scene and patch.
         """
-        records = (sidecar.record for sidecar in sidecars)
-        poses = billboard_info(records, task="ss", patch_label=info.patch_label, reference=VIEW)
-        return {f"gtFine/{info.split}/camera_billboard_info.json": dump(poses)}
+        return self.extend({}, 0, sidecars, info)
+
+    def extend(self, before: Indexes, start: int, sidecars: Sequence[Sidecar], info: SplitInfo) -> Indexes:
+        """Makes the files of a whole split from those of its first samples, as `ExtendsIndexes` describes."""
+        place = f"gtFine/{info.split}/camera_billboard_info.json"
+        records = (sidecars[index].record for index in range(start, len(sidecars)))
+        poses = billboard_info(
+            records, task="ss", patch_label=info.patch_label, reference=VIEW, before=before.get(place)
+        )
+        return {place: dump(poses)}
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> SemsegSample:
         """Reads a sample from its files: the picture, the label map and the instance map.
@@ -278,6 +285,7 @@ def cut(sample: SemsegSample, window: Window) -> SemsegSample:
 
 
 register(SemsegSample, Geometry(flip=flip, cut=cut))
+
 
 semseg: TaskSpec[SemsegConfig] = TaskSpec(
     name="semseg",

@@ -16,7 +16,7 @@ from gear.contracts.evaluation import Masks
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.legends import ColourNames, Legend
 from gear.contracts.specs import TaskSpec
-from gear.contracts.tasks import Encoded, Evaluator, Sample, Sidecar, SplitInfo
+from gear.contracts.tasks import Encoded, Evaluator, Indexes, Sample, Sidecar, SplitInfo
 from gear.dataset.files import read_bytes
 from gear.formats import results
 from gear.formats.billboard_info import billboard_info
@@ -36,7 +36,7 @@ from gear.formats.kitti_object import (
     to_edge_pixels,
 )
 from gear.formats.png import encode_rgb
-from gear.groundtruth.boxes import Box3d, box_in_camera, project_box
+from gear.groundtruth.boxes import Box3d, box_in_camera, box_of, project_box
 from gear.groundtruth.objects import observe_objects
 from gear.groundtruth.regions import MOSTLY, least_share_inside, part_boxes
 from gear.groundtruth.silhouettes import NEAR_M
@@ -58,7 +58,7 @@ from gear.plugins.tasks.common import (
 )
 from gear.values.errors import FieldError
 from gear.values.frames import Frame, SceneObject, UInt8Image, View
-from gear.values.geometry import Array, Intrinsics, wrap_angle_rad
+from gear.values.geometry import Intrinsics, wrap_angle_rad
 from gear.values.ground_truth import BoxPx, ObjectTruth
 from gear.values.labels import KittiType
 from gear.values.picture_objects import PictureObject, PictureObjects
@@ -204,10 +204,16 @@ class Stereo3dTask:
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
         """Makes the files of a whole split: the lists of sample ids, and the poses that CARLA-GeAR's loader reads."""
-        records = (sidecar.record for sidecar in sidecars)
-        poses = billboard_info(records, task="3dod", patch_label=info.patch_label, reference=LEFT, second=RIGHT)
-        lists = split_lists(info.split, [_name(index) for index in range(len(sidecars))])
-        return {**lists, f"{info.split}/label_2/camera_billboard_info.json": dump(poses)}
+        return self.extend({}, 0, sidecars, info)
+
+    def extend(self, before: Indexes, start: int, sidecars: Sequence[Sidecar], info: SplitInfo) -> Indexes:
+        """Makes the files of a whole split from those of its first samples, as `ExtendsIndexes` describes."""
+        place = f"{info.split}/label_2/camera_billboard_info.json"
+        records = (sidecars[index].record for index in range(start, len(sidecars)))
+        poses = billboard_info(
+            records, task="3dod", patch_label=info.patch_label, reference=LEFT, second=RIGHT, before=before.get(place)
+        )
+        return {**split_lists(info.split, [_name(index) for index in range(len(sidecars))]), place: dump(poses)}
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Stereo3dSample:
         """Reads a sample: both pictures from their files, and unrounded objects from its JSON file (sidecar)."""
@@ -359,9 +365,7 @@ def _notes(config: Stereo3dConfig) -> tuple[str, ...]:
 
 
 def _lines(sample: Stereo3dSample) -> tuple[KittiLabel, ...]:
-    """The labels of a sample after rounding to two decimals, as the devkit reads them; rounding can change the
-    difficulty of a label.
-    """
+    """The labels of a sample as the devkit reads them: rounded to two decimals, which can change a difficulty."""
     return parse_labels(format_labels(thing.label() for thing in sample.objects).decode())
 
 
@@ -411,7 +415,7 @@ def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Obj
     # Where the border cut the box, more of the silhouette may lie in the other picture.
     was_cut = np.equal(boxes[1], (0.0, 0.0, last, intrinsics.height_px - 1.0))
     frame = index_frame(intrinsics.width_px, intrinsics.height_px)
-    return _placed(thing, box, _box(np.where(was_cut, whole, tight)), _box(whole), frame, frame)
+    return _placed(thing, box, box_of(np.where(was_cut, whole, tight)), box_of(whole), frame, frame)
 
 
 def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
@@ -454,11 +458,6 @@ def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
     )
 
 
-def _box(sides: Array) -> BoxPx:
-    left, top, right, bottom = (float(side) for side in sides)
-    return (left, top, right, bottom)
-
-
 def _placed(
     thing: Object3d, box: Box3d, box_px: BoxPx, amodal_box_px: BoxPx, frame_px: BoxPx, shown_px: BoxPx
 ) -> Object3d | None:
@@ -480,6 +479,7 @@ def _placed(
 
 
 register(Stereo3dSample, Geometry(flip=flip, cut=cut, is_centred=True))
+
 
 stereo3d: TaskSpec[Stereo3dConfig] = TaskSpec(
     name="stereo3d",
