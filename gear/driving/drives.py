@@ -21,6 +21,7 @@ from gear.contracts.tasks import NO_PATCH
 from gear.dataset.json_text import dump_json
 from gear.driving.config import PATCH, DriveConfig, Driver
 from gear.driving.scenario import Scenario, ScenarioLibrary, load_scenarios
+from gear.driving.video import check_video
 from gear.measuring.plugin_selection import Chosen, check_defense, check_optics
 from gear.plugins.build import find
 from gear.values.errors import GearError, UnknownNameError
@@ -146,6 +147,10 @@ class Drives:
         options = cast.driver.options if cast.task else Mapping({}, place)
         return replace(read, weather=self.config.weather, crowd=self.config.crowd, options=options, probes=False)
 
+    def has_video(self, run: DriveRun) -> bool:
+        """Whether a drive leaves a video."""
+        return self.config.video and bool(self.casts[run.driver].task)
+
     def patch(self, run: DriveRun, surfaces: int) -> PatchSet:
         """The patch that the scene of a drive shows.
 
@@ -191,8 +196,11 @@ def plan_drives(config: DriveConfig, root: Path, device: str | None = None) -> D
         device: device of the networks; None for the one in the config.
 
     Raises:
-        GearError: a name is unknown, an option does not fit, or a patch cannot be used; the message is one line.
+        GearError: a name is unknown, an option does not fit, a patch cannot be used, or a package is missing; the
+            message is one line.
     """
+    if config.video:
+        check_video()
     with located_errors(config.places, "library"):
         library = load_scenarios(config.library)
     speeds = config.scenarios or dict.fromkeys(library.scenarios, ())

@@ -14,8 +14,9 @@ from gear.collecting.session import Session, open_session
 from gear.contracts.executors import MOST_FAILURES, Outcome, Report
 from gear.contracts.rendering import RendererInfo
 from gear.dataset.claims import Claims
-from gear.dataset.files import explained, write_alone
+from gear.dataset.files import explained, read_bytes, write_alone
 from gear.dataset.guarded_paths import owned, remove_tree
+from gear.dataset.json_text import parse_json
 from gear.dataset.sealed_json import load_sealed, sealed_json
 from gear.dataset.whole_tree import whole_tree
 from gear.driving.drives import Cast, DriveRun, Drives
@@ -24,6 +25,7 @@ from gear.driving.loop import Sight, Wheel, drive
 from gear.driving.measures import Measures, measure
 from gear.driving.simulation import DriveSimulation
 from gear.driving.start import Draw
+from gear.driving.video import Video
 from gear.measuring.calibration import NOTHING, opened_calibration
 from gear.measuring.guard import OpenedGuard
 from gear.measuring.guarded_model import GuardedModel
@@ -37,7 +39,7 @@ from gear.world.scene_spec import SceneSpec
 LEAST_POOL = 4
 """Smallest number of other vehicles and of people that a world can show, so that scenarios find their actors."""
 
-RESULT, LOG = "result.json", "log.jsonl"
+RESULT, LOG, VIDEO = "result.json", "log.jsonl", "video.mp4"
 """Names of the files in the folder of a drive."""
 
 CLAIMS = "drives"
@@ -201,7 +203,7 @@ def _made(shop: _Workshop, run: DriveRun) -> bool:
     place = shop.place_of(run)
     patch = drives.patch(run, 0 if place.session is None else len(place.session.world.faces))
     folder = drives.folder(run, patch)
-    if read_result(drives.root, folder) is not None:
+    if read_result(drives.root, folder, with_video=drives.has_video(run)) is not None:
         return False
     model, sight = shop.model_of(cast), None
     if place.session is not None and place.job is not None:
@@ -209,7 +211,8 @@ def _made(shop: _Workshop, run: DriveRun) -> bool:
         sight = Sight(session=session, rig=session.task.rig(), model=model)
     wheel = Wheel(plugin=cast.controller.found, controller=build(cast.controller.found, cast.controller.options))
     draw = Draw(name=run.scenario, scenario=drives.scenario(run), speed_mps=run.speed_kmh / 3.6, seed=run.seed)
-    log = drive(place.simulation, draw, wheel, sight)
+    video = Video() if drives.has_video(run) else None
+    log = drive(place.simulation, draw, wheel, sight, None if video is None else video.watch)
     data = log_bytes(log)
     result = DriveResult(
         run=run,
@@ -220,7 +223,8 @@ def _made(shop: _Workshop, run: DriveRun) -> bool:
         renderer=None if place.job is None else place.job.renderer,
     )
     content = sealed_json({"identity": drives.identity(run, patch), "result": to_json(result)})
-    _write(drives.root, folder, {LOG: data, RESULT: content})
+    shown = {} if video is None else {VIDEO: video.mp4()}
+    _write(drives.root, folder, {LOG: data, **shown, RESULT: content})
     return True
 
 
@@ -240,14 +244,19 @@ def _write(root: Path, folder: str, files: Mapping[str, bytes]) -> None:
             write_alone(unfinished / name, data)
 
 
-def read_result(root: Path, folder: str) -> DriveResult | None:
+def read_result(root: Path, folder: str, *, with_video: bool = False) -> DriveResult | None:
     """The result of a drive; None if it is not there, or its log does not have the hash that the result names.
+
+    Args:
+        root: folder of the study.
+        folder: folder of the drive, relative to the root.
+        with_video: whether a drive without a video counts as missing.
 
     Raises:
         DatasetError: the result is damaged, or cannot be read.
     """
     path = root / folder / RESULT
-    if not path.is_file():
+    if not path.is_file() or (with_video and not (root / folder / VIDEO).is_file()):
         return None
     content: Json = load_sealed(path)
     result = from_json(DriveResult, content["result"], str(path))
@@ -255,6 +264,15 @@ def read_result(root: Path, folder: str) -> DriveResult | None:
     if not log.is_file() or log_hash(log.read_bytes()) != result.log_sha256:
         return None
     return result
+
+
+def read_log(root: Path, folder: str) -> list[Json]:
+    """The log of a drive: head, frames, end.
+
+    Raises:
+        DatasetError: the file cannot be read.
+    """
+    return [parse_json(line) for line in read_bytes(root / folder / LOG).splitlines()]
 
 
 @contextlib.contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 from collections.abc import Sequence
 
@@ -10,11 +11,22 @@ from gear.verbs.drive.report import DriveReport
 from gear.verbs.drive.table import cells, legend, speed_cells
 
 
-def page(report: DriveReport) -> str:
-    """The whole page as HTML text. Names from configs are escaped, and the page has no scripts."""
+def page(report: DriveReport, figures: Sequence[tuple[str, bytes]] = ()) -> str:
+    """The whole page as HTML text. Names from configs are escaped, and the page has no scripts.
+
+    Args:
+        report: the report.
+        figures: SVG charts of situations, each with its title.
+    """
     parts = [f'<p class="dim">{html.escape(legend())}.</p>']
     parts += ["<h2>Drivers, scenarios and twins</h2>", table(cells(report), 3)]
     parts += ["<h2>By speed</h2>", table(speed_cells(report), 2)]
+    for title, drawn in figures:
+        source = base64.b64encode(drawn).decode()
+        name = html.escape(title, quote=True)
+        parts.append(
+            f'<h3>{name}</h3><p><img alt="ways and speeds: {name}" src="data:image/svg+xml;base64,{source}"></p>'
+        )
     if report.failed:
         failed = "".join(f"<li>{html.escape(title)}: {html.escape(problem)}</li>" for title, problem in report.failed)
         parts.append(f"<h2>Drives that could not be made</h2><ul>{failed}</ul>")

@@ -16,7 +16,7 @@ from gear.config.load import find_config
 from gear.config.nodes import parse_file
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
-from gear.contracts.executors import Executor, Outcome
+from gear.contracts.executors import Executor, Needs, Outcome
 from gear.dataset.claims import clear_claims
 from gear.dataset.executors.engines import DEFAULT, open_engine
 from gear.dataset.executors.in_process import InThisProcess
@@ -27,15 +27,24 @@ from gear.dataset.layout import split_folder
 from gear.dataset.store import check_output
 from gear.driving.config import DriveConfig
 from gear.driving.drives import Drives, patches_of, plan_drives
-from gear.driving.worker import CLAIMS, DriveResult, drive_all, read_result
+from gear.driving.worker import CLAIMS, DriveResult, drive_all, read_log, read_result
 from gear.reporting.display import displayed
 from gear.values.counted import counted
 from gear.values.errors import GearError
 from gear.values.progress import Callbacks, Progress, Warn
+from gear.verbs.drive.chart import chart
 from gear.verbs.drive.page import page
 from gear.verbs.drive.report import DriveReport
 from gear.verbs.drive.request import DriveRequest
 from gear.verbs.drive.table import text
+
+LONGEST_DRIVE_S = 7200.0
+"""Time without a message after which a worker counts as hung, seconds: a drive of two minutes has 1200 frames, and the
+first one of a place compiles its world.
+"""
+
+MOST_FIGURES = 12
+"""Largest number of situations whose twins are drawn in the report."""
 
 CONFIG = "drive.yml"
 """Name of the file with the config, with all defaults filled in."""
@@ -129,7 +138,7 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
         ("drives.csv", _csv(report)),
         ("drive.json", dump_json(report.as_json())),
         ("table.txt", text(report).encode()),
-        ("report.html", page(report).encode()),
+        ("report.html", page(report, _figures(drives, results)).encode()),
     ):
         write_whole(drives.root, name, data)
     clear_scratch(drives.root)
@@ -148,7 +157,8 @@ def _executor(request: DriveRequest) -> Executor:
     count = fitting_workers(request.workers)
     if count == 1 and request.engine == DEFAULT and request.address is None:
         return InThisProcess()
-    return open_engine(request.engine, workers=count, backend="raster", address=request.address)
+    needs = Needs(silence_s=LONGEST_DRIVE_S)
+    return open_engine(request.engine, workers=count, backend="drive", address=request.address, needs=needs)
 
 
 def _made(drives: Drives, executor: Executor, callbacks: Callbacks) -> dict[int, Outcome]:
@@ -156,7 +166,11 @@ def _made(drives: Drives, executor: Executor, callbacks: Callbacks) -> dict[int,
     folders = [
         drives.folder(run, patch) for run, patch in zip(drives.runs, patches_of(drives, drives.runs), strict=True)
     ]
-    missing = [index for index, folder in enumerate(folders) if read_result(drives.root, folder) is None]
+    missing = [
+        index
+        for index, (run, folder) in enumerate(zip(drives.runs, folders, strict=True))
+        if read_result(drives.root, folder, with_video=drives.has_video(run)) is None
+    ]
     done, failures = len(folders) - len(missing), {}
     callbacks.on_progress(done, len(folders))
 
@@ -183,6 +197,25 @@ def _gathered(drives: Drives, failures: dict[int, Outcome]) -> tuple[list[DriveR
             problem = failures[index].error if index in failures else "another run is making it; run the command again"
             failed.append((run.title, problem))
     return results, failed
+
+
+def _figures(drives: Drives, results: list[DriveResult]) -> list[tuple[str, bytes]]:
+    """Charts of the first situations of each driver, those whose twins ended differently first, each with a title."""
+    groups: dict[tuple[str, tuple[str, str, str, float, int]], list[DriveResult]] = {}
+    for one in results:
+        groups.setdefault((one.run.driver, one.run.situation), []).append(one)
+    several = [group for group in groups.values() if len(group) > 1]
+    several.sort(key=lambda group: len({one.measures.is_crash for one in group}) == 1)
+    figures = []
+    for group in several[:MOST_FIGURES]:
+        run = group[0].run
+        patches = patches_of(drives, [one.run for one in group])
+        logs = {
+            one.run.twin: read_log(drives.root, drives.folder(one.run, patch))
+            for one, patch in zip(group, patches, strict=True)
+        }
+        figures.append((run.title.rsplit(",", 1)[0], chart(logs)))
+    return figures
 
 
 def _csv(report: DriveReport) -> bytes:

@@ -89,8 +89,13 @@ def test_a_driver_with_a_camera_drives_the_same_twins(config: Path, tmp_path: Pa
         "drivers={eyes: {controller: blind, task: depth, options: {width_px: 256, height_px: 96}}}",
         "scenarios={stopped_lead: [40]}",
         "twins=[none, random]",
+        "video=true",
     ]
+    pytest.importorskip("av")
     found = gear.drive(config, out=tmp_path, settings=settings)
+    videos = list((tmp_path / "drives").glob("*/*/video.mp4"))
+    assert len(videos) == 2 and all(video.stat().st_size > 5000 for video in videos)
+    assert "data:image/svg+xml" in (tmp_path / "report.html").read_text()
     assert len(set(hashes(found))) == 1 and len(found.results) == 2
     assert [one.patch for one in found.results] == ["none", "random"]
     assert found.results[0].renderer is not None
