@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from gear.cli.main import main
+from gear.cli.main import full_parser, main
 from gear.testing.tiny_networks import tiny_depth, tiny_segmenter
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from tests.dataset.splits import tree
@@ -17,12 +18,27 @@ from tests.verbs.conftest import put_package
 
 PICTURES = ["--set", f"scenes={TINY_SCENES}", "--set", "options.width_px=128", "--set", "options.height_px=64"]
 
-VERBS = ["collect", "evaluate", "attack", "train", "defend", "gap", "bench", "export"]
+VERBS = ["collect", "evaluate", "attack", "train", "defend", "gap", "bench", "export", "merge", "leaderboard", "drive"]
+
+SINGLE_FILES = {"sheet", "towns", "view"}
+"""Commands that write one or two files beside others, each by `write_alone`, and delete nothing."""
+
+NOTHING = {"new", "show-config"}
+"""Commands that refuse a folder that exists (tests/verbs/scaffold/test_write.py), or that write nothing."""
+
+DRIVES = f"""
+drivers: {{truth: {{controller: truth}}}}
+towns: {{"{TINY_TOWN}": [board]}}
+scenarios: {{free_road: [30]}}
+collect: {{quality: fast, scenes: "{TINY_SCENES}"}}
+"""
 
 FORCES = {"collect", "attack"}
 
 UNUSED = ["gear", "gear/scratch", "gear/debug/begun"]
-"""Places that a finished folder need not have, and that commands use meanwhile."""
+"""Places that a finished folder need not have, and that commands use meanwhile; the last one only by `COLLECTING`."""
+
+COLLECTING = {"collect", "evaluate", "attack", "train", "defend", "gap", "bench", "export"}
 
 
 def collect(out: Path, *more: str) -> list[str]:
@@ -43,6 +59,9 @@ def arguments(verb: str, home: Path, out: Path) -> list[str]:
         "gap": ["gap", data, "--samples", "1", "--split", "debug", "--patch", "random", *town],
         "bench": ["bench", str(home / "bench.yml")],
         "export": ["export", str(home / "stereo"), "--layout", "kitti"],
+        "merge": ["merge", str(home / "first"), str(home / "second")],
+        "leaderboard": ["leaderboard", "build", str(home / "records")],
+        "drive": ["drive", str(home / "drive.yml")],
     }
     return [*commands[verb], "--out", str(out / "tree" if verb == "export" else out)]
 
@@ -65,6 +84,13 @@ def finished(home: Path) -> Callable[[str], Path]:
         if not out.exists():
             if verb == "bench":
                 write(home, (*FEW, ("{width_px: 256, height_px: 128}", "{width_px: 128, height_px: 64}")))
+            if verb == "merge":
+                for number, part in enumerate(("first", "second"), 1):
+                    assert main([*collect(home / part, "--samples", "2"), "--shard", f"{number}/2"]) == 0
+            if verb == "drive":
+                (home / "drive.yml").write_text(DRIVES)
+            if verb == "leaderboard":
+                (home / "records").mkdir()
             if verb == "export":  # an export that was killed, in the hidden folder beside its place
                 stereo = [word.replace("semseg", "stereo3d") for word in collect(home / "stereo")]
                 assert main([*stereo, "--samples", "1"]) == 0
@@ -75,6 +101,23 @@ def finished(home: Path) -> Callable[[str], Path]:
         return out
 
     return made
+
+
+def has_out(parser: argparse.ArgumentParser) -> bool:
+    """Whether a command, or one of its own commands, has the flag `--out`."""
+    inner = [
+        one
+        for action in parser._actions
+        if isinstance(action, argparse._SubParsersAction)
+        for one in action.choices.values()
+    ]
+    return "--out" in parser._option_string_actions or any(has_out(one) for one in inner)
+
+
+def test_every_command_with_an_output_folder_is_tested() -> None:
+    (commands,) = (one for one in full_parser()._actions if isinstance(one, argparse._SubParsersAction))
+    with_out = {name for name, parser in commands.choices.items() if has_out(parser)}
+    assert with_out == {*VERBS, *SINGLE_FILES, *NOTHING}
 
 
 @pytest.mark.parametrize(
@@ -100,7 +143,8 @@ def test_a_link_in_any_place_of_an_output_folder_costs_nobody_a_file(
     if verb == "bench":  # of the datasets and evaluations in it one each
         places = [place for place in places if len(Path(place).parts) < 3 or "none/" in f"{place}/"][:30]
     top = ".tree.gear-export" if verb == "export" else ""
-    for place in [*places, *(f"{top}/{unused}".strip("/") for unused in UNUSED)]:
+    unused_places = UNUSED if verb in COLLECTING else UNUSED[:-1]
+    for place in [*places, *(f"{top}/{unused}".strip("/") for unused in unused_places)]:
         out, victim = tmp_path / "out", tmp_path / "victim"
         shutil.copytree(whole, out)
         linked = out / place
@@ -116,7 +160,10 @@ def test_a_link_in_any_place_of_an_output_folder_costs_nobody_a_file(
         capfd.readouterr()
         code, said = main(command), capfd.readouterr().err
         assert (code, said.count("\n")) == (2, 1), (place, said)
-        assert "is a link; gear writes and deletes nothing through links" in said, place
+        wanted = (
+            "is not empty; merge" if verb == "merge" else "is a link; gear writes and deletes nothing through links"
+        )
+        assert wanted in said, place
         assert (tree(victim), tree(out)) == before, place
         for folder in (out, victim):
             shutil.rmtree(folder)
