@@ -208,6 +208,13 @@ class Scorer:
             defended=there[DEFENDED],
         )
 
+    def prediction(self, result: SampleResult, sample: Sample) -> Any:
+        """Reads the stored prediction of a finished sample; None for a task that stores no predictions."""
+        if self._keeper is None:
+            return None
+        folder = inside(self._root, f"{self._folder}/{PREDICTIONS}")
+        return self._keeper.decode_prediction(folder, sample, result.facts, self._dataset.plan.info)
+
     def finish(self, results: list[SampleResult]) -> None:
         """Writes the result files that cover the whole split, for tasks whose format has such files."""
         if self._keeper is None:

@@ -17,21 +17,25 @@ tr.first td { border-top: 1px solid #c5ccd4; } img { max-width: 100%; height: au
 figcaption { font-size: .8rem; color: #5b6672; } .row img { border: 1px solid #c5ccd4; display: block; }
 """
 
-POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
-"""Content policy of the page: no scripts, no connections; pictures are inside the page."""
+POLICY = "default-src 'none'; img-src {sources}; style-src 'unsafe-inline'"
+"""Content policy of the page: no scripts, no connections; `{sources}` is where pictures may come from."""
+
+EMBEDDED, NEARBY = "data:", "'self' file:"
+"""Sources of pictures: inside the page, or in files next to it."""
 
 
-def report_page(title: str, parts: Iterable[str]) -> str:
+def report_page(title: str, parts: Iterable[str], *, sources: str = EMBEDDED) -> str:
     """The whole page as HTML text.
 
     Args:
         title: title and heading; it is escaped.
         parts: HTML of the body, one element each.
+        sources: sources of pictures that the content policy allows.
     """
     safe = html.escape(title, quote=True)
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{safe}</title>\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY.format(sources=sources)}">\n'
         f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head>\n'
         f"<body><h1>{safe}</h1>\n" + "\n".join(parts) + "\n</body></html>\n"
     )

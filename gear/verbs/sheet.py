@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
-import numpy as np
 
 from gear.contracts.legends import ColourNames, WithLegends
 from gear.contracts.tasks import Sample
@@ -15,12 +14,12 @@ from gear.dataset.output_checks import check_previews
 from gear.plugins.build import blamed, find, name_of_task
 from gear.plugins.datasets import open_dataset
 from gear.reporting.display import displayed
-from gear.reporting.legend import INK, PAPER, draw_legend
+from gear.reporting.legend import draw_legend
+from gear.reporting.picture_grid import captioned, side_by_side, stacked
 from gear.values.frames import UInt8Image
 from gear.values.progress import Callbacks, Progress
 
 CELL_WIDTH_PX = 640
-CAPTION_PX = 22
 
 
 def contact_sheet(
@@ -54,13 +53,16 @@ def contact_sheet(
             previews = check_previews(dataset.task.preview(sample))
             if not previews:
                 raise ValueError("there is no picture")
-        rows.append(_beside([_cell(picture, caption(sample, name)) for name, picture in previews.items()]))
+        rows.append(
+            side_by_side(
+                [captioned(picture, caption(sample, name), CELL_WIDTH_PX) for name, picture in previews.items()]
+            )
+        )
         names = list(previews)
         report(len(rows), count)
     with blamed(found, "legends"):
         rows += _legends(dataset.task, names)
-    width = max(row.shape[1] for row in rows)
-    return np.concatenate([_widened(row, width) for row in rows])
+    return stacked(rows)
 
 
 def caption(sample: Sample, name: str) -> str:
@@ -119,24 +121,4 @@ def _legends(task: object, names: Sequence[str]) -> list[UInt8Image]:
     if not any(name in legends for name in names):
         return []
     empty = ColourNames(entries=())
-    return [_beside([draw_legend(legends.get(name, empty), CELL_WIDTH_PX) for name in names])]
-
-
-def _cell(picture: UInt8Image, caption: str) -> UInt8Image:
-    height = round(picture.shape[0] * CELL_WIDTH_PX / picture.shape[1])
-    small = cv2.resize(picture, (CELL_WIDTH_PX, height), interpolation=cv2.INTER_AREA)
-    bar = np.full((CAPTION_PX, CELL_WIDTH_PX, 3), PAPER, np.uint8)
-    cv2.putText(bar, caption, (6, 15), cv2.FONT_HERSHEY_SIMPLEX, 0.4, INK, 1, cv2.LINE_AA)
-    return np.concatenate([bar, small])
-
-
-def _beside(cells: list[UInt8Image]) -> UInt8Image:
-    height = max(cell.shape[0] for cell in cells)
-    filled = [
-        np.concatenate([cell, np.full((height - cell.shape[0], cell.shape[1], 3), PAPER, np.uint8)]) for cell in cells
-    ]
-    return np.concatenate(filled, axis=1)
-
-
-def _widened(row: UInt8Image, width: int) -> UInt8Image:
-    return np.concatenate([row, np.full((row.shape[0], width - row.shape[1], 3), PAPER, np.uint8)], axis=1)
+    return [side_by_side([draw_legend(legends.get(name, empty), CELL_WIDTH_PX) for name in names])]

@@ -15,8 +15,8 @@ EXAMPLE = """examples:
   gear evaluate --model ddrnet23_slim --defense zmask --calibration data/val --calibration-patched data/val-patched \
     --data data/none data/patch
 
-The folder --out gets predictions, results.json and table.txt. Run the same command again to continue after an
-interruption.
+The folder --out gets predictions, results.json, table.txt, and report.html with pictures. Run the same command again to
+continue after an interruption.
 """
 
 
@@ -69,6 +69,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=0,
         metavar="N",
         help="seed of the defense's random draws and of the permutation tests (0)",
+    )
+    parser.add_argument(
+        "--pictures",
+        type=int,
+        default=4,
+        metavar="N",
+        help="samples on the sheet of what changed most in each dataset, linked from report.html; 0 for none (4)",
     )
     add_device(parser, "model_settings")
     parser.add_argument("--json", action="store_true", help="print results.json instead of the table")

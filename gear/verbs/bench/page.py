@@ -5,9 +5,10 @@ scenes.
 from __future__ import annotations
 
 import base64
-import html
 import itertools
 from collections.abc import Iterable, Sequence
+from pathlib import Path
+from urllib.parse import quote
 
 import cv2
 import numpy as np
@@ -16,6 +17,7 @@ from gear.contracts.tasks import NO_PATCH
 from gear.dataset.files import read_bytes
 from gear.formats.png import decode_rgb
 from gear.plugins.datasets import open_dataset
+from gear.reporting.html_table import Cell, Link, html_table, safe
 from gear.reporting.report_page import report_page
 from gear.values.frames import UInt8Image
 from gear.verbs.bench.chart import chart
@@ -24,6 +26,7 @@ from gear.verbs.bench.report import BenchReport, TaskResult
 from gear.verbs.bench.scenes import Scene
 from gear.verbs.bench.table import columns, legend, title
 from gear.verbs.bench.validation import Contest
+from gear.verbs.evaluate.page import PAGE
 
 PICTURE_PX, PATCH_PX, QUALITY = 560, 220, 82
 """Width of pictures and width of patches in pixels, and JPEG quality of both."""
@@ -35,18 +38,18 @@ def page(report: BenchReport, plan: Plan) -> str:
     counts = plan.config.samples
     where = f"{len(facts['scenes'])} scene{'s' * (len(facts['scenes']) > 1)}, {', '.join(facts['weathers'])}"
     parts = [
-        f"<p>{_safe(where)}; {counts.measure} pictures of each scene and weather for every kind of patch. Patches: "
-        f"{_safe(plan.config.attack.plugin)} on {counts.attack} other pictures of a scene in each weather.</p>",
-        f'<p class="dim">{_safe(legend())}.</p>',
-        *(f'<p class="dim">Note: {_safe(note)}</p>' for note in facts["notes"]),
+        f"<p>{safe(where)}; {counts.measure} pictures of each scene and weather for every kind of patch. Patches: "
+        f"{safe(plan.config.attack.plugin)} on {counts.attack} other pictures of a scene in each weather.</p>",
+        f'<p class="dim">{safe(legend())}.</p>',
+        *(f'<p class="dim">Note: {safe(note)}</p>' for note in facts["notes"]),
     ]
     for task, contest in zip(report.tasks, plan.contests, strict=True):
-        parts += [f"<h2>{_safe(title(task))}</h2>", _table(task)]
+        parts += [f"<h2>{safe(title(task))}</h2>", _table(task)]
         if task.metric is not None:
             drawn = base64.b64encode(chart(task, "svg")).decode()
-            name = _safe(f"bars of {task.metric.title} by network, defense and patch")
+            name = safe(f"bars of {task.metric.title} by network, defense and patch")
             parts.append(f'<p><img alt="{name}" src="data:image/svg+xml;base64,{drawn}"></p>')
-        parts += [_scenes(task), *_pictures(plan, contest)]
+        parts += [_scenes(task, report.out), *_pictures(plan, contest)]
     return report_page("gear bench", parts)
 
 
@@ -58,30 +61,26 @@ def _table(task: TaskResult) -> str:
         shown = cells if who != before else ["", "", *cells[2:]]
         rows.append((who != before, shown))
         before = who
-    return _rows(titles, rows)
+    return html_table(titles, rows)
 
 
-def _scenes(task: TaskResult) -> str:
-    """Returns an HTML table of the metric in each scene, with one column per kind of patch."""
+def _scenes(task: TaskResult, out: Path) -> str:
+    """Returns an HTML table of the metric in each scene, with one column per kind of patch; the names of networks are
+    links to pictures of what changed most.
+    """
     kinds = list(dict.fromkeys(at.patch for one in task.results for at in one.scenes))
-    rows = []
+    rows: list[tuple[bool, Sequence[Cell]]] = []
     for one in task.results:
         places = dict.fromkeys((at.scene, at.weather) for at in one.scenes)
         for number, (scene, weather) in enumerate(places):
             here = {at.patch: at.value.value for at in one.scenes if (at.scene, at.weather) == (scene, weather)}
             values = [f"{here[kind]:.3f}" if here.get(kind, np.nan) == here.get(kind, np.nan) else "" for kind in kinds]
-            name = [one.model, one.defense or "-"] if number == 0 else ["", ""]
+            link = Link(one.model, quote((one.evaluation.out / PAGE).relative_to(out).as_posix()))
+            name: list[Cell] = [link, one.defense or "-"] if number == 0 else ["", ""]
             rows.append((number == 0, [*name, scene, weather, *values]))
-    return f"<h3>Scene by scene</h3>{_rows(['network', 'defense', 'scene', 'weather', *kinds], rows)}" if rows else ""
-
-
-def _rows(titles: Sequence[str], rows: Iterable[tuple[bool, Sequence[str]]]) -> str:
-    top = "".join(f"<th>{_safe(cell)}</th>" for cell in titles)
-    body = "\n".join(
-        f"<tr{' class=first' * is_first}>" + "".join(f"<td>{_safe(cell)}</td>" for cell in cells) + "</tr>"
-        for is_first, cells in rows
+    return (
+        f"<h3>Scene by scene</h3>{html_table(['network', 'defense', 'scene', 'weather', *kinds], rows)}" if rows else ""
     )
-    return f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
 
 
 def _pictures(plan: Plan, contest: Contest) -> Iterable[str]:
@@ -101,7 +100,7 @@ def _pictures(plan: Plan, contest: Contest) -> Iterable[str]:
                 _figure(decode_rgb(read_bytes(path)), f"{path.stem} against {name}", PATCH_PX)
                 for path in sorted(plan.patch(contest, scene, name).glob("patch_*.png"))
             ]
-        yield f'<h3>{_safe(f"{scene.label}, {weather.label}")}</h3><div class="row">{"".join(figures)}</div>'
+        yield f'<h3>{safe(f"{scene.label}, {weather.label}")}</h3><div class="row">{"".join(figures)}</div>'
 
 
 def _shown(plan: Plan, contest: Contest, scene: Scene, weather: Weather, patch: str, number: int, caption: str) -> str:
@@ -119,10 +118,6 @@ def _figure(pixels: UInt8Image, caption: str, width_px: int) -> str:
         raise ValueError(f"cannot encode a picture of shape {pixels.shape}")
     encoded = base64.b64encode(data.tobytes()).decode()
     return (
-        f'<figure><img width="{size[0]}" height="{size[1]}" alt="{_safe(caption)}" '
-        f'src="data:image/jpeg;base64,{encoded}"><figcaption>{_safe(caption)}</figcaption></figure>'
+        f'<figure><img width="{size[0]}" height="{size[1]}" alt="{safe(caption)}" '
+        f'src="data:image/jpeg;base64,{encoded}"><figcaption>{safe(caption)}</figcaption></figure>'
     )
-
-
-def _safe(text: str) -> str:
-    return html.escape(text, quote=True)

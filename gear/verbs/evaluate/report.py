@@ -56,6 +56,7 @@ class RowReport:
         defense: mean metrics of the defense's masks, and the share of pictures that raise its alarm; empty without a
             defense.
         per_sample: metrics of each single sample; JSON.
+        pictures: path of the sheet of pictures relative to the evaluation's folder; None without a sheet.
     """
 
     name: str
@@ -68,6 +69,7 @@ class RowReport:
     cost: Mapping[str, float]
     defense: Mapping[str, float]
     per_sample: Json
+    pictures: str | None = None
 
     @property
     def patch(self) -> str:
@@ -84,6 +86,7 @@ class RowReport:
             "cost": dict(self.cost),
             "defense": known_json(self.defense),
             "per_sample": self.per_sample,
+            **({} if self.pictures is None else {"pictures": self.pictures}),
         }
 
 
@@ -291,7 +294,7 @@ class EvaluateReport:
     """The results of a model, with or without a defense, on datasets.
 
     Attributes:
-        out: folder of results.json, table.txt and the predictions.
+        out: folder of results.json, table.txt, report.html, pictures and predictions.
         facts: model, defense, task, seed, versions, and notes for the reader of the metrics; JSON.
         rows: results of the datasets, in the order of the arguments.
         together: one entry per label of a patch (`none`, `random`, ...) that several datasets share, such as datasets

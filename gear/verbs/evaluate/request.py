@@ -34,10 +34,13 @@ class EvaluateRequest:
     address: str | None = None
     engine_workers: int = 1
     seed: int = 0
+    pictures: int = 4
     pools: Mapping[str, Sequence[str | Path]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
+        if self.pictures < 0:
+            raise GearError(f"pictures must be at least 0; got {self.pictures}")
         if min(1 if self.batch is None else self.batch, self.workers) < 1:
             raise GearError(f"batch and workers must be at least 1; got {self.batch}, {self.workers}")
         if self.engine_workers < 1:

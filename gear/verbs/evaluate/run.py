@@ -33,6 +33,8 @@ from gear.values.serial import Json
 from gear.verbs.evaluate.alarm_notes import alarm_notes
 from gear.verbs.evaluate.compare import EvaluatedDataset, compared, drive_note, row_report, together
 from gear.verbs.evaluate.distribute import FIT, measure_dataset, predict_in_workers, store_fit
+from gear.verbs.evaluate.page import PAGE, page
+from gear.verbs.evaluate.pictures import write_sheets
 from gear.verbs.evaluate.pools import Pools, check_pools, pooled
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.request import EvaluateRequest
@@ -69,6 +71,7 @@ def evaluate(
     address: str | None = None,
     engine_workers: int = 1,
     seed: int = 0,
+    pictures: int = 4,
     pools: Pools | None = None,
     progress: bool = False,
     on_progress: Progress | None = None,
@@ -77,10 +80,11 @@ def evaluate(
 ) -> EvaluateReport:
     """Evaluates a model, with or without a defense, on datasets of its task; resumes an interrupted run.
 
-    The folder `out` gets results.json, table.txt, and one folder per dataset with predictions in the result layout of
-    the dataset's format and a note (scores) per sample. Samples with a note are not predicted again, unless their files
-    are damaged. Datasets that differ only in their patch are compared sample by sample, and detections object by
-    object. Intervals are 95 % jackknife intervals over streets, groups of samples with the same scene content.
+    The folder `out` gets results.json, table.txt, report.html with pictures, and one folder per dataset with
+    predictions in the result layout of the dataset's format and a note (scores) per sample. Samples with a note are not
+    predicted again, unless their files are damaged. Datasets that differ only in their patch are compared sample by
+    sample, and detections object by object. Intervals are 95 % jackknife intervals over streets, groups of samples with
+    the same scene content.
 
     Args:
         data: roots of datasets, or folders of such roots, all of one task; `DIR:SPLIT` selects a split.
@@ -101,6 +105,8 @@ def evaluate(
         engine_workers: number of datasets that are evaluated at the same time. With more than one, a script needs
             `if __name__ == "__main__":`.
         seed: seed of the defense's random draws and of the permutation tests.
+        pictures: number of samples on the sheet of pictures of each dataset, of which those come first in which the
+            patch changed most; 0 for no sheets.
         pools: roots of datasets that are evaluated as one, by name of the pool. Pools with the same scenes as the pools
             `none` and `random` are compared with these, sample by sample.
         progress: shows a progress bar.
@@ -126,6 +132,7 @@ def evaluate(
         address=address,
         engine_workers=engine_workers,
         seed=seed,
+        pictures=pictures,
         pools=pools or {},
     )
     callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
@@ -159,7 +166,8 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
         _begin(root, facts)
         rows = _measured(request, datasets, names, guarded, callbacks)
         learnt_facts = _fit_facts(root, guarded, request, callbacks.on_warning)
-        reports = tuple(row_report(row) for row in rows)
+        sheets = write_sheets(root, rows, request.pictures, callbacks.on_warning)
+        reports = tuple(replace(row_report(row), pictures=sheets.get(row.name)) for row in rows)
         alarms = alarm_notes(reports, learnt_facts)
         for line in alarms:
             callbacks.on_warning(line)
@@ -257,6 +265,7 @@ def _end(root: Path, found: EvaluateReport) -> None:
     """Writes the results and deletes leftovers."""
     write_whole(root, "results.json", dump_json(found.as_json()))
     write_whole(root, "table.txt", table(found).encode())
+    write_whole(root, PAGE, page(found).encode())
     clear_scratch(root)
 
 

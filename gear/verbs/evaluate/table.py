@@ -25,30 +25,8 @@ def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
         report: results of the evaluation.
         width: number of characters per line; columns that do not fit follow in further blocks.
     """
-    columns = _columns(report)
-    labels = row_labels(report.rows)
-    head = [
-        "",
-        "samples",
-        *(metric_title(*column) for column in columns),
-        "model s/sample",
-        "defense s/sample",
-        "mask IoU",
-        "alarm rate",
-        "AUROC",
-    ]
-    lines = []
-    for row in report.rows:
-        lines.append([labels[row.name], *_row(row, columns)])
-        lines += [_difference(one, report, columns) for one in report.differences if one.row == row.name]
-    for pooled in report.together:
-        metrics = [shown(pooled.metrics.get(name, {}).get(metric)) for name, metric in columns]
-        lines.append([f"all with patch {pooled.patch}", str(pooled.samples), *metrics, "", "", "", "", ""])
-    used = [i for i, title in enumerate(head) if title in ("", "samples") or any(line[i] for line in lines)]
-    text = number_table([[line[i] for i in used] for line in [head, *lines]], width=width)
-    guarded = report.facts["defense"]
-    title = f"{report.facts['task']['name']}: {report.facts['model']['name']}"
-    title += f" guarded by {guarded['name']}" if guarded else ""
+    columns, labels = _columns(report), row_labels(report.rows)
+    text = number_table([cells for _, cells in table_cells(report)], width=width)
     notes = [
         *_paired(report, labels),
         *_objects(report, labels, width),
@@ -57,7 +35,35 @@ def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
         *_times(report),
         *report.facts.get("notes", []),
     ]
-    return "\n".join([title, *text, *notes]) + "\n"
+    return "\n".join([title(report), *text, *notes]) + "\n"
+
+
+def title(report: EvaluateReport) -> str:
+    """Returns the title of the results: task, model and defense."""
+    guarded = report.facts["defense"]
+    text = f"{report.facts['task']['name']}: {report.facts['model']['name']}"
+    return text + (f" guarded by {guarded['name']}" if guarded else "")
+
+
+def table_cells(report: EvaluateReport) -> list[tuple[str | None, list[str]]]:
+    """Returns the titles and the rows of the table, without empty columns.
+
+    Returns:
+        For each line its cells, preceded by the name of the dataset's row (`RowReport.name`); the name is None for the
+        titles, differences and sums of several datasets.
+    """
+    columns, labels = _columns(report), row_labels(report.rows)
+    titles = [metric_title(*column) for column in columns]
+    head = ["", "samples", *titles, "model s", "defense s", "mask IoU", ALARMS, "AUROC"]
+    lines: list[tuple[str | None, list[str]]] = [(None, head)]
+    for row in report.rows:
+        lines.append((row.name, [labels[row.name], *_row(row, columns)]))
+        lines += [(None, _difference(one, report, columns)) for one in report.differences if one.row == row.name]
+    for pooled in report.together:
+        metrics = [shown(pooled.metrics.get(name, {}).get(metric)) for name, metric in columns]
+        lines.append((None, [f"all with patch {pooled.patch}", str(pooled.samples), *metrics, "", "", "", "", ""]))
+    used = [i for i, text in enumerate(head) if text in ("", "samples") or any(line[i] for _, line in lines[1:])]
+    return [(name, [line[i] for i in used]) for name, line in lines]
 
 
 def _times(report: EvaluateReport) -> list[str]:

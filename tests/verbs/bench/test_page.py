@@ -8,14 +8,7 @@ import re
 import cv2
 import numpy as np
 
-from gear.verbs.bench.page import _figure, _rows
-
-
-def test_names_are_escaped_in_tables() -> None:
-    text = _rows(["<b>"], [(True, ["a & b"]), (False, ["'c'"])])
-    assert "<th>&lt;b&gt;</th>" in text
-    assert "<tr class=first><td>a &amp; b</td></tr>" in text
-    assert "<tr><td>&#x27;c&#x27;</td></tr>" in text
+from gear.verbs.bench.page import _figure
 
 
 def test_a_figure_holds_its_picture_at_the_given_width() -> None:
