@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from gear.verbs.evaluate.run import evaluate
     from gear.verbs.export import export
     from gear.verbs.gap.run import gap
+    from gear.verbs.import_archive.run import ImportReport, import_archive
     from gear.verbs.leaderboard.build import BoardReport, build_leaderboard
     from gear.verbs.leaderboard.check import check_record
     from gear.verbs.merge import MergeReport, merge
@@ -60,6 +61,7 @@ __all__ = [
     "EvaluateReport",
     "GapReport",
     "GearError",
+    "ImportReport",
     "MergeReport",
     "ModelFacts",
     "Town",
@@ -82,6 +84,7 @@ __all__ = [
     "evaluate",
     "export",
     "gap",
+    "import_archive",
     "list_models",
     "merge",
     "open_dataset",
@@ -108,6 +111,7 @@ _HOME = {
     "EvaluateReport": "gear.verbs.evaluate.report",
     "GapReport": "gear.measuring.gap.report",
     "GearError": "gear.values.errors",
+    "ImportReport": "gear.verbs.import_archive.run",
     "MergeReport": "gear.verbs.merge",
     "ModelFacts": "gear.verbs.models",
     "Town": "gear.verbs.towns.facts",
@@ -131,6 +135,7 @@ _HOME = {
     "export": "gear.verbs.export",
     "gap": "gear.verbs.gap.run",
     "list_models": "gear.verbs.models",
+    "import_archive": "gear.verbs.import_archive.run",
     "merge": "gear.verbs.merge",
     "open_dataset": "gear.plugins.datasets",
     "open_twins": "gear.plugins.datasets",

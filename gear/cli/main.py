@@ -33,6 +33,7 @@ COMMANDS: dict[str, str] = {
     "drive": "drive cars in the closed loop with and without patches, and write a report",
     "verify": "check every file of a dataset, and make damaged samples again",
     "merge": "join the shards of one collection into one dataset",
+    "import": "unpack a dataset from an archive and check every file",
     "export": "write a dataset in the layout of another tool",
     "towns": "list towns and their scenes, or draw a map of a town and a picture of every scene",
     "models": "list the installed networks, with their size, input and weights",
@@ -43,7 +44,10 @@ COMMANDS: dict[str, str] = {
     "show-config": "print the complete collection config that results from flags and files",
     "completion": "print a script with which a shell completes gear's commands and flags",
 }
-"""One-line description of each command; the module `gear.cli.commands.<name>` implements it."""
+"""One-line description of each command."""
+
+MODULES = {"import": "import_archive"}
+"""Modules of commands whose name is a keyword of Python."""
 
 EXAMPLES = """examples:
   gear collect --task stereo3d                      a KITTI stereo dataset around billboard01
@@ -66,6 +70,11 @@ FULL = {errno.ENOSPC, errno.EDQUOT}
 
 NO_TEMPORARY = "No usable temporary directory"
 """Beginning of Python's error message when no folder for temporary files is usable; this error has no file name."""
+
+
+def module_of(command: str) -> str:
+    """Returns the dotted name of the module that implements a command."""
+    return f"gear.cli.commands.{MODULES.get(command, command.replace('-', '_'))}"
 
 
 class Terminated(KeyboardInterrupt):
@@ -148,7 +157,7 @@ def full_parser(wanted: str | None = None) -> Parser:
             name, help=summary, description=summary, formatter_class=argparse.RawDescriptionHelpFormatter
         )
         if wanted in (None, name):
-            module = importlib.import_module(f"gear.cli.commands.{name.replace('-', '_')}")
+            module = importlib.import_module(module_of(name))
             module.add_arguments(command)
             command.set_defaults(run=module.run)
     return parser

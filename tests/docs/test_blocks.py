@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from gear.cli.main import COMMANDS
+from gear.cli.main import COMMANDS, module_of
 from gear.cli.parser import Parser
 from gear.config.load import load_collection
 from gear.config.nodes import parse_file
@@ -68,7 +68,7 @@ def _parsed(words: list[str]) -> argparse.Namespace:
     """The arguments as the command's own parser reads them; the test fails where it refuses them."""
     assert words[0] in COMMANDS, words
     parser = Parser(prog=f"gear {words[0]}")
-    importlib.import_module(f"gear.cli.commands.{words[0].replace('-', '_')}").add_arguments(parser)
+    importlib.import_module(module_of(words[0])).add_arguments(parser)
     try:
         args = parser.parse_args(words[1:])
     except SystemExit:

@@ -54,7 +54,7 @@ def table_cells(report: EvaluateReport) -> list[tuple[str | None, list[str]]]:
     """
     columns, labels = _columns(report), row_labels(report.rows)
     titles = [metric_title(*column) for column in columns]
-    head = ["", "samples", *titles, "model s", "defense s", "mask IoU", ALARMS, "AUROC"]
+    head = ["", "samples", *titles, "model s/sample", "defense s/sample", "mask IoU", "alarm rate", "AUROC"]
     lines: list[tuple[str | None, list[str]]] = [(None, head)]
     for row in report.rows:
         lines.append((row.name, [labels[row.name], *_row(row, columns)]))
@@ -165,9 +165,9 @@ def _objects(report: EvaluateReport, labels: Mapping[str, str], width: int) -> l
                 cells.append([f"    {name.replace('_', ' ')}", *counts])
             lines += [f"  {labels[one.row]} minus {against.patch}", *number_table(cells, width=width)]
     head = (
-        "objects found in the twin but not in this dataset, and detections that are not in the twin (reverse: the",
-        "same counted from this dataset to the twin; rate: share of the objects found, for invented: number per",
-        "picture; p: two-sided p of a paired permutation test of count and reverse)",
+        "objects found in the twin but not in this dataset, and detections that are not in the twin",
+        "(reverse: the same counted from this dataset to the twin; rate: share of the objects found, for",
+        "invented: number per picture; p: two-sided p of a paired permutation test of count and reverse)",
     )
     return [*head, *lines] if lines else []
 

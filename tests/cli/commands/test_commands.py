@@ -17,6 +17,7 @@ from gear.cli.commands import (
     evaluate,
     export,
     gap,
+    import_archive,
     merge,
     models,
     new,
@@ -28,17 +29,16 @@ from gear.cli.commands import (
     view,
     weights,
 )
-from gear.cli.main import COMMANDS, full_parser
+from gear.cli.main import COMMANDS, full_parser, module_of
 
 MODULES = [
-    attack, bench, collect, completion, defend, doctor, evaluate, export, gap, merge, models, new, plugins, sheet,
-    show_config, towns, train, view, weights,
+    attack, bench, collect, completion, defend, doctor, evaluate, export, gap, import_archive, merge, models, new,
+    plugins, sheet, show_config, towns, train, view, weights,
 ]  # fmt: skip
 
 
 def test_every_command_is_listed() -> None:
-    files = {module.__name__.rpartition(".")[2].replace("_", "-") for module in MODULES}
-    assert files <= set(COMMANDS)
+    assert {module.__name__ for module in MODULES} <= set(map(module_of, COMMANDS))
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.rpartition(".")[2])

@@ -97,7 +97,7 @@ def test_it_is_taken_up_again_and_predicts_nothing_twice(
     evaluate(data, model="odd", out=tmp_path / "whole", reports=["reference"], on_progress=count)
     assert noted == [0, 1, 2, 3]
     evaluate(data, model="odd", out=folder, reports=["reference"])
-    (row,) = sorted(path for path in folder.iterdir() if path.is_dir())
+    (row,) = sorted(path for path in folder.iterdir() if (path / "samples").is_dir())
     (row / "samples/000001.json").unlink()
     (folder / "results.json").unlink()
     oracle.shown = 0
@@ -116,7 +116,7 @@ def test_a_sample_whose_result_is_damaged_is_predicted_again_and_that_is_told(
     install(model_spec(lambda _: Oracle([data]), "depth"))
     out = tmp_path / "out"
     first, whole = evaluate(data, model="odd", out=out), timeless(out)
-    (row,) = sorted(path for path in out.iterdir() if path.is_dir())
+    (row,) = sorted(path for path in out.iterdir() if (path / "samples").is_dir())
     note = row / "samples/000001.json"
     (row / "samples/notes-of-mine.json").write_text("[]")
     if damage == "prediction":

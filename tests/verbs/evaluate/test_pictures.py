@@ -13,6 +13,7 @@ import pytest
 import gear
 from gear.measuring.scoring import SampleResult
 from gear.reporting.picture_grid import CAPTION_PX, captioned, side_by_side, stacked
+from gear.verbs.evaluate.page import PAGE
 from gear.verbs.evaluate.pictures import CELL_WIDTH_PX, most_changed
 from gear.verbs.evaluate.run import evaluate
 from tests.verbs.conftest import Install, Small
@@ -54,7 +55,7 @@ def test_every_row_has_a_sheet_and_links_to_it(tmp_path: Path, small: Small, ins
         assert np.abs(shown.astype(int) - wanted).mean() < 6
     predicted = sheet[:, CELL_WIDTH_PX : 2 * CELL_WIDTH_PX].astype(int)
     assert np.abs(predicted[CAPTION_PX:height] - predicted[height + CAPTION_PX : 2 * height]).mean() > 20
-    page = (tmp_path / "out" / "report.html").read_text()
+    page = (tmp_path / "out" / PAGE).read_text()
     for row in (none, random):
         assert f'href="#{row.name}"' in page and f'src="pictures/{row.name}.jpg"' in page
         assert (tmp_path / "out" / f"pictures/{row.name}.jpg").is_file()

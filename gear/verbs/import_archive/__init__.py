@@ -1,0 +1,1 @@
+"""`gear.import_archive`: unpacks a dataset from an archive and checks it."""

@@ -1,0 +1,162 @@
+"""`gear.import_archive`: what comes in, and what does not."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import shutil
+import stat
+import tarfile
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import gear
+from gear.cli.main import main
+from gear.values.errors import DatasetError
+from gear.verbs.import_archive import members
+from gear.verbs.import_archive.run import import_archive
+
+
+@pytest.fixture
+def root(collected: Any) -> Path:
+    return Path(collected("depth", "random", samples=2, patch="random"))
+
+
+def packed(
+    root: Path, out: Path, mode: str = "w", name: str = "data", then: Callable[[Any], None] | None = None
+) -> Path:
+    with tarfile.open(out, mode) as archive:  # type: ignore[call-overload]
+        archive.add(root, name)
+        if then is not None:
+            then(archive)
+    return out
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def member(name: str, data: bytes = b"x", **fields: Any) -> Callable[[Any], None]:
+    def add(archive: Any) -> None:
+        info = tarfile.TarInfo(name)
+        info.size = len(data)
+        for key, value in fields.items():
+            setattr(info, key, value)
+        archive.addfile(info, io.BytesIO(data) if info.isreg() else None)
+
+    return add
+
+
+def nothing_left(folder: Path) -> bool:
+    return not (folder / "new").exists() and not list(folder.glob(".new*"))
+
+
+@pytest.mark.parametrize(
+    ("suffix", "mode"), [("tar", "w"), ("tar.gz", "w:gz"), ("tar.bz2", "w:bz2"), ("tar.xz", "w:xz")]
+)
+@pytest.mark.parametrize("name", [".", "some/data"])
+def test_what_was_packed_comes_out(root: Path, tmp_path: Path, suffix: str, mode: str, name: str) -> None:
+    archive = packed(root, tmp_path / f"a.{suffix}", mode, name)
+    seen: list[tuple[int, int]] = []
+    report = import_archive(archive, out=tmp_path / "new", on_progress=lambda *now: seen.append(now))
+    wanted = tree(root)
+    assert tree(tmp_path / "new") == {path: wanted[path] for path in tree(tmp_path / "new")}
+    assert set(wanted) - set(tree(tmp_path / "new")) == set(report.left_out)
+    assert seen[-1] == (len(wanted), len(wanted)) and report.files == len(tree(tmp_path / "new"))
+    assert len(gear.open_dataset(tmp_path / "new")) == 2
+    assert gear.verify(tmp_path / "new").is_whole
+
+
+def test_zip_archives_too_and_by_the_command(root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.make_archive(str(tmp_path / "a"), "zip", root)
+    assert main(["import", str(tmp_path / "a.zip"), "--out", str(tmp_path / "new")]) == 0
+    assert "all as they were written" in capsys.readouterr().out
+    assert gear.verify(tmp_path / "new").is_whole
+    assert main(["import", str(tmp_path / "a.zip"), "--out", str(tmp_path / "new")]) == 2
+    assert "is not empty" in capsys.readouterr().err
+
+
+def test_strangers_files_are_left_out(root: Path, tmp_path: Path) -> None:
+    def add(archive: Any) -> None:
+        for name in ("data/evil.sh", "data/hooks/post", "data/gear/x.py", "elsewhere"):
+            member(name)(archive)
+
+    report = import_archive(packed(root, tmp_path / "a.tar", then=add), out=tmp_path / "new")
+    assert set(report.left_out) >= {"evil.sh", "hooks/post", "gear/x.py", "elsewhere"}
+    assert "left out" in report.summary()
+    assert not {"evil.sh", "hooks/post", "gear/x.py", "elsewhere"} & set(tree(tmp_path / "new"))
+    assert not (tmp_path / "new/hooks").exists()
+
+
+@pytest.mark.parametrize(
+    ("add", "problem"),
+    [
+        (member("../victim"), "is not a path inside"),
+        (member("/victim"), "is not a path inside"),
+        (member("data/..\\\\victim"), "is not a path inside"),
+        (member("data/link", b"", type=tarfile.SYMTYPE, linkname="/etc"), "is a link"),
+        (member("data/link", b"", type=tarfile.LNKTYPE, linkname="data/README.md"), "is a link"),
+        (member("data/pipe", b"", type=tarfile.FIFOTYPE), "a device, a pipe"),
+        (member("data/tty", b"", type=tarfile.CHRTYPE), "a device, a pipe"),
+        (member("data/README.md"), "twice"),
+        (member("data2/gear/test/plan.json", b"{}"), "holds 2 datasets"),
+    ],
+)
+def test_hostile_members_refuse_the_archive(root: Path, tmp_path: Path, add: Any, problem: str) -> None:
+    archive = packed(root, tmp_path / "a.tar", then=add)
+    with pytest.raises(DatasetError, match=problem):
+        import_archive(archive, out=tmp_path / "new")
+    assert nothing_left(tmp_path)
+
+
+def test_links_and_ciphers_in_zip_archives(root: Path, tmp_path: Path) -> None:
+    shutil.make_archive(str(tmp_path / "a"), "zip", root)
+    with zipfile.ZipFile(tmp_path / "a.zip", "a") as archive:
+        link = zipfile.ZipInfo("link")
+        link.external_attr = (stat.S_IFLNK | 0o777) << 16
+        archive.writestr(link, "/etc")
+    with pytest.raises(DatasetError, match="is a link"):
+        import_archive(tmp_path / "a.zip", out=tmp_path / "new")
+    assert nothing_left(tmp_path)
+
+
+def test_archives_that_unpack_to_too_much(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(members, "ALWAYS_BYTES", 1_000_000)
+    zeros = member("data/zeros", bytes(60_000_000))
+    archive = packed(root, tmp_path / "a.tar.gz", "w:gz", then=zeros)
+    monkeypatch.setattr(members, "LARGEST_RATIO", 10)
+    with pytest.raises(DatasetError, match="unpacks to more than"):
+        import_archive(archive, out=tmp_path / "new")
+    assert nothing_left(tmp_path)
+
+
+def test_a_header_that_demands_the_memory(tmp_path: Path) -> None:
+    info = tarfile.TarInfo("x")
+    info.type, info.size = tarfile.XHDTYPE, 1 << 32  # an extended header of 4 GB
+    (tmp_path / "a.tar").write_bytes(info.tobuf() + bytes(2048))
+    with pytest.raises(DatasetError, match="cannot be unpacked: a header is too long"):
+        import_archive(tmp_path / "a.tar", out=tmp_path / "new")
+
+
+def test_damage_is_one_line_and_leaves_nothing(root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = packed(root, tmp_path / "a.tar")
+    picture = next(path for path in root.rglob("rgb_0001.png") if "leftImg8bit" in path.parts)
+    data, place = whole.read_bytes(), whole.read_bytes().find(picture.read_bytes()) + 300
+    (tmp_path / "flipped.tar").write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
+    (tmp_path / "cut.tar").write_bytes(data[: len(data) // 2])
+    (tmp_path / "cut.tar.gz").write_bytes(gzip.compress(data)[:-2000])
+    (tmp_path / "text").write_text("no archive")
+    (tmp_path / "empty").write_bytes(b"")
+    with zipfile.ZipFile(tmp_path / "other.zip", "w") as archive:
+        archive.writestr("a.txt", "a")
+    for name in ("flipped.tar", "cut.tar", "cut.tar.gz", "text", "empty", "other.zip", "missing", "."):
+        assert main(["import", str(tmp_path / name), "--out", str(tmp_path / "new")]) == 2, name
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1 and said.startswith("gear: "), said
+        assert nothing_left(tmp_path)
+    assert main(["import", str(tmp_path / "flipped.tar"), "--out", str(tmp_path / "new")]) == 2
+    assert "rgb_0001.png is damaged" in capsys.readouterr().err
