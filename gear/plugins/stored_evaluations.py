@@ -44,7 +44,7 @@ KEPT: Any = {
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class EvaluatedDataset:
+class StoredResults:
     """The part of an evaluation that belongs to one dataset.
 
     Attributes:
@@ -98,7 +98,7 @@ class EvaluatedDataset:
         return read_defended(inside(self.root, self.name), stored if isinstance(stored, dict) else {})
 
 
-def open_evaluation(root: str | Path) -> tuple[EvaluatedDataset, ...]:
+def open_evaluation(root: str | Path) -> tuple[StoredResults, ...]:
     """Opens a finished evaluation.
 
     Args:
@@ -128,7 +128,7 @@ def is_evaluation(path: str | Path) -> bool:
     return (Path(path) / RESULTS).is_file() and not (Path(path) / "gear").is_dir()
 
 
-def _parts(root: Path, found: dict[str, Any]) -> tuple[EvaluatedDataset, ...]:
+def _parts(root: Path, found: dict[str, Any]) -> tuple[StoredResults, ...]:
     defense = found.get("defense")
     label = from_json(str, found["model"]["name"], "model.name")
     label += f" + {from_json(str, defense['name'], 'defense.name')}" if defense else ""
@@ -146,7 +146,7 @@ def _parts(root: Path, found: dict[str, Any]) -> tuple[EvaluatedDataset, ...]:
             for sample in row["per_sample"]
         )
         parts.append(
-            EvaluatedDataset(
+            StoredResults(
                 name=name,
                 label=label,
                 root=root,

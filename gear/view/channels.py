@@ -12,7 +12,7 @@ from gear.contracts.tasks import Sample, Task
 from gear.dataset.output_checks import check_previews
 from gear.dataset.reading import Dataset
 from gear.plugins.prediction_pictures import prediction_pictures
-from gear.plugins.stored_evaluations import EvaluatedDataset
+from gear.plugins.stored_evaluations import StoredResults
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
@@ -75,7 +75,7 @@ def previews(task: Task[Any, Any], sample: Sample, dataset: str = "") -> dict[Ch
     return {Channel("preview", name, dataset): Shown(p, aligned_with(name, p, sample)) for name, p in pictures.items()}
 
 
-def predictions(dataset: Dataset[Any], part: EvaluatedDataset, sample: Sample, label: str) -> dict[Channel, Shown]:
+def predictions(dataset: Dataset[Any], part: StoredResults, sample: Sample, label: str) -> dict[Channel, Shown]:
     """Returns the pictures of a stored prediction and the pictures that the defense returned, by channel.
 
     Args:

@@ -14,7 +14,7 @@ from urllib.parse import quote
 from gear.contracts.tasks import CONTROLS
 from gear.dataset.reading import Dataset, pair_twins
 from gear.plugins.datasets import open_dataset, root_and_split, roots_of
-from gear.plugins.stored_evaluations import EvaluatedDataset, is_evaluation, open_evaluation
+from gear.plugins.stored_evaluations import StoredResults, is_evaluation, open_evaluation
 from gear.values.errors import DatasetError
 
 
@@ -32,7 +32,7 @@ class Source:
     dataset: Dataset[Any]
     label: str
     base_url: str
-    evaluated: tuple[EvaluatedDataset, ...] = ()
+    evaluated: tuple[StoredResults, ...] = ()
 
 
 def sources_of(
@@ -107,7 +107,7 @@ def open_compared(
     return found[0], [*found[1:], *further], []
 
 
-def _of_evaluation(part: EvaluatedDataset, folder: Path) -> Dataset[Any]:
+def _of_evaluation(part: StoredResults, folder: Path) -> Dataset[Any]:
     root = Path(str(part.metadata.get("root", "")))
     if not root.is_dir():
         raise DatasetError(folder, f"its dataset {root} is not here; give the dataset and --evaluation {folder}")

@@ -26,7 +26,7 @@ from gear.reporting.legend import draw_legend
 from gear.reporting.picture_grid import captioned, side_by_side, stacked
 from gear.values.frames import UInt8Image
 from gear.values.progress import Warn
-from gear.verbs.evaluate.compare import Measured
+from gear.verbs.evaluate.compare import EvaluatedDataset
 
 PICTURES = "pictures"
 """Folder of the sheets in the folder of the evaluation."""
@@ -43,7 +43,7 @@ CHANGE_COLOURS: dict[Change, tuple[int, int, int]] = {
 """Colours of the boxes of changed objects, RGB."""
 
 
-def write_sheets(root: Path, rows: Sequence[Measured], count: int, on_warning: Warn) -> dict[str, str]:
+def write_sheets(root: Path, rows: Sequence[EvaluatedDataset], count: int, on_warning: Warn) -> dict[str, str]:
     """Writes one sheet for each dataset into the folder of the evaluation.
 
     Args:
@@ -69,14 +69,14 @@ def write_sheets(root: Path, rows: Sequence[Measured], count: int, on_warning: W
     return paths
 
 
-def twin_of(row: Measured, rows: Sequence[Measured]) -> Measured | None:
+def twin_of(row: EvaluatedDataset, rows: Sequence[EvaluatedDataset]) -> EvaluatedDataset | None:
     """Returns the dataset that shows the same samples without a patch; None if it was not evaluated, or is `row`."""
     key = row.dataset.plan.twin_key
     others = (one for one in rows if one.patch == NO_PATCH and one.dataset.plan.twin_key == key)
     return None if row.patch == NO_PATCH else next(others, None)
 
 
-def draw_sheet(root: Path, row: Measured, twin: Measured | None, count: int) -> UInt8Image:
+def draw_sheet(root: Path, row: EvaluatedDataset, twin: EvaluatedDataset | None, count: int) -> UInt8Image:
     """Draws the sheet of one dataset, with the legend of the predictions.
 
     A sample has one line of pictures, or two if there is a twin: the first shows the twin and the ground truth, the
@@ -125,12 +125,14 @@ def _change(result: SampleResult, twin: SampleResult) -> tuple[int, float, int]:
     return counted, known[0] if known else 0.0, -result.index
 
 
-def _changes(result: SampleResult, twin: Measured) -> tuple[ObjectChange, ...]:
+def _changes(result: SampleResult, twin: EvaluatedDataset) -> tuple[ObjectChange, ...]:
     other = twin.results[result.index]
     return () if result.outcomes is None or other.outcomes is None else changes(result.outcomes, other.outcomes)
 
 
-def _cells(root: Path, row: Measured, twin: Measured | None, result: SampleResult) -> list[list[UInt8Image]]:
+def _cells(
+    root: Path, row: EvaluatedDataset, twin: EvaluatedDataset | None, result: SampleResult
+) -> list[list[UInt8Image]]:
     """Returns the captioned pictures of one sample, line by line and from left to right."""
     sample, index = row.dataset[result.index], f"{result.index:06d}"
     drawn = _predicted(row, sample, result)
@@ -161,7 +163,7 @@ def _line(caption: str, picture: UInt8Image, drawn: Mapping[str, UInt8Image]) ->
     return [(caption, picture), *((f"{caption}, predicted {name}", shown) for name, shown in drawn.items())]
 
 
-def _predicted(row: Measured, sample: Sample, result: SampleResult) -> Mapping[str, UInt8Image]:
+def _predicted(row: EvaluatedDataset, sample: Sample, result: SampleResult) -> Mapping[str, UInt8Image]:
     """Returns the pictures of a sample's stored prediction; none for a task that stores no predictions."""
     prediction: Any = row.scorer.prediction(result, sample)
     return {} if prediction is None else prediction_pictures(row.dataset.task, sample, prediction)

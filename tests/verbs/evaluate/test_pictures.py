@@ -20,15 +20,15 @@ from tests.verbs.conftest import Install, Small
 from tests.verbs.evaluate.conftest import Oracle, model_spec
 
 
-def note(index: int, **metrics: float) -> SampleResult:
+def result_of(index: int, **metrics: float) -> SampleResult:
     return SampleResult(
         index=index, metrics={"task": metrics}, parts={}, cost={}, score=None, mask=None, facts=None, sha256={}
     )
 
 
 def test_samples_that_changed_most_come_first() -> None:
-    here = [note(0, miou=0.5), note(1, miou=0.9), note(2, miou=float("nan")), note(3, miou=0.1)]
-    there = [note(index, miou=0.5) for index in range(4)]
+    here = [result_of(0, miou=0.5), result_of(1, miou=0.9), result_of(2, miou=float("nan")), result_of(3, miou=0.1)]
+    there = [result_of(index, miou=0.5) for index in range(4)]
     assert [one.index for one in most_changed(here, there)] == [1, 3, 0, 2]
 
 
