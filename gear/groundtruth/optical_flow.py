@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.camera.effects import recorded_effects
-from gear.values.frames import FloatImage, IdImage
+from gear.values.frames import FloatImage, IdImage, UInt16Image
 from gear.values.geometry import Array, Intrinsics
 from gear.values.scene import ActorRecord, CameraRecord, SceneRecord
 
@@ -53,10 +53,12 @@ class Flow:
             behind the next camera, or where its object does not exist in the next frame.
         is_visible: (H, W) bool, whether the next picture shows the point: it is inside the picture, and nothing is in
             front of it. Points at edges whose visibility is not certain count as hidden.
+        actor_id: (H, W) uint16 id of the road user that a pixel shows; 0 for everything else and for the ego car.
     """
 
     flow_px: FloatImage
     is_visible: Mask
+    actor_id: UInt16Image
 
 
 def object_ids(geom_id: IdImage, id_of_geom: npt.NDArray[np.int32]) -> IdImage:
@@ -85,7 +87,10 @@ def optical_flow(now: FlowView, after: FlowView, record: SceneRecord, next_recor
         ends = np.where((depth_m > _NEAR_M)[..., None], after.camera.intrinsics.project(moved_m), np.nan)
         inverse_depth = np.where(is_sky, 0.0, 1 / depth_m)
     is_shown = _is_shown(now, after, ends, inverse_depth)
-    return _through_lens(now.camera, after.camera, pixels, ends, is_shown)
+    others = [actor.id for actor in record.actors if actor.role != "ego"]
+    actor_id = np.where(np.isin(now.object_id, others), now.object_id, 0).astype(np.uint16)
+    whole = Flow(flow_px=(ends - pixels).astype(np.float32), is_visible=is_shown, actor_id=actor_id)
+    return _through_lens(whole, now.camera, after.camera, pixels)
 
 
 def _pixel_grid(pinhole: Intrinsics) -> Array:
@@ -192,19 +197,24 @@ def _difference(object_id: IdImage, ends: Array, inverse_depth: Array, axis: int
     return step
 
 
-def _through_lens(camera: CameraRecord, next_camera: CameraRecord, pixels: Array, ends: Array, is_shown: Mask) -> Flow:
+def _through_lens(flow: Flow, camera: CameraRecord, next_camera: CameraRecord, pixels: Array) -> Flow:
     """The flow of the picture that a lens makes of the pinhole's picture; without a lens it stays as it is.
 
     A pixel behind a lens has the depth of the nearest pixel of the pinhole's picture. Its flow is that of the point at
     this pixel's middle.
     """
     effects, next_effects = recorded_effects(camera), recorded_effects(next_camera)
-    if effects and next_effects:
-        lens, next_lens = effects[0].pixel_map(camera), next_effects[0].pixel_map(next_camera)
-        row, column = (np.rint(one).astype(np.intp) for one in (lens.y, lens.x))
-        pixels, ends = lens.forward(pixels[row, column]), next_lens.forward(ends[row, column])
-        height, width = lens.x.shape
-        with np.errstate(invalid="ignore"):
-            is_inside = ((ends >= -0.5) & (ends < (width - 0.5, height - 0.5))).all(axis=-1)
-        is_shown = is_shown[row, column] & is_inside
-    return Flow(flow_px=(ends - pixels).astype(np.float32), is_visible=is_shown)
+    if not (effects and next_effects):
+        return flow
+    lens, next_lens = effects[0].pixel_map(camera), next_effects[0].pixel_map(next_camera)
+    row, column = (np.rint(one).astype(np.intp) for one in (lens.y, lens.x))
+    starts = pixels[row, column]
+    ends = next_lens.forward(starts + flow.flow_px[row, column])
+    height, width = lens.x.shape
+    with np.errstate(invalid="ignore"):
+        is_inside = np.asarray(((ends >= -0.5) & (ends < (width - 0.5, height - 0.5))).all(axis=-1))
+    return Flow(
+        flow_px=(ends - lens.forward(starts)).astype(np.float32),
+        is_visible=flow.is_visible[row, column] & is_inside,
+        actor_id=flow.actor_id[row, column],
+    )

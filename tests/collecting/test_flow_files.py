@@ -26,17 +26,20 @@ DRIVE = Path(__file__).parents[1] / "formats/driving/drive.yml"
 VIDEO = {"split": "video", "samples": None, "scene": "no_billboard"}
 
 
-def test_a_flow_is_two_files() -> None:
+def test_a_flow_is_three_files() -> None:
     flow_px = np.array([[[1.5, 0.0], [np.nan, np.nan]]], np.float32)
-    flow = Flow(flow_px=flow_px, is_visible=np.array([[True, False]]))
+    actors = np.array([[0, 300]], np.uint16)
+    flow = Flow(flow_px=flow_px, is_visible=np.array([[True, False]]), actor_id=actors)
     files = flow_files(flow, "left", "video", 12)
     assert {key: file.path for key, (file, _) in files.items()} == {
         "flow/left": "gear/video/flow/000012_left.png",
         "flow/left/visible": "gear/video/flow/000012_left_visible.png",
+        "flow/left/actors": "gear/video/flow/000012_left_actors.png",
     }
     assert files["flow/left"][0].facts == {"known_px": 1, "visible_px": 1}
     assert np.array_equal(decode_flow(files["flow/left"][1]), flow_px, equal_nan=True)
     assert decode_plain(files["flow/left/visible"][1]).tolist() == [[255, 0]]
+    assert np.array_equal(decode_plain(files["flow/left/actors"][1]), actors)
 
 
 def test_single_pictures_have_no_flow(tmp_path: Path, collect_small: Collect) -> None:

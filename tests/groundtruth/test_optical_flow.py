@@ -102,6 +102,7 @@ def test_a_car_that_keeps_its_distance_stands_still_in_the_picture() -> None:
     is_car = object_ids(before[0].views["left"].geom_id, before[0].geoms.object_id) == 5
     assert is_car.sum() > 100 and np.abs(flow.flow_px[is_car]).max() < 1e-3
     assert flow.is_visible[is_car].all()
+    assert np.array_equal(flow.actor_id, np.where(is_car, 5, 0)), "the ego car and the wall are no other road users"
 
 
 def test_corners_of_a_turning_car_are_where_the_flow_leads() -> None:

@@ -13,9 +13,9 @@ from gear.values.frames import FloatImage
 UNITS_PER_PX, ZERO = 64, 32768
 """Units per pixel, and the stored number for a flow of 0. A flow lies in -512 to 511.98 pixels."""
 
-FLOW, VISIBLE = "flow/{camera}", "flow/{camera}/visible"
-"""Keys of a camera's flow, and of the mask of points that the next picture shows, among the auxiliary files of a
-sample.
+FLOW, VISIBLE, ACTORS = "flow/{camera}", "flow/{camera}/visible", "flow/{camera}/actors"
+"""Keys of a camera's flow, of the mask of points that the next picture shows, and of the map of road users, among the
+auxiliary files of a sample.
 """
 
 _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 3, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_PAETH]
