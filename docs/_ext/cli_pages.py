@@ -7,7 +7,7 @@ import importlib
 import os
 from unittest import mock
 
-from gear.cli.main import COMMANDS
+from gear.cli.main import COMMANDS, module_of
 from gear.cli.parser import Parser
 
 
@@ -26,7 +26,7 @@ def page() -> str:
 
 def _parser(name: str, summary: str) -> argparse.ArgumentParser:
     parser = Parser(prog=f"gear {name}", description=summary, formatter_class=argparse.RawDescriptionHelpFormatter)
-    importlib.import_module(f"gear.cli.commands.{name.replace('-', '_')}").add_arguments(parser)
+    importlib.import_module(module_of(name)).add_arguments(parser)
     return parser
 
 
