@@ -67,7 +67,7 @@ class TaskBench:
                 if not LABEL.fullmatch(label):
                     raise FieldError(name, f"{label!r} names folders and rows: letters, digits, `_`, `.` and `-`")
         for label in TAKEN & self.models.keys():
-            raise FieldError("models", f"{label!r} is what pictures without the network's patch are called")
+            raise FieldError("models", f"{label!r} is a reserved name; choose another")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -67,7 +67,7 @@ def calibration_scene(config: BenchConfig, node: Node, measured: tuple[Scene, ..
     try:
         (one,) = _named(config.calibration.town, (config.calibration.scene,))
         if one.label in [other.label for other in measured]:
-            raise GearError(f"scene {one.name!r} is measured in, too; what a defense has seen, it finds more easily")
+            raise GearError(f"scene {one.name!r} is also a measured scene; calibrate the defense on another one")
     except ConfigError:
         raise
     except GearError as error:

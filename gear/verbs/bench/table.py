@@ -42,7 +42,7 @@ def legend() -> str:
     return (
         "in brackets: 95 % intervals; change and AUROC: of a patch against a random one, and of a random one against "
         "none; outside patch: mean change of a picture, without the pixels of the patch where the task can leave them "
-        "out; p: how often chance alone changes as much; hidden, misclassified, moved: shares of the objects found in "
+        "out; p: two-sided p of a paired permutation test; hidden, misclassified, moved: shares of the objects found in "
         "the twin; invented: detections per picture that neither an object nor the twin explains"
     )
 

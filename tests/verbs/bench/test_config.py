@@ -45,7 +45,7 @@ def prepared(config: str | Path, *, out: Path, **given: Any) -> Plan:
         (':double"', ':dubble"', r"bench\.yml:11:3: places\..*did you mean double"),
         (':double"', ':no_billboard"', r"neither a board nor the truck"),
         (':double"', ':board"', r"is named twice"),
-        (':truck"', ':board"', r"bench\.yml:12:.*calibration\.scene: .*is measured in, too"),
+        (':truck"', ':board"', r"bench\.yml:12:.*calibration\.scene: .*is also a measured scene"),
         (':truck"', ':trick"', r"calibration\.scene: .*did you mean truck"),
         (LESSON, "", r"bench\.yml:9:7: tasks\.semseg\.defenses\.fpda: must learn first"),
         ("{steps: 2}", "{steps: 0}", r"bench\.yml:14:.*attack\.steps: must be at least 1"),

@@ -39,7 +39,7 @@ def test_scenes_have_labels_and_surfaces() -> None:
         (["board", "board"], "", "is named twice"),
         (["bord"], "", "named 'bord'; did you mean board"),
         (["no_billboard"], "", "has neither a board nor the truck"),
-        (["board"], "board", "is measured in, too"),
+        (["board"], "board", "is also a measured scene"),
     ],
 )
 def test_mistakes_have_their_place_in_the_file(names: list[str], calibration: str, message: str) -> None:
