@@ -195,6 +195,10 @@ def combined_interval(one: float, one_ends: Interval, other: float, other_ends: 
 
     The distances to the ends are added as squares, as for independent estimates (Newcombe, Statistics in Medicine 1998,
     method 10). For metrics of the same scenes, which mostly rise and fall together, the interval is conservative.
+
+    Args:
+        one, other: values of the metric in the two datasets.
+        one_ends, other_ends: ends of their intervals.
     """
     below = math.hypot(one - one_ends[0], other_ends[1] - other)
     above = math.hypot(one_ends[1] - one, other - other_ends[0])

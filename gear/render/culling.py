@@ -19,6 +19,10 @@ Mask = npt.NDArray[np.bool_]
 def bounding_spheres(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:
     """The bounding spheres of geoms: (ngeom, 3) centres in world coordinates and (ngeom,) radii, metres; the radii of
     planes are infinite.
+
+    Args:
+        model: compiled model.
+        data: state of the model, with the world poses of its geoms.
     """
     return data.geom_xpos, bounding_radii(model)
 

@@ -15,6 +15,10 @@ from gear.values.frames import UInt8Image
 def texture_of_face(model: mujoco.MjModel, geom_id: int) -> int:
     """The id of the colour texture of a face, from the material of its geom.
 
+    Args:
+        model: compiled model.
+        geom_id: id of the face's geom.
+
     Raises:
         ValueError: the geom has no such texture, so it cannot be a face.
     """

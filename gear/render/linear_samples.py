@@ -71,6 +71,10 @@ def edge_mask(geom_id: IdImage, depth_m: FloatImage) -> npt.NDArray[np.uint8]:
 
     On a plane 1/z is linear over the picture, so a second difference of 1/z other than zero means that the surface is
     not a plane.
+
+    Args:
+        geom_id: (H, W) geom ids; -1 for none.
+        depth_m: (H, W) planar depth in metres.
     """
     height, width = geom_id.shape
     edges = np.empty((height, width), np.uint8)

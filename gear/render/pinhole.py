@@ -56,6 +56,9 @@ class Frustum:
     def slice_corners(self, begin_m: float, end_m: float) -> Array:
         """The (8, 3) corners, in world coordinates, of the part of the view volume between two distances along the
         optical axis.
+
+        Args:
+            begin_m, end_m: planar depths at which the slice begins and ends.
         """
         right = np.cross(self.forward_world, self.up_world)
         rays = [

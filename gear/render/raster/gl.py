@@ -231,6 +231,9 @@ def shadow_map(width: int, height: int) -> int:
     """Makes a depth texture with comparison for shadows. Returns its OpenGL name.
 
     A read in a shader returns the lit share 0..1, and 1 outside the borders.
+
+    Args:
+        width, height: size in texels.
     """
     texture = _texture(GL.GL_TEXTURE_2D)
     GL.glTextureStorage2D(texture, 1, GL.GL_DEPTH_COMPONENT32F, width, height)

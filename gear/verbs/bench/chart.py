@@ -20,6 +20,10 @@ BAR_IN, GAP_IN, EDGE_IN, WIDTH_IN = 0.16, 0.14, 0.9, 8.0
 def chart(task: TaskResult, form: Literal["svg", "pdf", "png"]) -> bytes:
     """Draws the chart as SVG, PDF or PNG bytes, with 95 % intervals where they are known. Equal results give equal
     bytes.
+
+    Args:
+        task: results of one task.
+        form: file format.
     """
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -32,7 +32,7 @@ def _nothing() -> Node:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contestant:
+class PluginConfig:
     """A network or a defense of the benchmark, with its options; its key in the bench config is its name in
     tables.
 
@@ -55,8 +55,8 @@ class TaskBench:
         collect: further collection settings for this task's pictures.
     """
 
-    models: dict[str, Contestant]
-    defenses: dict[str, Contestant] = field(default_factory=dict)
+    models: dict[str, PluginConfig]
+    defenses: dict[str, PluginConfig] = field(default_factory=dict)
     collect: Node = field(default_factory=_nothing)
 
     def __post_init__(self) -> None:
@@ -168,7 +168,12 @@ class BenchConfig:
 
 
 def settings_of(node: Node, above: str = "") -> Iterable[str]:
-    """Yields nested options as flat `KEY=VALUE` texts, one per option, such as `augmentation.flip=0`."""
+    """Yields nested options as flat `KEY=VALUE` texts, one per option, such as `augmentation.flip=0`.
+
+    Args:
+        node: the nested options.
+        above: name of the option that contains them; "" at the top.
+    """
     if isinstance(node, MappingNode) and (node.entries or not above):
         for key, (_, below) in node.entries.items():
             yield from settings_of(below, f"{above}.{key}" if above else key)

@@ -25,7 +25,7 @@ from gear.verbs.bench.plan import Plan, Weather
 from gear.verbs.bench.report import BenchReport, TaskResult
 from gear.verbs.bench.scenes import Scene
 from gear.verbs.bench.table import columns, legend, title
-from gear.verbs.bench.validation import Contest
+from gear.verbs.bench.validation import TaskPlugins
 from gear.verbs.evaluate.page import PAGE
 
 PICTURE_PX, PATCH_PX, QUALITY = 560, 220, 82
@@ -43,13 +43,13 @@ def page(report: BenchReport, plan: Plan) -> str:
         f'<p class="dim">{safe(legend())}.</p>',
         *(f'<p class="dim">Note: {safe(note)}</p>' for note in facts["notes"]),
     ]
-    for task, contest in zip(report.tasks, plan.contests, strict=True):
+    for task, task_plugins in zip(report.tasks, plan.plugins_of_tasks, strict=True):
         parts += [f"<h2>{safe(title(task))}</h2>", _table(task)]
         if task.metric is not None:
             drawn = base64.b64encode(chart(task, "svg")).decode()
             name = safe(f"bars of {task.metric.title} by network, defense and patch")
             parts.append(f'<p><img alt="{name}" src="data:image/svg+xml;base64,{drawn}"></p>')
-        parts += [_scenes(task, report.out), *_pictures(plan, contest)]
+        parts += [_scenes(task, report.out), *_pictures(plan, task_plugins)]
     return report_page("gear bench", parts)
 
 
@@ -83,28 +83,30 @@ def _scenes(task: TaskResult, out: Path) -> str:
     )
 
 
-def _pictures(plan: Plan, contest: Contest) -> Iterable[str]:
+def _pictures(plan: Plan, task_plugins: TaskPlugins) -> Iterable[str]:
     """Yields for each scene its pictures without a patch and with each network's patch, as HTML.
 
     Each scene is represented by the sample in which most pixels of the patch surfaces are visible.
     """
     for scene, weather in plan.places():
-        clean = open_dataset(plan.pictures(contest, scene, weather, NO_PATCH))
+        clean = open_dataset(plan.pictures(task_plugins, scene, weather, NO_PATCH))
         seen = [sum(one.visible_px for one in clean.sidecar(i).surfaces) for i in range(len(clean))]
         number = int(np.argmax(seen))
-        figures = [_shown(plan, contest, scene, weather, NO_PATCH, number, "without a patch")]
-        for model, defense in itertools.product(contest.models, plan.looked_through(contest)):
+        figures = [_shown(plan, task_plugins, scene, weather, NO_PATCH, number, "without a patch")]
+        for model, defense in itertools.product(task_plugins.models, plan.adaptive_defenses(task_plugins)):
             name = plan.name(model, defense)
-            figures.append(_shown(plan, contest, scene, weather, name, number, f"with the patch against {name}"))
+            figures.append(_shown(plan, task_plugins, scene, weather, name, number, f"with the patch against {name}"))
             figures += [
                 _figure(decode_rgb(read_bytes(path)), f"{path.stem} against {name}", PATCH_PX)
-                for path in sorted(plan.patch(contest, scene, name).glob("patch_*.png"))
+                for path in sorted(plan.patch(task_plugins, scene, name).glob("patch_*.png"))
             ]
         yield f'<h3>{safe(f"{scene.label}, {weather.label}")}</h3><div class="row">{"".join(figures)}</div>'
 
 
-def _shown(plan: Plan, contest: Contest, scene: Scene, weather: Weather, patch: str, number: int, caption: str) -> str:
-    images = open_dataset(plan.pictures(contest, scene, weather, patch))[number].images
+def _shown(
+    plan: Plan, task_plugins: TaskPlugins, scene: Scene, weather: Weather, patch: str, number: int, caption: str
+) -> str:
+    images = open_dataset(plan.pictures(task_plugins, scene, weather, patch))[number].images
     return _figure(next(iter(images.values())), caption, PICTURE_PX)
 
 

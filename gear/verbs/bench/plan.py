@@ -20,7 +20,7 @@ from gear.plugins.build import build, find
 from gear.values.rng import derive_rng
 from gear.verbs.bench.config import BenchConfig, settings_of
 from gear.verbs.bench.scenes import Scene
-from gear.verbs.bench.validation import Contest, Entrant
+from gear.verbs.bench.validation import Candidate, TaskPlugins
 
 RANDOM, PATCH, ADAPTIVE = RANDOM_PATCH, "patch", "adaptive patch"
 """Kinds of patches: random, optimised against the network, optimised against the network with its defense."""
@@ -49,20 +49,20 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Match:
+class PlannedEvaluation:
     """One evaluation of the benchmark: a network, alone or guarded by a defense, in all scenes.
 
     Attributes:
-        contest: all networks and defenses of the task.
+        task_plugins: all networks and defenses of the task.
         model, defense: the network and the defense that are evaluated together; `defense` is None for the network
             alone.
         out: folder of the evaluation.
         pools: roots of the datasets, by kind of patch.
     """
 
-    contest: Contest
-    model: Entrant
-    defense: Entrant | None
+    task_plugins: TaskPlugins
+    model: Candidate
+    defense: Candidate | None
     out: Path
     pools: dict[str, list[Path]]
 
@@ -87,7 +87,7 @@ class Plan:
         config: the bench config.
         scenes: scenes in which networks are measured.
         calibration: scene in which defenses are calibrated; None if the config names none.
-        contests: networks and defenses of each task.
+        plugins_of_tasks: networks and defenses of each task.
         attack: spec of the attack that makes the patches.
         root: folder of the benchmark.
         workers: arguments of each collection that name its workers: `workers`, and `engine` and `address` if they are
@@ -100,46 +100,46 @@ class Plan:
         *,
         scenes: tuple[Scene, ...],
         calibration: Scene | None,
-        contests: tuple[Contest, ...],
+        plugins_of_tasks: tuple[TaskPlugins, ...],
         attack: AttackSpec[Any],
         root: Path,
         workers: Mapping[str, str | int],
     ) -> None:
-        self.config, self.contests, self.scenes = config, contests, scenes
+        self.config, self.plugins_of_tasks, self.scenes = config, plugins_of_tasks, scenes
         self.weathers = tuple(weathers(config.weathers))
         self._calibration, self._attack, self._root = calibration, attack, root
         self._workers = workers
 
     def steps(self) -> Iterator[Step]:
         """Yields all steps in an order in which each step comes after the steps that it depends on."""
-        for contest in self.contests:
+        for task_plugins in self.plugins_of_tasks:
             for scene in self.scenes:
-                yield from self._pictures(contest, scene)
-            learning = [defense for defense in contest.defenses if defense.learns]
+                yield from self._pictures(task_plugins, scene)
+            learning = [defense for defense in task_plugins.defenses if defense.needs_calibration]
             if self._calibration is not None and learning:
-                yield from self._lessons(contest, self._calibration)
+                yield from self._calibration_data(task_plugins, self._calibration)
             for scene in self.scenes:
-                for model in contest.models:
-                    yield from self._patch(contest, scene, model)
-            for match in self.matches(contest):
-                yield self.evaluation(match)
+                for model in task_plugins.models:
+                    yield from self._patch(task_plugins, scene, model)
+            for planned in self.planned_evaluations(task_plugins):
+                yield self.evaluation(planned)
 
-    def matches(self, contest: Contest) -> Iterator[Match]:
+    def planned_evaluations(self, task_plugins: TaskPlugins) -> Iterator[PlannedEvaluation]:
         """Yields one evaluation per network of a task without a defense, and one per network and defense."""
-        for model in contest.models:
-            for defense in contest.guards:
+        for model in task_plugins.models:
+            for defense in task_plugins.guards:
                 shown = {NO_PATCH: NO_PATCH, RANDOM: RANDOM, PATCH: model.label}
                 if defense is not None and self._is_adaptive(defense):
                     shown[ADAPTIVE] = self.name(model, defense)
                 if defense is None and self.config.transfer:
-                    shown |= {f"{PATCH} of {one.label}": one.label for one in contest.models if one is not model}
-                yield Match(
-                    contest=contest,
+                    shown |= {f"{PATCH} of {one.label}": one.label for one in task_plugins.models if one is not model}
+                yield PlannedEvaluation(
+                    task_plugins=task_plugins,
                     model=model,
                     defense=defense,
-                    out=self._root / "evaluations" / contest.folder / self.name(model, defense),
+                    out=self._root / "evaluations" / task_plugins.folder / self.name(model, defense),
                     pools={
-                        kind: [self.pictures(contest, *place, patch) for place in self.places()]
+                        kind: [self.pictures(task_plugins, *place, patch) for place in self.places()]
                         for kind, patch in shown.items()
                     },
                 )
@@ -148,35 +148,41 @@ class Plan:
         """Returns every (scene, weather) pair, in the order of the datasets of a pool."""
         return [(scene, weather) for scene in self.scenes for weather in self.weathers]
 
-    def pictures(self, contest: Contest, scene: Scene, weather: Weather, patch: str) -> Path:
+    def pictures(self, task_plugins: TaskPlugins, scene: Scene, weather: Weather, patch: str) -> Path:
         """Returns the root of the pictures on which networks are measured; `patch` is `none`, `random` or the name
         of the attacked network.
+
+        Args:
+            task_plugins: networks and defenses of the task.
+            scene: the measured scene.
+            weather: the weather.
+            patch: `none`, `random` or the name of the attacked network.
         """
         kind = patch if patch in (NO_PATCH, RANDOM) else f"patch-{patch}"
-        return self._place(contest, scene) / weather.label / kind
+        return self._place(task_plugins, scene) / weather.label / kind
 
-    def patch(self, contest: Contest, scene: Scene, name: str) -> Path:
+    def patch(self, task_plugins: TaskPlugins, scene: Scene, name: str) -> Path:
         """Returns the folder of the patches that were optimised in a scene; `name` is a network, or a network with
         a defense.
         """
-        return self._root / "patches" / contest.folder / name / scene.label
+        return self._root / "patches" / task_plugins.folder / name / scene.label
 
-    def looked_through(self, contest: Contest) -> tuple[Entrant | None, ...]:
+    def adaptive_defenses(self, task_plugins: TaskPlugins) -> tuple[Candidate | None, ...]:
         """Returns the defenses that attacks on a network take into account; None stands for the attack on the
         network alone.
 
         Defenses are included only if the config asks for adaptive patches, and only those that support the attack.
         """
-        return (None, *(defense for defense in contest.defenses if self._is_adaptive(defense)))
+        return (None, *(defense for defense in task_plugins.defenses if self._is_adaptive(defense)))
 
     @staticmethod
-    def name(model: Entrant, defense: Entrant | None) -> str:
+    def name(model: Candidate, defense: Candidate | None) -> str:
         """Returns the name of a network with its defense, `<network>+<defense>`, for tables, folders and patches."""
         return model.label if defense is None else f"{model.label}+{defense.label}"
 
-    def picture_settings(self, contest: Contest) -> tuple[str, ...]:
+    def picture_settings(self, task_plugins: TaskPlugins) -> tuple[str, ...]:
         """Returns the `KEY=VALUE` settings that all collections of a task share."""
-        return (*settings_of(self.config.collect), *settings_of(self.config.tasks[contest.name].collect))
+        return (*settings_of(self.config.collect), *settings_of(self.config.tasks[task_plugins.name].collect))
 
     def seed(self, purpose: str) -> int:
         """Returns the seed of the pictures for one purpose, such as `attack` or `measure`; the samples of two
@@ -189,63 +195,75 @@ class Plan:
         """The scene in which defenses are calibrated; None if the config names none."""
         return self._calibration
 
-    def _place(self, contest: Contest, scene: Scene) -> Path:
-        return self._root / "data" / contest.folder / scene.label
+    def _place(self, task_plugins: TaskPlugins, scene: Scene) -> Path:
+        return self._root / "data" / task_plugins.folder / scene.label
 
-    def _is_adaptive(self, defense: Entrant) -> bool:
-        return self.config.adaptive and defense.is_looked_through(self._attack)
+    def _is_adaptive(self, defense: Candidate) -> bool:
+        return self.config.adaptive and defense.supports_adaptive_attack(self._attack)
 
-    def _pictures(self, contest: Contest, scene: Scene) -> Iterator[Step]:
+    def _pictures(self, task_plugins: TaskPlugins, scene: Scene) -> Iterator[Step]:
         for weather in self.weathers:
-            yield from self._grounds(contest, scene, weather)
+            yield from self._grounds(task_plugins, scene, weather)
             for patch in (NO_PATCH, RANDOM):
-                out = self.pictures(contest, scene, weather, patch)
-                yield self._collect(contest, scene, weather, "measure", out, patch=patch)
+                out = self.pictures(task_plugins, scene, weather, patch)
+                yield self._collect(task_plugins, scene, weather, "measure", out, patch=patch)
 
-    def _grounds(self, contest: Contest, scene: Scene, weather: Weather) -> Iterator[Step]:
+    def _grounds(self, task_plugins: TaskPlugins, scene: Scene, weather: Weather) -> Iterator[Step]:
         """Yields the collections of the pictures on which a patch is optimised, and of those on which its best
         step is chosen.
         """
         for purpose in ("attack", "choose"):
-            yield self._collect(contest, scene, weather, purpose, self._ground(contest, scene, weather, purpose))
+            yield self._collect(
+                task_plugins, scene, weather, purpose, self._ground(task_plugins, scene, weather, purpose)
+            )
 
-    def _ground(self, contest: Contest, scene: Scene, weather: Weather, purpose: str) -> Path:
-        return self._place(contest, scene) / weather.label / purpose
+    def _ground(self, task_plugins: TaskPlugins, scene: Scene, weather: Weather, purpose: str) -> Path:
+        return self._place(task_plugins, scene) / weather.label / purpose
 
-    def _patch(self, contest: Contest, scene: Scene, model: Entrant) -> Iterator[Step]:
+    def _patch(self, task_plugins: TaskPlugins, scene: Scene, model: Candidate) -> Iterator[Step]:
         """Yields the steps for a network's patch, its adaptive patches, and the rendered pictures of both."""
-        for defense in self.looked_through(contest):
+        for defense in self.adaptive_defenses(task_plugins):
             name = self.name(model, defense)
-            yield self._attacked(contest, scene, model, defense, self.weathers)
+            yield self._attacked(task_plugins, scene, model, defense, self.weathers)
             for weather in self.weathers:
-                out, patch = self.pictures(contest, scene, weather, name), self.patch(contest, scene, name)
-                yield self._collect(contest, scene, weather, "measure", out, patch=patch)
+                out, patch = self.pictures(task_plugins, scene, weather, name), self.patch(task_plugins, scene, name)
+                yield self._collect(task_plugins, scene, weather, "measure", out, patch=patch)
 
-    def _lessons(self, contest: Contest, scene: Scene) -> Iterator[Step]:
+    def _calibration_data(self, task_plugins: TaskPlugins, scene: Scene) -> Iterator[Step]:
         """Yields the steps that make the calibration data of defenses.
 
         The calibration data are pictures of the calibration scene without a patch, and the same pictures with each
         network's patch.
         """
         weather = self.weathers[0]
-        yield from self._grounds(contest, scene, weather)
-        yield self._collect(contest, scene, weather, "calibrate", self._lesson(contest, NO_PATCH))
-        for model in contest.models:
-            yield self._attacked(contest, scene, model, None, (weather,))
-            out, patch = self._lesson(contest, model.label), self.patch(contest, scene, model.label)
-            yield self._collect(contest, scene, weather, "calibrate", out, patch=patch)
+        yield from self._grounds(task_plugins, scene, weather)
+        yield self._collect(task_plugins, scene, weather, "calibrate", self._calibration_folder(task_plugins, NO_PATCH))
+        for model in task_plugins.models:
+            yield self._attacked(task_plugins, scene, model, None, (weather,))
+            out, patch = (
+                self._calibration_folder(task_plugins, model.label),
+                self.patch(task_plugins, scene, model.label),
+            )
+            yield self._collect(task_plugins, scene, weather, "calibrate", out, patch=patch)
 
-    def _lesson(self, contest: Contest, patch: str) -> Path:
+    def _calibration_folder(self, task_plugins: TaskPlugins, patch: str) -> Path:
         assert self._calibration is not None
         kind = NO_PATCH if patch == NO_PATCH else f"patch-{patch}"
-        return self._place(contest, self._calibration) / self.weathers[0].label / f"calibrate-{kind}"
+        return self._place(task_plugins, self._calibration) / self.weathers[0].label / f"calibrate-{kind}"
 
     def _collect(
-        self, contest: Contest, scene: Scene, weather: Weather, purpose: str, out: Path, *, patch: str | Path = NO_PATCH
+        self,
+        task_plugins: TaskPlugins,
+        scene: Scene,
+        weather: Weather,
+        purpose: str,
+        out: Path,
+        *,
+        patch: str | Path = NO_PATCH,
     ) -> Step:
         shown = "" if patch == NO_PATCH else f", {patch if isinstance(patch, str) else patch.parent.name} patch"
         arguments = {
-            "task": contest.name,
+            "task": task_plugins.name,
             "town": scene.town,
             "scene": scene.name,
             "split": SPLITS[purpose],
@@ -255,7 +273,7 @@ class Plan:
             "out": str(out),
             "probes": purpose in ("attack", "choose") and self.config.attack.compositor == "transport",
             "settings": (
-                *self.picture_settings(contest),
+                *self.picture_settings(task_plugins),
                 *weather.settings,
                 f"patch_seed={self.seed(RANDOM)}",
             ),
@@ -263,69 +281,74 @@ class Plan:
         }
         return Step(
             verb="collect",
-            title=f"collect {contest.name} in {scene.label} {weather.label} to {purpose}{shown}",
+            title=f"collect {task_plugins.name} in {scene.label} {weather.label} to {purpose}{shown}",
             arguments={key: value for key, value in arguments.items() if value is not False},
         )
 
     def _attacked(
-        self, contest: Contest, scene: Scene, model: Entrant, defense: Entrant | None, shown: tuple[Weather, ...]
+        self,
+        task_plugins: TaskPlugins,
+        scene: Scene,
+        model: Candidate,
+        defense: Candidate | None,
+        shown: tuple[Weather, ...],
     ) -> Step:
         attack, name = self.config.attack, self.name(model, defense)
         return Step(
             verb="attack",
-            title=f"attack {name} of {contest.name} in {scene.label}",
+            title=f"attack {name} of {task_plugins.name} in {scene.label}",
             arguments={
                 "model": model.plugin,
-                "data": [str(self._ground(contest, scene, weather, "attack")) for weather in shown],
-                "val": [str(self._ground(contest, scene, weather, "choose")) for weather in shown],
-                "out": str(self.patch(contest, scene, name)),
+                "data": [str(self._ground(task_plugins, scene, weather, "attack")) for weather in shown],
+                "val": [str(self._ground(task_plugins, scene, weather, "choose")) for weather in shown],
+                "out": str(self.patch(task_plugins, scene, name)),
                 "attack": attack.plugin,
                 **({"queries": attack.queries} if attack.queries else {"steps": attack.steps}),
                 "settings": tuple(settings_of(attack.set)),
                 "model_settings": model.settings,
-                **_keywords(self._guard(contest, model, defense)),
+                **_keywords(self._guard(task_plugins, model, defense)),
                 "compositor": attack.compositor,
                 "seed": self.config.seed,
             },
         )
 
-    def evaluation(self, match: Match) -> Step:
+    def evaluation(self, planned: PlannedEvaluation) -> Step:
         """Returns the step that measures a network, alone or behind a defense, on all of its datasets."""
         return Step(
             verb="evaluate",
-            title=f"evaluate {self.name(match.model, match.defense)} in {match.contest.name}",
+            title=f"evaluate {self.name(planned.model, planned.defense)} in {planned.task_plugins.name}",
             arguments={
-                "model": match.model.plugin,
-                "model_settings": match.model.settings,
-                **_keywords(self._guard(match.contest, match.model, match.defense)),
-                "data": [str(root) for roots in match.pools.values() for root in roots],
-                "reports": reports_of(match.contest),
-                "out": str(match.out),
+                "model": planned.model.plugin,
+                "model_settings": planned.model.settings,
+                **_keywords(self._guard(planned.task_plugins, planned.model, planned.defense)),
+                "data": [str(root) for roots in planned.pools.values() for root in roots],
+                "reports": reports_of(planned.task_plugins),
+                "out": str(planned.out),
                 "seed": self.config.seed,
-                "pools": {name: [str(root) for root in roots] for name, roots in match.pools.items()},
+                "pools": {name: [str(root) for root in roots] for name, roots in planned.pools.items()},
             },
         )
 
-    def _guard(self, contest: Contest, model: Entrant, defense: Entrant | None) -> Guard | None:
+    def _guard(self, task_plugins: TaskPlugins, model: Candidate, defense: Candidate | None) -> Guard | None:
         """Returns a defense of one network with the calibration data that it needs; None for no defense."""
         if defense is None:
             return None
         guard = Guard(defense=defense.plugin, settings=defense.settings)
-        if not defense.learns:
+        if not defense.needs_calibration:
             return guard
         return replace(
             guard,
-            calibration=str(self._lesson(contest, NO_PATCH)),
-            calibration_patched=str(self._lesson(contest, model.label)),
+            calibration=str(self._calibration_folder(task_plugins, NO_PATCH)),
+            calibration_patched=str(self._calibration_folder(task_plugins, model.label)),
         )
 
 
-def reports_of(contest: Contest) -> tuple[str, ...]:
+def reports_of(task_plugins: TaskPlugins) -> tuple[str, ...]:
     """Returns the names of the metric reports that the tables need: the report with the task's main metric, and
     `outside_patch`.
     """
-    product = build(find("task", contest.name))
-    metric_report, dot, _ = contest.task.metric.partition(".")
+    product = build(find("task", task_plugins.name))
+    metric_report, dot, _ = task_plugins.task.metric.partition(".")
     wanted = [metric_report] if dot and isinstance(product, Reports) else []
     return (*wanted, *([OUTSIDE_PATCH] if isinstance(product, Maskable) else []))
 

@@ -41,9 +41,9 @@ from gear.plugins.datasets import open_dataset
 from gear.values.errors import FieldError, GearError
 from gear.values.serial import Json
 from gear.verbs.bench.config import settings_of
-from gear.verbs.bench.plan import PATCH, Match, Plan
+from gear.verbs.bench.plan import PATCH, Plan, PlannedEvaluation
 from gear.verbs.bench.report import FOUND_SHARE, BenchReport, Result, TaskResult
-from gear.verbs.bench.validation import Contest
+from gear.verbs.bench.validation import TaskPlugins
 from gear.verbs.evaluate.report import Pool
 from gear.verbs.evaluate.table import metric_title
 
@@ -71,50 +71,52 @@ def write_records(report: BenchReport, plan: Plan, name: str, kind: Kind | None 
         GearError: a value cannot be part of a record.
     """
     written = []
-    for task, contest in zip(report.tasks, plan.contests, strict=True):
+    for task, task_plugins in zip(report.tasks, plan.plugins_of_tasks, strict=True):
         if task.metric is None:
             raise GearError(f"{task.name}: has no metric by which networks can be ranked, so there is no record")
-        for one, match in zip(task.results, plan.matches(contest), strict=True):
+        for one, planned in zip(task.results, plan.planned_evaluations(task_plugins), strict=True):
             try:
-                record = _record(task, one, match, plan, name, kind)
+                record = _record(task, one, planned, plan, name, kind)
             except FieldError as error:
                 raise GearError(
-                    f"{plan.name(match.model, match.defense)} of {task.name}: no record: {error}"
+                    f"{plan.name(planned.model, planned.defense)} of {task.name}: no record: {error}"
                 ) from error
             data = encoded(record)
-            label = f"{contest.folder}-{plan.name(match.model, match.defense)}-seed{record.benchmark.seed}"
+            label = f"{task_plugins.folder}-{plan.name(planned.model, planned.defense)}-seed{record.benchmark.seed}"
             relative = f"{RECORDS}/{label}.json"
             write_whole(report.out, relative, data)
             written.append(report.out / relative)
-        _copy_patches(plan, contest, report.out)
+        _copy_patches(plan, task_plugins, report.out)
     return written
 
 
-def _record(task: TaskResult, one: Result, match: Match, plan: Plan, name: str, kind: Kind | None) -> Record:
-    guard = guard_of(plan, match)
+def _record(
+    task: TaskResult, one: Result, planned: PlannedEvaluation, plan: Plan, name: str, kind: Kind | None
+) -> Record:
+    guard = guard_of(plan, planned)
     datasets = [open_dataset(row.dataset) for row in one.evaluation.rows]
-    data, samples, metric = _samples(task, one, match, plan, datasets)
-    config = reduced(plan, match)
+    data, samples, metric = _samples(task, one, planned, plan, datasets)
+    config = reduced(plan, planned)
     alone = next(other for other in task.results if other.model == one.model and other.defense is None)
     return Record(
         benchmark=Benchmark(name=printable(Path(name).stem), config=config, sha256=digest(config)),
-        entry=_entry(task, one, match, kind, random=is_random(match, guard, datasets[0], plan.config.seed)),
+        entry=_entry(task, one, planned, kind, random=is_random(planned, guard, datasets[0], plan.config.seed)),
         attack=_attack(plan),
         environment=_environment(one, datasets[0]),
         data=data,
         calibration=tuple(_calibration(plan, guard)),
-        patches=tuple(_patches(plan, match)),
+        patches=tuple(_patches(plan, planned)),
         results=tuple(_figures(task, one)),
-        reference=() if match.defense is None else tuple(_figures(task, alone)),
+        reference=() if planned.defense is None else tuple(_figures(task, alone)),
         sample_metric=metric,
         samples=samples,
         cost_s={key.removesuffix("_s"): value for key, value in one.pool(PATCH).cost.items()},
     )
 
 
-def guard_of(plan: Plan, match: Match) -> Guard | None:
+def guard_of(plan: Plan, planned: PlannedEvaluation) -> Guard | None:
     """The defense of an evaluation with its calibration data; None for a network alone."""
-    arguments = plan.evaluation(match).arguments
+    arguments = plan.evaluation(planned).arguments
     return Guard.of(
         arguments.get("defense"),
         arguments.get("defense_settings", ()),
@@ -123,7 +125,7 @@ def guard_of(plan: Plan, match: Match) -> Guard | None:
     )
 
 
-def reduced(plan: Plan, match: Match) -> Json:
+def reduced(plan: Plan, planned: PlannedEvaluation) -> Json:
     """The bench config with only one network and its defense, as JSON without folders of this machine.
 
     Paths keep only their last part: a town's file becomes its name, a scene of a file the bare name of the scene. Who
@@ -133,11 +135,13 @@ def reduced(plan: Plan, match: Match) -> Json:
     config["tasks"] = {
         task: {
             **bench,
-            "models": {match.model.label: bench["models"][match.model.label]},
-            "defenses": {} if match.defense is None else {match.defense.label: bench["defenses"][match.defense.label]},
+            "models": {planned.model.label: bench["models"][planned.model.label]},
+            "defenses": {}
+            if planned.defense is None
+            else {planned.defense.label: bench["defenses"][planned.defense.label]},
         }
         for task, bench in config["tasks"].items()
-        if task == match.contest.name
+        if task == planned.task_plugins.name
     }
     config["places"] = {
         Path(town).stem: [text.rpartition(":")[2] for text in scenes] for town, scenes in config["places"].items()
@@ -176,12 +180,12 @@ def plugin_facts(chosen: Chosen, weights_sha256: str | None = None) -> Plugin:
     )
 
 
-def _entry(task: TaskResult, one: Result, match: Match, kind: Kind | None, *, random: bool) -> Entry:
+def _entry(task: TaskResult, one: Result, planned: PlannedEvaluation, kind: Kind | None, *, random: bool) -> Entry:
     assert task.metric is not None
-    spec = None if match.defense is None else match.defense.chosen.found.spec
+    spec = None if planned.defense is None else planned.defense.chosen.found.spec
     assert spec is None or isinstance(spec, DefenseSpec)
-    network = plugin_facts(match.model.chosen, one.evaluation.facts["model"]["weights_sha256"])
-    defense = None if match.defense is None else plugin_facts(match.defense.chosen)
+    network = plugin_facts(planned.model.chosen, one.evaluation.facts["model"]["weights_sha256"])
+    defense = None if planned.defense is None else plugin_facts(planned.defense.chosen)
     trained = one.evaluation.facts["model"].get("trained_on", "")
     return Entry(
         kind=kind or ("model" if defense is None else "defense"),
@@ -197,14 +201,14 @@ def _entry(task: TaskResult, one: Result, match: Match, kind: Kind | None, *, ra
     )
 
 
-def is_random(match: Match, guard: Guard | None, dataset: Dataset[Any], seed: int) -> bool:
+def is_random(planned: PlannedEvaluation, guard: Guard | None, dataset: Dataset[Any], seed: int) -> bool:
     """Whether a defense gives another result for the first sample of a dataset if its random generator has another
     state.
     """
     if guard is None:
         return False
-    opened = open_guard(guard, [match.model.chosen], match.contest.name)
-    guarded = GuardedModel(match.model.chosen, opened, seed=seed)
+    opened = open_guard(guard, [planned.model.chosen], planned.task_plugins.name)
+    guarded = GuardedModel(planned.model.chosen, opened, seed=seed)
     return guarded.is_random(dataset[0].images)
 
 
@@ -243,10 +247,10 @@ def _data(dataset: Dataset[Any], scene: str, weather: str, patch: str) -> Data:
 
 
 def _samples(
-    task: TaskResult, one: Result, match: Match, plan: Plan, datasets: list[Dataset[Any]]
+    task: TaskResult, one: Result, planned: PlannedEvaluation, plan: Plan, datasets: list[Dataset[Any]]
 ) -> tuple[tuple[Data, ...], tuple[SampleResult, ...], str]:
     """The datasets, the results of all their samples, and the name of the metric of single samples."""
-    places = [(kind, *place) for kind in match.pools for place in plan.places()]
+    places = [(kind, *place) for kind in planned.pools for place in plan.places()]
     metric = sample_metric(task, one.evaluation.rows[0].per_sample[0]["metrics"])
     data, samples = [], []
     for number, ((kind, scene, weather), row, dataset) in enumerate(
@@ -287,19 +291,21 @@ def _calibration(plan: Plan, guard: Guard | None) -> Iterator[Data]:
             yield _data(open_dataset(root), plan.calibration.label, plan.weathers[0].label, patch)
 
 
-def _patches(plan: Plan, match: Match) -> Iterator[PatchFacts]:
+def _patches(plan: Plan, planned: PlannedEvaluation) -> Iterator[PatchFacts]:
     """Yields the patches that the entry sees, and those on which its defense is calibrated."""
-    contest = match.contest
-    targets = [match.model.label]
-    if match.defense is not None and match.defense in plan.looked_through(contest):
-        targets.append(plan.name(match.model, match.defense))
-    if match.defense is None and plan.config.transfer:
-        targets += [one.label for one in contest.models if one is not match.model]
-    learns = match.defense is not None and match.defense.learns and plan.calibration is not None
+    task_plugins = planned.task_plugins
+    targets = [planned.model.label]
+    if planned.defense is not None and planned.defense in plan.adaptive_defenses(task_plugins):
+        targets.append(plan.name(planned.model, planned.defense))
+    if planned.defense is None and plan.config.transfer:
+        targets += [one.label for one in task_plugins.models if one is not planned.model]
+    needs_calibration = (
+        planned.defense is not None and planned.defense.needs_calibration and plan.calibration is not None
+    )
     for target in targets:
-        is_learnt = learns and target == match.model.label
+        is_learnt = needs_calibration and target == planned.model.label
         for scene in (*plan.scenes, *([plan.calibration] if is_learnt and plan.calibration else [])):
-            folder = plan.patch(contest, scene, target)
+            folder = plan.patch(task_plugins, scene, target)
             facts: Any = load_json(folder / "attack.json")
             achieved = (facts.get("achieved") or {}).get("validation") or {}
             gain = (
@@ -326,13 +332,13 @@ def _pictures(folder: Path) -> list[Path]:
     return [found[number] for number in sorted(found)]
 
 
-def _copy_patches(plan: Plan, contest: Contest, root: Path) -> None:
+def _copy_patches(plan: Plan, task_plugins: TaskPlugins, root: Path) -> None:
     """Copies all patches of a task beside the records; each file's name is its hash."""
     scenes = (*plan.scenes, *([] if plan.calibration is None else [plan.calibration]))
-    for model in contest.models:
-        for defense in plan.looked_through(contest):
+    for model in task_plugins.models:
+        for defense in plan.adaptive_defenses(task_plugins):
             for scene in scenes:
-                folder = plan.patch(contest, scene, plan.name(model, defense))
+                folder = plan.patch(task_plugins, scene, plan.name(model, defense))
                 for path in _pictures(folder) if folder.is_dir() else []:
                     data = read_bytes(path)
                     write_whole(root, f"{RECORDS}/patches/{sha256(data)}.png", data)

@@ -33,14 +33,14 @@ from gear.verbs.bench.carry_out import carry_out
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig
 from gear.verbs.bench.page import page
-from gear.verbs.bench.plan import Match, Plan, Step
+from gear.verbs.bench.plan import Plan, PlannedEvaluation, Step
 from gear.verbs.bench.recording import write_records
 from gear.verbs.bench.report import COLUMNS, BenchReport, Metric, Result, SceneMetric, TaskResult
 from gear.verbs.bench.request import BenchRequest
 from gear.verbs.bench.scenes import calibration_scene, located, measured_scenes
 from gear.verbs.bench.schedule import OnStep, run_steps
 from gear.verbs.bench.table import text
-from gear.verbs.bench.validation import contests, find_attack
+from gear.verbs.bench.validation import find_attack, plugins_of_tasks
 from gear.verbs.evaluate.report import EvaluateReport
 
 CONFIG = "bench.yml"
@@ -114,6 +114,11 @@ def bench(
 def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | None = None) -> BenchReport:
     """Runs a benchmark with the arguments in `request`, which `gear.bench` describes.
 
+    Args:
+        request: arguments of the benchmark.
+        callbacks: progress and warnings.
+        on_step: called at the start of each step; None for no calls.
+
     Raises:
         GearError: an error that the user can correct; the message is one line.
     """
@@ -179,9 +184,9 @@ def _write(report: BenchReport, plan: Plan, root: Path) -> None:
     write_whole(root, "bench.csv", written.getvalue().encode())
     write_whole(root, "bench.json", dump_json(report.as_json()))
     write_whole(root, "table.txt", text(report).encode())
-    for task, contest in zip(report.tasks, plan.contests, strict=True):
+    for task, task_plugins in zip(report.tasks, plan.plugins_of_tasks, strict=True):
         if task.metric is not None:
-            write_whole(root, f"figures/{contest.folder}.pdf", chart(task, "pdf"))
+            write_whole(root, f"figures/{task_plugins.folder}.pdf", chart(task, "pdf"))
     write_whole(root, "report.html", page(report, plan).encode())
     clear_scratch(root)
 
@@ -204,7 +209,7 @@ def prepared(request: BenchRequest) -> Plan:
         read,
         scenes=scenes,
         calibration=calibration_scene(read, node, scenes),
-        contests=tuple(contests(read, node, attack=attacker, surfaces=surfaces, device=request.device)),
+        plugins_of_tasks=tuple(plugins_of_tasks(read, node, attack=attacker, surfaces=surfaces, device=request.device)),
         attack=attacker.spec,
         root=root,
         workers=_workers(request),
@@ -233,17 +238,17 @@ def _check_pictures(plan: Plan, node: Node) -> None:
     Raises:
         ConfigError: a key cannot be read, a weather is unknown, or a network expects another camera.
     """
-    for contest in plan.contests:
+    for task_plugins in plan.plugins_of_tasks:
         for weather in plan.weathers:
-            settings = (*plan.picture_settings(contest), *weather.settings)
+            settings = (*plan.picture_settings(task_plugins), *weather.settings)
             try:
-                config = load_collection(None, {"task": contest.name}, settings)
-                options = to_plain(read_node(contest.task.config, config.options, "options"))
+                config = load_collection(None, {"task": task_plugins.name}, settings)
+                options = to_plain(read_node(task_plugins.task.config, config.options, "options"))
                 find_weather(config.weather)
             except GearError as error:
-                raise located(node, error, "tasks", contest.name, "collect") from error
-        for model in contest.models:
-            at = ("tasks", contest.name, "models", model.label)
+                raise located(node, error, "tasks", task_plugins.name, "collect") from error
+        for model in task_plugins.models:
+            at = ("tasks", task_plugins.name, "models", model.label)
             try:
                 check_optics(model.chosen, options, "pictures are collected", f"--set {'.'.join(at)}.set.")
             except GearError as error:
@@ -252,11 +257,14 @@ def _check_pictures(plan: Plan, node: Node) -> None:
 
 def _report(plan: Plan, root: Path, evaluations: dict[str, EvaluateReport]) -> BenchReport:
     tasks = []
-    for contest in plan.contests:
-        spec = contest.task
+    for task_plugins in plan.plugins_of_tasks:
+        spec = task_plugins.task
         metric = Metric.of(spec.metric, lower_is_better=spec.lower_is_better) if spec.metric else None
-        results = [_result(match, metric, evaluations[str(match.out)], plan) for match in plan.matches(contest)]
-        tasks.append(TaskResult(name=contest.name, metric=metric, results=tuple(results)))
+        results = [
+            _result(planned, metric, evaluations[str(planned.out)], plan)
+            for planned in plan.planned_evaluations(task_plugins)
+        ]
+        tasks.append(TaskResult(name=task_plugins.name, metric=metric, results=tuple(results)))
     notes = [note for task in tasks for one in task.results for note in one.evaluation.facts.get("notes", [])]
     facts = {
         "config": to_plain(plan.config),
@@ -268,16 +276,16 @@ def _report(plan: Plan, root: Path, evaluations: dict[str, EvaluateReport]) -> B
     return BenchReport(out=root, facts=facts, tasks=tuple(tasks))
 
 
-def _result(match: Match, metric: Metric | None, evaluation: EvaluateReport, plan: Plan) -> Result:
-    places = [(kind, *place) for kind in match.pools for place in plan.places()]
+def _result(planned: PlannedEvaluation, metric: Metric | None, evaluation: EvaluateReport, plan: Plan) -> Result:
+    places = [(kind, *place) for kind in planned.pools for place in plan.places()]
     scenes = [
         SceneMetric(scene=scene.label, weather=weather.label, patch=kind, samples=row.samples, value=value)
         for (kind, scene, weather), row in zip(places, evaluation.rows, strict=True)
         if metric is not None and (value := metric.among(row.metrics)) is not None
     ]
     return Result(
-        model=match.model.label,
-        defense=None if match.defense is None else match.defense.label,
+        model=planned.model.label,
+        defense=None if planned.defense is None else planned.defense.label,
         evaluation=evaluation,
         scenes=tuple(scenes),
     )

@@ -42,8 +42,8 @@ def legend() -> str:
     return (
         "in brackets: 95 % intervals; change and AUROC: of a patch against a random one, and of a random one against "
         "none; outside patch: mean change of a picture, without the pixels of the patch where the task can leave them "
-        "out; p: two-sided p of a paired permutation test; hidden, misclassified, moved: shares of the objects found in "
-        "the twin; invented: detections per picture that neither an object nor the twin explains"
+        "out; p: two-sided p of a paired permutation test; hidden, misclassified, moved: shares of the objects "
+        "found in the twin; invented: detections per picture that neither an object nor the twin explains"
     )
 
 
@@ -68,7 +68,13 @@ def lines(task: TaskResult) -> Iterator[list[str]]:
 
 
 def line(task: TaskResult, one: Result, pool: Pool) -> list[str]:
-    """Returns the cells of one row, for one network (with its defense) and one kind of patch."""
+    """Returns the cells of one row, for one network (with its defense) and one kind of patch.
+
+    Args:
+        task: results of one task.
+        one: result of the network, alone or with a defense.
+        pool: metrics for one kind of patch.
+    """
     against = one.against(pool)
     outside = task.outside_patch(against)
     test = None if outside is None or not outside[1].pairs else outside[1]

@@ -16,12 +16,12 @@ from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError
 from gear.verbs.attack.models import check_attack
-from gear.verbs.bench.config import BenchConfig, Contestant, settings_of
+from gear.verbs.bench.config import BenchConfig, PluginConfig, settings_of
 from gear.verbs.bench.scenes import located
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Entrant:
+class Candidate:
     """A network or a defense of the benchmark, with its plugin.
 
     Attributes:
@@ -37,12 +37,12 @@ class Entrant:
     chosen: Chosen
 
     @property
-    def learns(self) -> bool:
+    def needs_calibration(self) -> bool:
         """Whether the entrant is a defense that needs calibration."""
         spec = self.chosen.found.spec
         return isinstance(spec, DefenseSpec) and spec.needs_calibration
 
-    def is_looked_through(self, attack: AttackSpec[object]) -> bool:
+    def supports_adaptive_attack(self, attack: AttackSpec[object]) -> bool:
         """Whether the entrant is a defense that changes pictures and supports the attack, so patches can be
         optimised against it.
 
@@ -55,7 +55,7 @@ class Entrant:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Contest:
+class TaskPlugins:
     """The networks and defenses of one task.
 
     Attributes:
@@ -66,8 +66,8 @@ class Contest:
 
     name: str
     task: TaskSpec[object]
-    models: tuple[Entrant, ...]
-    defenses: tuple[Entrant, ...]
+    models: tuple[Candidate, ...]
+    defenses: tuple[Candidate, ...]
 
     @property
     def folder(self) -> str:
@@ -75,13 +75,17 @@ class Contest:
         return self.name.replace("/", "-")
 
     @property
-    def guards(self) -> tuple[Entrant | None, ...]:
+    def guards(self) -> tuple[Candidate | None, ...]:
         """None, which stands for the networks alone, followed by every defense."""
         return (None, *self.defenses)
 
 
 def find_attack(config: BenchConfig, node: Node) -> PluginEntry:
     """Returns the attack plugin that makes the patches.
+
+    Args:
+        config: config of the benchmark.
+        node: the same config as a YAML tree, for the position in messages.
 
     Raises:
         ConfigError: there is no plugin of that name, or an option does not fit.
@@ -97,9 +101,9 @@ def find_attack(config: BenchConfig, node: Node) -> PluginEntry:
     return found
 
 
-def contests(
+def plugins_of_tasks(
     config: BenchConfig, node: Node, *, attack: PluginEntry, surfaces: int, device: str | None = None
-) -> Iterator[Contest]:
+) -> Iterator[TaskPlugins]:
     """Yields the networks and defenses of every task, checked against each other.
 
     Args:
@@ -121,14 +125,14 @@ def contests(
         assert isinstance(task, TaskSpec)
         models = _entrants("model", bench.models, node, ("tasks", name, "models"), device)
         defenses = _entrants("defense", bench.defenses, node, ("tasks", name, "defenses"), None)
-        one = Contest(name=name, task=task, models=models, defenses=defenses)
+        one = TaskPlugins(name=name, task=task, models=models, defenses=defenses)
         _check(one, attack, config, node, surfaces)
         yield one
 
 
 def _entrants(
-    kind: Kind, named: Mapping[str, Contestant], node: Node, at: tuple[str, ...], device: str | None
-) -> tuple[Entrant, ...]:
+    kind: Kind, named: Mapping[str, PluginConfig], node: Node, at: tuple[str, ...], device: str | None
+) -> tuple[Candidate, ...]:
     found = []
     for label, one in named.items():
         plugin, settings = one.plugin or label, tuple(settings_of(one.set))
@@ -139,11 +143,11 @@ def _entrants(
         except GearError as error:
             raise located(node, error, *at, label) from error
         assert chosen is not None
-        found.append(Entrant(label=label, plugin=plugin, settings=settings, chosen=chosen))
+        found.append(Candidate(label=label, plugin=plugin, settings=settings, chosen=chosen))
     return tuple(found)
 
 
-def _check(one: Contest, attack: PluginEntry, config: BenchConfig, node: Node, surfaces: int) -> None:
+def _check(one: TaskPlugins, attack: PluginEntry, config: BenchConfig, node: Node, surfaces: int) -> None:
     at = ("tasks", one.name)
     for model in one.models:
         spec = model.chosen.found.spec
@@ -165,7 +169,7 @@ def _check(one: Contest, attack: PluginEntry, config: BenchConfig, node: Node, s
             except GearError as error:
                 raise located(node, error, *at, "defenses", defense.label) from error
     for defense in one.defenses:
-        if defense.learns and config.calibration is None:
+        if defense.needs_calibration and config.calibration is None:
             problem = (
                 "must learn first: name a scene that is not measured in, such as "
                 "`calibration: {town: town10, scene: billboard03}`"

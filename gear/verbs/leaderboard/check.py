@@ -159,7 +159,7 @@ class _Counter:
 
 def _kinds(rerun: Rerun) -> list[str]:
     """The kinds of patches that can be measured again; patches of other networks (transfer) cannot."""
-    return [kind for kind in rerun.record.kinds() if kind in rerun.match.pools]
+    return [kind for kind in rerun.record.kinds() if kind in rerun.planned.pools]
 
 
 def _chosen(record: Record, request: CheckRequest) -> list[tuple[int, int]]:
@@ -192,7 +192,7 @@ def _compare_built(rerun: Rerun, record: Record) -> Iterator[Finding]:
     weights = rerun.guarded().weights_sha256
     if weights != record.entry.network.weights_sha256:
         yield finding("differs", "network: other weights than in the record")
-    if rerun.match.defense is None:
+    if rerun.planned.defense is None:
         return
     if rerun.guarded().is_random(rerun.pictures) and not record.entry.is_random:
         yield finding("differs", "defense: its results depend on its random generator, the record says they do not")
@@ -203,14 +203,14 @@ def _fresh(
 ) -> Iterator[Finding]:
     """Yields the findings about samples that are not part of the benchmark."""
     seed = int(derive_rng(request.seed, "leaderboard", "fresh").integers(1 << 31)) if secret is None else secret.seed
-    places = list(range(min(FRESH_PLACES, len(rerun.match.pools[NONE]), request.fresh)))
+    places = list(range(min(FRESH_PLACES, len(rerun.planned.pools[NONE]), request.fresh)))
     shares = {place: request.fresh // len(places) + (place < request.fresh % len(places)) for place in places}
     found = [
         count(one) for patch in _kinds(rerun) for place in places
         for one in rerun.fresh(patch, place, shares[place], seed)
     ]  # fmt: skip
     yield from compare_fresh(rerun.record, found, request.seed)
-    if secret is not None and secret.places and rerun.match.defense is not None:
+    if secret is not None and secret.places and rerun.planned.defense is not None:
         other = rerun.elsewhere((secret.places_setting,))
         defended, alone = (
             [one for patch in _kinds(rerun) for one in other.fresh(patch, 0, request.fresh, seed, with_defense=guarded)]

@@ -64,7 +64,7 @@ class Rerun:
     Attributes:
         record: the record.
         plan: plan of the benchmark, whose folders lie in a work folder.
-        match: the recorded network, with its defense if it has one.
+        planned: the recorded network, with its defense if it has one.
         network, defense: facts about the installed plugins; `defense` is None without a defense.
         pictures: (H, W, 3) uint8 pictures by camera name of the sample that was measured last.
         renderer: name, driver and device of the renderer that made them.
@@ -91,11 +91,13 @@ class Rerun:
         asked = tuple(settings)
         self.plan = _plan(work / "bench.yml", work / "bench", asked, device)
         self._asked, self._device = asked, device
-        (contest,) = self.plan.contests
+        (task_plugins,) = self.plan.plugins_of_tasks
         guarded = record.entry.defense is not None
-        self.match = next(one for one in self.plan.matches(contest) if (one.defense is not None) == guarded)
-        self.network = plugin_facts(self.match.model.chosen)
-        self.defense = None if self.match.defense is None else plugin_facts(self.match.defense.chosen)
+        self.planned = next(
+            one for one in self.plan.planned_evaluations(task_plugins) if (one.defense is not None) == guarded
+        )
+        self.network = plugin_facts(self.planned.model.chosen)
+        self.defense = None if self.planned.defense is None else plugin_facts(self.planned.defense.chosen)
         self.pictures: Mapping[str, UInt8Image] = {}
         self.renderer: Mapping[str, Any] = {}
         self._guarded: dict[bool, GuardedModel] = {}
@@ -118,18 +120,18 @@ class Rerun:
             GearError: a patch of the calibration is missing, or a plugin fails.
         """
         if with_defense not in self._guarded:
-            chosen, opened = self.match.model.chosen, UNGUARDED
-            guard = guard_of(self.plan, self.match) if with_defense else None
+            chosen, opened = self.planned.model.chosen, UNGUARDED
+            guard = guard_of(self.plan, self.planned) if with_defense else None
             if guard is not None:
                 if guard.calibration is not None:
                     self._calibration()
-                opened = open_guard(guard, [chosen], self.match.contest.name)
+                opened = open_guard(guard, [chosen], self.planned.task_plugins.name)
             self._guarded[with_defense] = GuardedModel(chosen, opened, seed=self.plan.config.seed)
         return self._guarded[with_defense]
 
     def pictures_of_calibration(self) -> int:
         """The number of pictures on which the defense is calibrated."""
-        guard = guard_of(self.plan, self.match)
+        guard = guard_of(self.plan, self.planned)
         both = (None, None) if guard is None else (guard.calibration, guard.calibration_patched)
         return self.plan.config.samples.calibrate * sum(one is not None for one in both)
 
@@ -139,7 +141,7 @@ class Rerun:
         Raises:
             GearError: a sample cannot be made, or a plugin fails.
         """
-        step = self._step(self.match.pools[patch][place])
+        step = self._step(self.planned.pools[patch][place])
         dataset = self._part(step, self.data_of(patch)[place].samples, indices)
         return self._measured(dataset, patch, place, indices, self.guarded())
 
@@ -149,7 +151,7 @@ class Rerun:
         Raises:
             GearError: a sample cannot be made, or a plugin fails.
         """
-        root = self.match.pools[patch][place]
+        root = self.planned.pools[patch][place]
         step = self._step(root)
         out = self._work / "fresh" / root.relative_to(self._work)
         arguments = {**step.arguments, "seed": seed, "samples": count, "out": str(out)}
@@ -164,7 +166,7 @@ class Rerun:
             GearError: a place does not exist, or has more surfaces than the first scene.
         """
         other = Rerun(self.record, self._work / "withheld", self._patches, (*self._asked, *settings), self._device)
-        first = next(one for one in self.record.patches if one.target == self.match.model.label)
+        first = next(one for one in self.record.patches if one.target == self.planned.model.label)
         shown = [one for one in self.record.patches if one.scene == first.scene]
         facts = [replace(one, scene=scene.label) for scene in other.plan.scenes for one in shown]
         other.record = replace(self.record, patches=(*facts, *self.record.patches))

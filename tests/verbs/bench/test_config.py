@@ -90,7 +90,7 @@ def test_the_config_of_the_documentation_fits_together(tmp_path: Path, monkeypat
     page = (Path(__file__).parents[3] / "docs/how-to/run-a-bench.md").read_text()
     (tmp_path / "page.yml").write_text(page.split("```yaml bench\n")[1].split("```")[0])
     plan = prepared(tmp_path / "page.yml", out=tmp_path / "out")
-    assert [model.label for model in plan.contests[0].models] == ["ddrnet23_slim", "mine"]
+    assert [model.label for model in plan.plugins_of_tasks[0].models] == ["ddrnet23_slim", "mine"]
     assert len(plan.scenes) == 3 + 7 and len(plan.weathers) == 2
 
 

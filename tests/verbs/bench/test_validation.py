@@ -9,26 +9,26 @@ from gear.config.reader import read_node
 from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import ConfigError
 from gear.verbs.bench.config import BenchConfig
-from gear.verbs.bench.validation import Contest, contests, find_attack
+from gear.verbs.bench.validation import TaskPlugins, find_attack, plugins_of_tasks
 
 TASK = "tasks: {semseg: {models: {net: {plugin: ddrnet23_slim, set: {weights: none}}}%s}}\nplaces: {town10: []}\n"
 
 
-def checked(rest: str = "", defenses: str = "") -> tuple[PluginEntry, tuple[Contest, ...]]:
+def checked(rest: str = "", defenses: str = "") -> tuple[PluginEntry, tuple[TaskPlugins, ...]]:
     node = parse_text(TASK % defenses + rest, "b.yml")
     config = read_node(BenchConfig, node)
     attack = find_attack(config, node)
-    return attack, tuple(contests(config, node, attack=attack, surfaces=1, device="cpu"))
+    return attack, tuple(plugins_of_tasks(config, node, attack=attack, surfaces=1, device="cpu"))
 
 
 def test_entrants_keep_their_names_and_order() -> None:
-    attack, (contest,) = checked("attack: {plugin: eot}\n", ", defenses: {squeeze: {plugin: jpeg}, median: {}}")
+    attack, (task_plugins,) = checked("attack: {plugin: eot}\n", ", defenses: {squeeze: {plugin: jpeg}, median: {}}")
     assert attack.spec.name == "eot"
-    assert contest.name == "semseg"
-    assert [(one.label, one.plugin) for one in contest.models] == [("net", "ddrnet23_slim")]
-    assert [one.label for one in contest.defenses] == ["squeeze", "median"]
-    assert [None if one is None else one.label for one in contest.guards] == [None, "squeeze", "median"]
-    assert not contest.defenses[0].learns
+    assert task_plugins.name == "semseg"
+    assert [(one.label, one.plugin) for one in task_plugins.models] == [("net", "ddrnet23_slim")]
+    assert [one.label for one in task_plugins.defenses] == ["squeeze", "median"]
+    assert [None if one is None else one.label for one in task_plugins.guards] == [None, "squeeze", "median"]
+    assert not task_plugins.defenses[0].needs_calibration
 
 
 @pytest.mark.parametrize(
