@@ -41,7 +41,7 @@ def prepared(config: str | Path, *, out: Path, **given: Any) -> Plan:
         ("plugin: gaussian", "plugin: gausian", r"bench\.yml:8:7: tasks\.semseg\.defenses\.blur: .*gaussian"),
         ("small: {", "a/b: {", r"models: 'a/b' names folders and rows"),
         ("small: {", "random: {", r"bench\.yml:5:7: .*models: 'random' is a reserved name"),
-        ("small: {", "none: {", r"models: 'none' is what pictures"),
+        ("small: {", "none: {", r"models: 'none' is a reserved name"),
         (':double"', ':dubble"', r"bench\.yml:11:3: places\..*did you mean double"),
         (':double"', ':no_billboard"', r"neither a board nor the truck"),
         (':double"', ':board"', r"is named twice"),
