@@ -275,7 +275,7 @@ def test_the_farthest_depth_must_be_some_metres(tmp_path: Path, most: int) -> No
 def test_a_network_that_is_built_but_does_not_run_gets_one_line(tmp_path: Path, facts: dict[str, Any]) -> None:
     changed(**facts)(saved(lambda: depth_anything("metric"), tmp_path))
     model: Any = depth.build(DepthFolderOptions(folder=str(tmp_path), device="cpu"))
-    with pytest.raises(GearError, match="the network does not run on 140 x 70 pixels; see to ") as caught:
+    with pytest.raises(GearError, match="the network does not run on 140 x 70 pixels; check ") as caught:
         model.predict({"left": np.zeros((70, 140, 3), np.uint8)})
     assert str(caught.value).startswith(str(tmp_path)) and "\n" not in str(caught.value)
 
