@@ -1,7 +1,7 @@
 """Processor time of a sample, of several commits in turns in one run.
 
-    git worktree add /tmp/old 60a9c83
-    python benchmarks/turns.py /tmp/old . --qualities fast film
+    git worktree add ../old 60a9c83
+    python benchmarks/turns.py ../old . --qualities fast film
 
 Each tree (a checkout of a commit) has a process of its own, which opens a world once and collects blocks of samples
 when it is asked to; the blocks of the trees alternate, so that other work on the machine disturbs all of them alike.
