@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from gear.verbs.verify.run import verify
     from gear.verbs.weights.average import average_weights
     from gear.verbs.weights.convert import ConvertReport, convert_weights
+    from gear.view.rerun_recording import to_rerun
     from gear.view.write import ViewReport, write_view
 
 __all__ = [
@@ -91,6 +92,7 @@ __all__ = [
     "open_twins",
     "read_town",
     "sheet",
+    "to_rerun",
     "towns",
     "train",
     "verify",
@@ -141,6 +143,7 @@ _HOME = {
     "open_twins": "gear.plugins.datasets",
     "read_town": "gear.verbs.towns.facts",
     "sheet": "gear.verbs.sheet",
+    "to_rerun": "gear.view.rerun_recording",
     "towns": "gear.verbs.towns.facts",
     "train": "gear.verbs.train.run",
     "verify": "gear.verbs.verify.run",

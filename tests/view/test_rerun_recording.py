@@ -1,0 +1,37 @@
+"""Datasets in Rerun, with the real package where it is installed."""
+
+from __future__ import annotations
+
+import builtins
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import gear
+from gear.values.errors import GearError
+
+
+def test_a_dataset_becomes_a_recording(write_dataset: Any, tmp_path: Path) -> None:
+    rerun = pytest.importorskip("rerun")
+    root = write_dataset("depth", 2)
+    recording = gear.to_rerun(root, tmp_path / "a.rrd", samples=1)
+    assert isinstance(recording, rerun.RecordingStream)
+    recording.disconnect()
+    data = (tmp_path / "a.rrd").read_bytes()
+    assert data.startswith(b"RR") and len(data) > 20_000  # the picture and two previews
+    for path in (b"/world/left/image", b"/preview/depth", b"/world/actors", b"/world/surfaces"):
+        assert path in data or path.lstrip(b"/") in data
+
+
+def test_without_rerun_it_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    load = builtins.__import__
+
+    def missing(name: str, *given: Any, **named: Any) -> Any:
+        if name == "rerun":
+            raise ImportError(name)
+        return load(name, *given, **named)
+
+    monkeypatch.setattr(builtins, "__import__", missing)
+    with pytest.raises(GearError, match=r"pip install 'mujoco-gear\[rerun\]'"):
+        gear.to_rerun(tmp_path, tmp_path / "a.rrd")
