@@ -33,7 +33,7 @@ LEAST_SCORE = 0.3
 """Score from which a detection counts for recall."""
 
 
-def annotations(samples: Iterable[Any], categories: tuple[int, ...]) -> dict[str, Any]:
+def ground_truth_of(samples: Iterable[Any], categories: tuple[int, ...]) -> dict[str, Any]:
     """COCO's ground truth of one class that joins several categories; objects that do not count are ignored."""
     found: list[dict[str, Any]] = []
     pictures = []
@@ -57,7 +57,7 @@ def annotations(samples: Iterable[Any], categories: tuple[int, ...]) -> dict[str
     return {"images": pictures, "annotations": found, "categories": [{"id": 1}], "info": {}}
 
 
-def detections(predictions: Iterable[Any], categories: tuple[int, ...]) -> list[dict[str, Any]]:
+def results_of(predictions: Iterable[Any], categories: tuple[int, ...]) -> list[dict[str, Any]]:
     """COCO's results of one class that joins several categories."""
     return [
         {
@@ -99,7 +99,7 @@ def main(weights: str, roots: list[str]) -> None:
         found = [model.predict(sample.images) for sample in samples]
         cells = []
         for categories in (PEOPLE, VEHICLES):
-            value, recall, count = ap50(annotations(samples, categories), detections(found, categories))
+            value, recall, count = ap50(ground_truth_of(samples, categories), results_of(found, categories))
             cells.append(f"{value:.3f} ({count}, {recall:.2f})")
         print(f"{Path(root).name} | {cells[0]} | {cells[1]}", flush=True)
 

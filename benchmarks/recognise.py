@@ -24,6 +24,7 @@ import torch
 import gear
 from gear.formats.coco import CATEGORY_NAMES
 from gear.networks import efficientnet_lite0, torchvision_import
+from gear.networks.efficientnet_lite0_official import from_official
 
 CLASSES: dict[str, frozenset[int]] = {
     "car": frozenset({407, 436, 468, 479, 511, 581, 609, 627, 656, 661, 717, 734, 751, 817}),
@@ -90,7 +91,7 @@ def classifier() -> torch.nn.Module:
     import timm
 
     published = efficientnet_lite0.published()
-    state = efficientnet_lite0.from_official(published)
+    state = from_official(published)
     for old, new in (("_conv_head", "conv_head"), ("_bn1", "bn2"), ("_fc", "classifier")):
         state.update({key.replace(old, new, 1): value for key, value in published.items() if key.startswith(f"{old}.")})
     network: torch.nn.Module = timm.create_model(efficientnet_lite0.NAME, pretrained=False)
