@@ -68,26 +68,31 @@ def on_grid(features: Tensor, grid: Cells) -> Tensor:
     return functional.interpolate(features[None], size=grid, mode="nearest")[0]
 
 
-def pooled_sizes(z: Tensor, grid: Cells, kernel: Cells) -> Tensor:
+def pooled_sizes(z: Tensor, grid: Cells, kernels: Sequence[Cells]) -> list[Tensor]:
     """Magnitudes of the mean z-scores in windows of the grid, averaged over channels and resized to the grid.
 
     Windows lie inside the grid, as published. Nearest-neighbour resizing and averaging over windows are both linear and
-    separable, so they are two matrix products. Their time does not depend on the size of the windows.
+    separable. Along the columns, windows are differences of cumulative sums, which are computed once for all sizes of
+    windows; along the rows, they are a matrix product. The time does not depend on the size of the windows.
 
     Args:
         z: (C, h, w) z-scores of any size.
         grid: rows and columns of the grid.
-        kernel: rows and columns of the windows, limited to those of the grid.
+        kernels: rows and columns of the windows of each result, limited to those of the grid.
 
     Returns:
-        (rows, columns) values of at least 0.
+        (rows, columns) values of at least 0 for each of `kernels`.
     """
-    down, across = (_window_means(*sizes) for sizes in zip(z.shape[1:], grid, kernel, strict=True))
-    sizes = torch.zeros(len(down), len(across))
+    kernels = [(min(kernel[0], grid[0]), min(kernel[1], grid[1])) for kernel in kernels]
+    columns = functional.interpolate(torch.arange(z.shape[2]).float()[None, None], size=grid[1], mode="nearest")
+    sizes = [torch.zeros(grid[0] - rows + 1, grid[1] - across + 1) for rows, across in kernels]
     for channels in torch.split(z, CHANNELS_AT_ONCE):
-        # In place, because a copy of the windows takes a sixth of the time.
-        sizes += (down @ channels @ across.T).abs_().sum(dim=0)
-    return on_grid(sizes[None] / len(z), grid)[0]
+        sums = functional.pad(channels[..., columns[0, 0].long()].cumsum(dim=-1), (1, 0))
+        for size, (rows, across) in zip(sizes, kernels, strict=True):
+            beside = (sums[..., across:] - sums[..., :-across]) / across
+            # In place, because a copy of the windows takes a sixth of the time.
+            size += (_window_means(z.shape[1], grid[0], rows) @ beside).abs_().sum(dim=0)
+    return [on_grid(size[None] / len(z), grid)[0] for size in sizes]
 
 
 def refined(pooled: Sequence[Tensor]) -> Tensor:

@@ -279,7 +279,8 @@ class ZMask:
         heats: dict[str, dict[str, Tensor]] = {"shallow": {}, "deep": {}}
         for name, features in maps.items():
             z = statistics[name].z_scores(features)
-            pooled = {rows: pooled_sizes(z, grid, (rows, 2 * rows)) for rows in {*shallow, *deep}}
+            every = sorted({*shallow, *deep})
+            pooled = dict(zip(every, pooled_sizes(z, grid, [(rows, 2 * rows) for rows in every]), strict=True))
             if name in layers.shallow:
                 heats["shallow"][name] = refined([pooled[rows] for rows in shallow])
             if name in layers.deep:

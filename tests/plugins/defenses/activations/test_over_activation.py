@@ -25,7 +25,7 @@ GRID = (ROWS, COLUMNS)
 
 
 def heat(z: torch.Tensor, kernels: list[tuple[int, int]]) -> torch.Tensor:
-    return refined([pooled_sizes(z, GRID, kernel) for kernel in kernels])
+    return refined(pooled_sizes(z, GRID, kernels))
 
 
 def noise(seed: int, channels: int = 5) -> torch.Tensor:
@@ -46,7 +46,7 @@ def test_pooled_sizes_are_those_of_torch_s_own_pooling(
     inside = (min(kernel[0], ROWS), min(kernel[1], COLUMNS))
     pooled = functional.avg_pool2d(on, inside, stride=1).abs()
     expected = functional.interpolate(pooled, size=GRID, mode="nearest")[0].mean(dim=0)
-    assert torch.allclose(pooled_sizes(z, GRID, kernel), expected, atol=1e-5)
+    assert torch.allclose(pooled_sizes(z, GRID, [kernel])[0], expected, atol=1e-5)
 
 
 def test_kernels_refine_one_another_as_published() -> None:
@@ -89,8 +89,8 @@ def test_statistics_are_those_of_the_grid() -> None:
 
 def test_channels_are_pooled_in_portions_to_the_same_end() -> None:
     z = noise(2, channels=150)
-    alone = torch.stack([pooled_sizes(one[None], GRID, (4, 8)) for one in z]).mean(dim=0)
-    assert torch.allclose(pooled_sizes(z, GRID, (4, 8)), alone, atol=1e-5)
+    alone = torch.stack([pooled_sizes(one[None], GRID, [(4, 8)])[0] for one in z]).mean(dim=0)
+    assert torch.allclose(pooled_sizes(z, GRID, [(4, 8)])[0], alone, atol=1e-5)
 
 
 def test_pictures_are_averaged_not_pooled() -> None:
