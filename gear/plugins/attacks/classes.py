@@ -28,7 +28,7 @@ def check_classes(source_class: str, target: str) -> None:
 
 
 def check_seen(source_class: str, dataset: Sequence[Any]) -> None:
-    """Checks that the ground truth of at least one sample contains the attacked class; an empty name passes.
+    """Checks that the ground truth of at least one sample contains the class `source_class`; an empty name passes.
 
     Args:
         source_class: name of a Cityscapes class, or "".

@@ -33,5 +33,5 @@ def test_the_attacked_class_must_occur() -> None:
     samples = [SimpleNamespace(label_ids=np.full((2, 2), LABEL_IDS["road"], np.uint8))]
     check_seen("road", samples)
     check_seen("", samples)
-    with pytest.raises(GearError, match="none of the 1 pictures shows car"):
+    with pytest.raises(GearError, match="none of the 1 pictures show car"):
         check_seen("car", samples)
