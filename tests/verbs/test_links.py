@@ -23,8 +23,11 @@ VERBS = ["collect", "evaluate", "attack", "train", "defend", "gap", "bench", "ex
 SINGLE_FILES = {"sheet", "towns", "view"}
 """Commands that write one or two files beside others, each by `write_alone`, and delete nothing."""
 
-NOTHING = {"new", "show-config"}
-"""Commands that refuse a folder that exists (tests/verbs/scaffold/test_write.py), or that write nothing."""
+NEW_FOLDERS = {"import", "new"}
+"""Commands that refuse a folder with files in it (`gear.dataset.whole_tree` and tests/verbs/scaffold/test_write.py)."""
+
+NOTHING = {"show-config"}
+"""Commands that write nothing."""
 
 DRIVES = f"""
 drivers: {{truth: {{controller: truth}}}}
@@ -117,7 +120,7 @@ def has_out(parser: argparse.ArgumentParser) -> bool:
 def test_every_command_with_an_output_folder_is_tested() -> None:
     (commands,) = (one for one in full_parser()._actions if isinstance(one, argparse._SubParsersAction))
     with_out = {name for name, parser in commands.choices.items() if has_out(parser)}
-    assert with_out == {*VERBS, *SINGLE_FILES, *NOTHING}
+    assert with_out == {*VERBS, *SINGLE_FILES, *NEW_FOLDERS, *NOTHING}
 
 
 @pytest.mark.parametrize(
