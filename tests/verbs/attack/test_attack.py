@@ -273,7 +273,7 @@ def test_the_best_patches_are_held_to_the_promise_too(small: Small, install: Ins
         ({"steps": 0}, "at least 1"),
         ({"defense": "bit_dept"}, "bit_depth"),
         ({"defense_settings": ["bits=3"]}, "there is no defense"),
-        ({"patience": 3}, "name some with --val"),
+        ({"patience": 3}, "needs validation data; give --val"),
         ({"compositor": "glue"}, "transport"),
         ({"settings": ["learning_rate=-1"]}, "learning_rate"),
     ],
