@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gear.verbs.attack.run import attack
     from gear.verbs.bench.report import BenchReport
     from gear.verbs.bench.run import bench
+    from gear.verbs.bench.sweep import SweepReport, sweep
     from gear.verbs.collect.run import collect
     from gear.verbs.defend.run import DefendReport, defend
     from gear.verbs.doctor import DoctorReport, doctor
@@ -65,6 +66,7 @@ __all__ = [
     "ImportReport",
     "MergeReport",
     "ModelFacts",
+    "SweepReport",
     "Town",
     "TownReport",
     "TrainReport",
@@ -92,6 +94,7 @@ __all__ = [
     "open_twins",
     "read_town",
     "sheet",
+    "sweep",
     "to_rerun",
     "towns",
     "train",
@@ -116,6 +119,7 @@ _HOME = {
     "ImportReport": "gear.verbs.import_archive.run",
     "MergeReport": "gear.verbs.merge",
     "ModelFacts": "gear.verbs.models",
+    "SweepReport": "gear.verbs.bench.sweep",
     "Town": "gear.verbs.towns.facts",
     "TownReport": "gear.verbs.towns.write",
     "TrainReport": "gear.verbs.train.run",
@@ -143,6 +147,7 @@ _HOME = {
     "open_twins": "gear.plugins.datasets",
     "read_town": "gear.verbs.towns.facts",
     "sheet": "gear.verbs.sheet",
+    "sweep": "gear.verbs.bench.sweep",
     "to_rerun": "gear.view.rerun_recording",
     "towns": "gear.verbs.towns.facts",
     "train": "gear.verbs.train.run",

@@ -186,6 +186,7 @@ class _Lines:
         with self._lock:
             self._title, self._detail, self._pace, self._channel = title, "", None, ""
             self._begun_s = time.monotonic()
+        self.write(f"gear {self._verb}: {title}")
 
     def detail(self, text: str) -> None:
         with self._lock:

@@ -15,6 +15,14 @@ th, td { text-align: left; padding: .25rem .7rem; white-space: nowrap; } th { bo
 tr.first td { border-top: 1px solid #c5ccd4; } img { max-width: 100%; height: auto; }
 .row { display: flex; flex-wrap: wrap; gap: .75rem; align-items: flex-start; } figure { margin: 0; }
 figcaption { font-size: .8rem; color: #5b6672; } .row img { border: 1px solid #c5ccd4; display: block; }
+td.grey { background: #e4e4e4; } td.reference { font-weight: 700; } td.worse { color: #b00000; }
+td.better { color: #007000; } td.same { color: #0000b0; } pre { white-space: pre-wrap; font-size: .8rem; }
+@media print {
+  @page { size: A4 landscape; margin: 10mm; } body { max-width: none; margin: 0; padding: 0; font-size: 10px; }
+  .wide { overflow: visible; } table { width: 100%; font-size: 7px; } td.grey { print-color-adjust: exact; }
+  th, td { white-space: normal; padding: .15rem .25rem; overflow-wrap: anywhere; } h2, h3 { break-after: avoid; }
+  tr, figure, img { break-inside: avoid; }
+}
 """
 
 POLICY = "default-src 'none'; img-src {sources}; style-src 'unsafe-inline'"

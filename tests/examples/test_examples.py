@@ -12,7 +12,10 @@ import cv2
 import numpy as np
 import pytest
 
+from gear.config.nodes import parse_file
+from gear.config.reader import read_node
 from gear.dataset.locks import dataset_lock
+from gear.verbs.bench.config import BenchConfig
 from tests.shared import shared_folder
 
 ROOT = Path(__file__).parents[2]
@@ -221,3 +224,35 @@ def test_the_wheel_can_write_new_packages(home: Path) -> None:
     for kind in ("task", "model", "attack", "defense", "metric"):
         assert gear(home, "new", kind, "my_thing").startswith(f"gear-{kind}-my-thing: ")
         assert (home / f"empty/gear-{kind}-my-thing/src/gear_{kind}_my_thing/my_thing.py").is_file()
+
+
+BENCH = """
+tasks:
+  depth:
+    models: {net: {plugin: ddrnet23_slim_depth, set: {weights: none}}}
+    defenses: {jpeg_tv: {}}
+places: {TOWN: ["SCENES:board"]}
+samples: {attack: 1, choose: 1, measure: 2}
+attack: {steps: 1}
+adaptive: true
+collect: {renderer: classic, quality: fast, options: {width_px: 256, height_px: 128}}
+"""
+
+
+def test_a_wheel_of_a_defense_gets_a_row_with_two_commands(home: Path) -> None:
+    text = BENCH.replace("TOWN", TOWN[1]).replace("SCENES", SCENES.partition("=")[2])
+    (home / "empty/row.yml").write_text(text)
+    gear(home, "bench", "row.yml", "--out", "row", "--record")
+    assert "2 rows, " in gear(home, "leaderboard", "build", "row/records", "--out", "site")
+    record = json.loads((home / "empty/row/records/depth-net+jpeg_tv-seed0.json").read_text())
+    package = record["entry"]["defense"]
+    assert package["package"] == "gear-defense-jpeg-tv" and package["wheel_sha256"] and record["entry"]["licence"]
+    board = json.loads((home / "empty/site/board.json").read_text())
+    assert {row["defense"] for row in board["tables"][0]["rows"]} == {"-", "jpeg_tv (gear-defense-jpeg-tv 0.1.0)"}
+
+
+def test_shipped_benches_of_examples_can_be_read() -> None:
+    paths = sorted((ROOT / "examples").glob("*/bench.yml"))
+    assert paths
+    for path in paths:
+        assert read_node(BenchConfig, parse_file(path)).adaptive, "a row needs an adaptive attack"

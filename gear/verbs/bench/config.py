@@ -26,6 +26,9 @@ TAKEN = frozenset(CONTROLS)
 
 MOST_SAMPLES = 100_000
 
+MOST_VALUES = 100
+"""Largest number of values, and of seeds, of a sweep."""
+
 
 def _nothing() -> Node:
     return MappingNode({}, Place("defaults"))
@@ -132,6 +135,31 @@ class Calibration:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Sweep:
+    """A key of the config that takes several values, one benchmark for each; `gear bench` plots the results.
+
+    Attributes:
+        key: name of the key, such as `samples.attack`.
+        values: values as YAML texts, such as `24` or `[ClearNoon]`.
+        seeds: number of benchmarks for each value, with the seeds `seed`, `seed + 1`, and so on.
+        title: title of the axis; by default the key.
+    """
+
+    key: str
+    values: tuple[str, ...]
+    seeds: int = 1
+    title: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.values or len(self.values) > MOST_VALUES:
+            raise FieldError("values", f"must be 1 to {MOST_VALUES} values, got {len(self.values)}")
+        if not 1 <= self.seeds <= MOST_VALUES:
+            raise FieldError("seeds", f"must be 1 to {MOST_VALUES}, got {self.seeds}")
+        if self.key.partition(".")[0] in ("sweep", "seed", ""):
+            raise FieldError("key", f"{self.key!r} cannot be swept; name another key, such as samples.attack")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BenchConfig:
     """The configuration of a whole benchmark.
 
@@ -146,6 +174,7 @@ class BenchConfig:
         adaptive: whether patches are also optimised against each network behind each defense that supports this attack.
         seed: seed of all random draws.
         collect: further collection settings for all tasks (`gear show-config` prints the keys).
+        sweep: a key that takes several values; None for a single benchmark.
     """
 
     tasks: dict[str, TaskBench]
@@ -158,6 +187,7 @@ class BenchConfig:
     adaptive: bool = False
     seed: int = 0
     collect: Node = field(default_factory=_nothing)
+    sweep: Sweep | None = None
 
     def __post_init__(self) -> None:
         for name, what in (("tasks", "task"), ("places", "town"), ("weathers", "weather")):

@@ -13,6 +13,7 @@ from urllib.parse import quote
 import cv2
 import numpy as np
 
+from gear.config.dump import to_yaml
 from gear.contracts.tasks import NO_PATCH
 from gear.dataset.files import read_bytes
 from gear.formats.png import decode_rgb
@@ -21,6 +22,8 @@ from gear.reporting.html_table import Cell, Link, html_table, safe
 from gear.reporting.report_page import report_page
 from gear.values.frames import UInt8Image
 from gear.verbs.bench.chart import chart
+from gear.verbs.bench.paper_page import paper_table
+from gear.verbs.bench.paper_tables import paper_tables
 from gear.verbs.bench.plan import Plan, Weather
 from gear.verbs.bench.report import BenchReport, TaskResult
 from gear.verbs.bench.scenes import Scene
@@ -37,7 +40,9 @@ def page(report: BenchReport, plan: Plan) -> str:
     facts = report.facts
     counts = plan.config.samples
     where = f"{len(facts['scenes'])} scene{'s' * (len(facts['scenes']) > 1)}, {', '.join(facts['weathers'])}"
+    versions = ", ".join(f"{name} {text}" for name, text in facts["versions"].items())
     parts = [
+        f'<p class="dim">{safe(facts["command"])}; seed {facts["seed"]}; {safe(versions)}</p>',
         f"<p>{safe(where)}; {counts.measure} pictures of each scene and weather for every kind of patch. Patches: "
         f"{safe(plan.config.attack.plugin)} on {counts.attack} other pictures of a scene in each weather.</p>",
         f'<p class="dim">{safe(legend())}.</p>',
@@ -50,7 +55,9 @@ def page(report: BenchReport, plan: Plan) -> str:
             name = safe(f"bars of {task.metric.title} by network, defense and patch")
             parts.append(f'<p><img alt="{name}" src="data:image/svg+xml;base64,{drawn}"></p>')
         parts += [_scenes(task, report.out), *_pictures(plan, task_plugins)]
-    return report_page("gear bench", parts)
+    parts += [paper_table(table) for table in paper_tables(report)]
+    parts.append(f"<h2>Config</h2><pre>{safe(to_yaml(plan.config))}</pre>")
+    return report_page(report.title, parts)
 
 
 def _table(task: TaskResult) -> str:

@@ -92,12 +92,14 @@ class Result:
         model, defense: names in the config; `defense` is None for the network alone.
         evaluation: the evaluation with all metrics.
         scenes: the task's main metric in each scene.
+        changes_pictures: whether the defense changes pictures; a defense that only detects patches does not.
     """
 
     model: str
     defense: str | None
     evaluation: EvaluateReport
     scenes: tuple[SceneMetric, ...]
+    changes_pictures: bool = True
 
     def pool(self, patch: str) -> Pool:
         """Returns the results over all scenes with one kind of patch.
@@ -140,8 +142,8 @@ class TaskResult:
         """
         return None if self.metric is None else self.metric.among(pool.metrics)
 
-    def change(self, one: Difference | None) -> Estimate | None:
-        """Returns the change of the task's main metric between two pools; None if it is missing."""
+    def effect(self, one: Difference | None) -> Estimate | None:
+        """Returns the change of the task's main metric between two pools of one evaluation; None if it is missing."""
         return None if self.metric is None or one is None else self.metric.among(one.metrics)
 
     def outside_patch(self, one: Difference | None) -> tuple[str, PairedTest] | None:
@@ -175,12 +177,19 @@ class BenchReport:
 
     def as_json(self) -> Json:
         """Returns the content of bench.json."""
+        from gear.verbs.bench.report_json import task_json  # which needs the classes of this module
+
         return {
             "format": "gear-bench",
             "version": 1,
             **self.facts,
-            "tasks": {task.name: _task_json(task, self.out) for task in self.tasks},
+            "tasks": {task.name: task_json(task, self.out) for task in self.tasks},
         }
+
+    @property
+    def title(self) -> str:
+        """The title of the report: the name of the bench config."""
+        return f"gear bench {self.facts['name']}"
 
     def records(self) -> Iterator[Mapping[str, Json]]:
         """Yields the lines of bench.csv as flat records.
@@ -204,35 +213,3 @@ class BenchReport:
                 for at in one.scenes:
                     where = {"scene": at.scene, "weather": at.weather, "patch": at.patch, "samples": at.samples}
                     yield {**who, **where, "metric": metric, **at.value.as_json()}
-
-
-def _task_json(task: TaskResult, out: Path) -> Json:
-    metric = task.metric
-    return {
-        "metric": None if metric is None else {"name": metric.title, "lower_is_better": metric.lower_is_better},
-        "results": [_result_json(task, one, out) for one in task.results],
-    }
-
-
-def _result_json(task: TaskResult, one: Result, out: Path) -> Json:
-    pools = {}
-    for pool in one.evaluation.pools:
-        against = one.against(pool)
-        value, change, outside = task.value(pool), task.change(against), task.outside_patch(against)
-        pools[pool.name] = {
-            "samples": pool.samples,
-            "value": None if value is None else value.as_json(),
-            "against": None if against is None else against.against,
-            "change": None if change is None else change.as_json(),
-            "outside_patch": None if outside is None else {"metric": outside[0], **outside[1].as_json()},
-            "auroc": None if against is None or against.auroc is None else against.auroc.as_json(),
-            "defense": dict(pool.as_json()["defense"]),
-            "cost": dict(pool.cost),
-            **({} if against is None or against.objects is None else {"objects": against.objects.as_json()}),
-        }
-    return {
-        "model": one.model,
-        "defense": one.defense,
-        "evaluation": one.evaluation.out.relative_to(out).as_posix(),
-        "patches": pools,
-    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,6 +33,18 @@ class BenchRequest:
     def __post_init__(self) -> None:
         if self.workers != "auto" and self.workers < 1:
             raise GearError(f"workers must be at least 1, got {self.workers}")
+
+    @property
+    def name(self) -> str:
+        """The name of the config, without folder and ending."""
+        return Path(self.config).stem
+
+    @property
+    def command(self) -> str:
+        """The command line that makes the same results, without folders of this machine."""
+        config = self.config if Path(self.config).name == str(self.config) else Path(self.config).name
+        settings = [word for text in self.settings for word in ("--set", text)]
+        return shlex.join(["gear", "bench", str(config), *settings])
 
     @property
     def is_scheduled(self) -> bool:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from gear.collecting.job import versions
 from gear.collecting.lookup import find_weather
@@ -29,10 +30,14 @@ from gear.networks.runtime import has_cuda
 from gear.reporting.display import displayed
 from gear.values.errors import GearError
 from gear.values.progress import Callbacks, Progress, Warn
+from gear.verbs.bench.all_metrics import COLUMNS as METRIC_COLUMNS
+from gear.verbs.bench.all_metrics import metric_records
 from gear.verbs.bench.carry_out import carry_out
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig
+from gear.verbs.bench.latex import document, tabular
 from gear.verbs.bench.page import page
+from gear.verbs.bench.paper_tables import paper_tables
 from gear.verbs.bench.plan import Plan, PlannedEvaluation, Step
 from gear.verbs.bench.recording import write_records
 from gear.verbs.bench.report import COLUMNS, BenchReport, Metric, Result, SceneMetric, TaskResult
@@ -123,18 +128,20 @@ def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | Non
         GearError: an error that the user can correct; the message is one line.
     """
     plan, root = prepared(request), Path(request.out)
+    if plan.config.sweep is not None:
+        raise GearError(f"{request.config}: sweeps {plan.config.sweep.key}; gear.sweep runs it, or say sweep=")
     config = to_yaml(plan.config).encode()
     with exclusive_lock(root, callbacks.on_warning):
         if not (root / CONFIG).exists():  # an existing config belongs to the existing reports
             write_whole(root, CONFIG, config)
         steps = list(plan.steps())
         carried_out = _scheduled if request.is_scheduled else _in_turn
-        report = _report(plan, root, carried_out(steps, root, request, callbacks, on_step))
+        report = _report(plan, root, request, carried_out(steps, root, request, callbacks, on_step))
         write_whole(root, CONFIG, config)
         _write(report, plan, root)
         if request.record:
             kind = None if request.record is True else request.record
-            write_records(report, plan, Path(request.config).stem, kind)
+            write_records(report, plan, request.name, kind)
     return report
 
 
@@ -177,18 +184,30 @@ def _engine(request: BenchRequest, workers: int, *, gpus: int = 0) -> Executor:
 
 def _write(report: BenchReport, plan: Plan, root: Path) -> None:
     """Writes the reports into the folder of the bench."""
-    written = io.StringIO()
-    table = csv.DictWriter(written, COLUMNS, lineterminator="\n")
-    table.writeheader()
-    table.writerows(report.records())
-    write_whole(root, "bench.csv", written.getvalue().encode())
+    write_whole(root, "bench.csv", _csv(COLUMNS, report.records()))
     write_whole(root, "bench.json", dump_json(report.as_json()))
+    metrics = list(metric_records(report))
+    write_whole(root, "metrics.csv", _csv(METRIC_COLUMNS, metrics))
+    write_whole(root, "metrics.json", dump_json(metrics))
+    tables = paper_tables(report)
+    for one in tables:
+        write_whole(root, f"tables/{one.name}.tex", tabular(one).encode())
+    write_whole(root, "tables/tables.tex", document(tables, report.title).encode())
     write_whole(root, "table.txt", text(report).encode())
     for task, task_plugins in zip(report.tasks, plan.plugins_of_tasks, strict=True):
         if task.metric is not None:
             write_whole(root, f"figures/{task_plugins.folder}.pdf", chart(task, "pdf"))
     write_whole(root, "report.html", page(report, plan).encode())
     clear_scratch(root)
+
+
+def _csv(columns: Sequence[str], records: Iterable[Mapping[str, Any]]) -> bytes:
+    """Encodes flat records as CSV with a line of titles."""
+    written = io.StringIO()
+    table = csv.DictWriter(written, columns, lineterminator="\n")
+    table.writeheader()
+    table.writerows(records)
+    return written.getvalue().encode()
 
 
 def prepared(request: BenchRequest) -> Plan:
@@ -255,7 +274,7 @@ def _check_pictures(plan: Plan, node: Node) -> None:
                 raise located(node, error, *at) from error
 
 
-def _report(plan: Plan, root: Path, evaluations: dict[str, EvaluateReport]) -> BenchReport:
+def _report(plan: Plan, root: Path, request: BenchRequest, evaluations: dict[str, EvaluateReport]) -> BenchReport:
     tasks = []
     for task_plugins in plan.plugins_of_tasks:
         spec = task_plugins.task
@@ -270,6 +289,9 @@ def _report(plan: Plan, root: Path, evaluations: dict[str, EvaluateReport]) -> B
         "config": to_plain(plan.config),
         "scenes": [scene.label for scene in plan.scenes],
         "weathers": [weather.label for weather in plan.weathers],
+        "name": request.name,
+        "command": request.command,
+        "seed": plan.config.seed,
         "versions": versions(),
         "notes": list(dict.fromkeys(notes)),
     }
@@ -288,4 +310,5 @@ def _result(planned: PlannedEvaluation, metric: Metric | None, evaluation: Evalu
         defense=None if planned.defense is None else planned.defense.label,
         evaluation=evaluation,
         scenes=tuple(scenes),
+        changes_pictures=planned.defense is not None and planned.defense.changes_pictures,
     )

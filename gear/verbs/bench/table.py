@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gear.measuring.text_table import number_table
+from gear.verbs.bench.gains import against_clean, gain, is_failed
 from gear.verbs.bench.report import BenchReport, Result, TaskResult
 from gear.verbs.evaluate.report import Difference, Pool
 from gear.verbs.evaluate.table import number, shown
@@ -19,6 +20,9 @@ OBJECT_COLUMNS = {
 """Column titles for tasks with detected objects, each with the key of the count in `ObjectChanges.counts`."""
 
 REST = ("AUROC", "mask IoU", "s/picture")
+
+FAILED = " (failed)"
+"""Mark of an optimised patch that is no worse than a random one."""
 
 ALONE = "-"
 """Text of the cell `defense` for a network without a defense."""
@@ -40,10 +44,14 @@ def title(task: TaskResult) -> str:
 def legend() -> str:
     """Returns one line that explains the columns of the tables."""
     return (
-        "in brackets: 95 % intervals; change and AUROC: of a patch against a random one, and of a random one against "
-        "none; outside patch: mean change of a picture, without the pixels of the patch where the task can leave them "
-        "out; p: two-sided p of a paired permutation test; hidden, misclassified, moved: shares of the objects "
-        "found in the twin; invented: detections per picture that neither an object nor the twin explains"
+        "in brackets: 95 % intervals; change: against the network without a defense and without a patch; gain: against "
+        "the network without a defense under the same kind of patch (adaptive patches: under the patches against the "
+        "network alone), so without a patch it is what the defense costs; outside patch, p, objects and AUROC: of a "
+        "patch against a random one, and of a random one against none, behind the same defense; outside patch: mean "
+        "change of a picture, without the pixels of the patch where the task can leave them out; p: two-sided p of a "
+        "paired permutation test; hidden, misclassified, moved: shares of the objects found in the twin; invented: "
+        "detections per picture that neither an object nor the twin explains; (failed): the patches are no worse than "
+        "random ones, or only by chance (p above 0.05)"
     )
 
 
@@ -57,7 +65,7 @@ def columns(task: TaskResult) -> list[list[str]]:
 def head(task: TaskResult) -> list[str]:
     """Returns the column titles of a task's table."""
     metric = "" if task.metric is None else task.metric.title
-    return ["network", "defense", "patch", metric, "change", "outside patch", "p", *OBJECT_COLUMNS, *REST]
+    return ["network", "defense", "patch", metric, "change", "gain", "outside patch", "p", *OBJECT_COLUMNS, *REST]
 
 
 def lines(task: TaskResult) -> Iterator[list[str]]:
@@ -81,9 +89,10 @@ def line(task: TaskResult, one: Result, pool: Pool) -> list[str]:
     return [
         one.model,
         one.defense or ALONE,
-        pool.name,
+        pool.name + FAILED * is_failed(task, one, pool),
         shown(task.value(pool)),
-        shown(task.change(against), is_signed=True),
+        shown(against_clean(task, one, pool), is_signed=True),
+        shown(gain(task, one, pool), is_signed=True),
         "" if test is None else number(test.mean, is_signed=True),
         "" if test is None else f"{test.p:.2g}",
         *(_rate(against, name) for name in OBJECT_COLUMNS.values()),

@@ -42,6 +42,12 @@ class Candidate:
         spec = self.chosen.found.spec
         return isinstance(spec, DefenseSpec) and spec.needs_calibration
 
+    @property
+    def changes_pictures(self) -> bool:
+        """Whether the entrant is a defense that returns other pictures; some only detect patches."""
+        spec = self.chosen.found.spec
+        return isinstance(spec, DefenseSpec) and "images" in spec.outputs
+
     def supports_adaptive_attack(self, attack: AttackSpec[object]) -> bool:
         """Whether the entrant is a defense that changes pictures and supports the attack, so patches can be
         optimised against it.

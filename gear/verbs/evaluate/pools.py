@@ -65,6 +65,7 @@ def pooled(rows: Sequence[EvaluatedDataset], pools: Pools, seed: int) -> Iterabl
                 for other in others
                 if _keys(found[other]) == _keys(members)
             ),
+            gathered={report: one.gathered(report) for report in one.scorer.reports},
         )
 
 

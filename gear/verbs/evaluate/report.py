@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from gear.measuring.metric_json import known_json
+from gear.measuring.statistics import Metrics as GatheredMetrics
 from gear.metrics.object_changes import ObjectChange
 from gear.values.serial import Json, to_json
 
@@ -266,6 +267,8 @@ class Pool:
             defense.
         differences: differences to the pools `none` and `random`, if these show the same scenes; `row` and `against`
             are names of pools.
+        gathered: the metrics of each report with their jackknife replicates, for differences to other evaluations of
+            the same scenes; not part of results.json.
     """
 
     name: str
@@ -275,6 +278,7 @@ class Pool:
     cost: Mapping[str, float]
     defense: Mapping[str, float]
     differences: tuple[Difference, ...]
+    gathered: Mapping[str, GatheredMetrics] = field(default_factory=dict, repr=False)
 
     def as_json(self) -> Json:
         """Returns the entry of the pool in results.json."""

@@ -84,7 +84,7 @@ def _check_metrics(report: BenchReport) -> None:
                 assert against is None
                 continue
             assert against is not None and against.against == ("none" if pool.name == "random" else "random")
-            control, change = task.value(one.pool(against.against)), task.change(against)
+            control, change = task.value(one.pool(against.against)), task.effect(against)
             assert control is not None and change is not None
             assert change.value == pytest.approx(value.value - control.value)
             found = task.outside_patch(against)
@@ -94,7 +94,8 @@ def _check_metrics(report: BenchReport) -> None:
 
 def _check_files(out: Path, report: BenchReport) -> None:
     assert sorted(path.name for path in out.iterdir()) == [
-        "bench.csv", "bench.json", "bench.yml", "data", "evaluations", "figures", "patches", "report.html", "table.txt",
+        "bench.csv", "bench.json", "bench.yml", "data", "evaluations", "figures", "metrics.csv", "metrics.json",
+        "patches", "report.html", "table.txt", "tables",
     ]  # fmt: skip
     written: Any = json.loads((out / "bench.json").read_text())
     assert written == json.loads(json.dumps(report.as_json()))
@@ -107,7 +108,7 @@ def _check_files(out: Path, report: BenchReport) -> None:
     assert {line["scene"] for line in lines} == {"all", "tiny-board", "tiny-double"}
     assert (out / "table.txt").read_text().startswith("semseg: miou (higher is better)\n")
     page = (out / "report.html").read_text()
-    against = "change and AUROC: of a patch against a random one, and of a random one against none"
+    against = "against the network without a defense and without a patch"
     assert all(against in shown for shown in (page, (out / "table.txt").read_text()))
     assert "other pictures of a scene in each weather" in page, "a patch is made on those of all weathers together"
     patched = 2 * 2  # against two networks, alone and behind a defense that is looked through
@@ -133,7 +134,9 @@ def test_the_command(tmp_path: Path, written: Callable[..., Path], capsys: pytes
     capsys.readouterr()
     assert main(["bench", config, "--out", out, "--json"]) == 0
     told = capsys.readouterr()
-    assert json.loads(told.out)["format"] == "gear-bench" and told.out.endswith("}\n") and told.err == ""
+    assert json.loads(told.out)["format"] == "gear-bench" and told.out.endswith("}\n")
+    begun = {line.partition("]")[0] for line in told.err.splitlines() if line.startswith("gear bench: [")}
+    assert len(begun) == len(listed), "without a terminal there is a line for each step"
     report = gear.bench(config, out=out)
     assert all(row.made == 0 for one in report.tasks[0].results for row in one.evaluation.rows)
     assert main(["bench", config, "--out", out, "--list", "--json"]) == 0

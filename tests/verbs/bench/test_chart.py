@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -34,3 +35,10 @@ def test_bars_without_an_interval_have_no_whisker() -> None:
 def test_what_nobody_measured_is_a_chart_without_bars() -> None:
     missing = Estimate(value=float("nan"))
     assert whiskers(missing, missing) == 0
+
+
+def test_the_pdf_embeds_truetype_fonts_at_the_width_of_a_column() -> None:
+    data = chart(task(Estimate(value=0.4), Estimate(value=0.2)), "pdf")
+    assert b"/Type3" not in data and b"/CIDFontType2" in data
+    found = re.search(rb"/MediaBox \[ 0 0 ([0-9.]+) ", data)
+    assert found is not None and 230 < float(found[1]) < 260, "3.5 inches are 252 points"

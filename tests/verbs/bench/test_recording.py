@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import json
 from collections.abc import Callable
@@ -48,6 +49,18 @@ def test_a_record_holds_what_a_check_needs(
     values = [note["metrics"]["task"]["miou"] for row in results["rows"] for note in row["per_sample"]]
     assert [sample.value for sample in record.samples] == values and record.sample_metric == "miou"
     assert str(tmp_path) not in encoded(record).decode() and "/tiny" not in encoded(record).decode()
+    table = (out / "tables/table1.tex").read_text()
+    assert "fpda" in table and "tiny-board" in table and (out / "tables/table2.tex").is_file()
+    page = (out / "report.html").read_text()
+    assert "Table 1: detection of patches by scene" in page and "gear bench bench.yml; seed 0" in page
+    with (out / "metrics.csv").open() as file:
+        lines = list(csv.DictReader(file))
+    scores = [line for line in lines if line["quantity"] == "auroc" and line["defense"] == "fpda"]
+    assert {(line["scene"], line["patch"], line["against"]) for line in scores} >= {("tiny-board", "patch", "none")}
+    shown = json.loads((out / "bench.json").read_text())["tasks"]["semseg"]["results"]
+    clean, behind = (one["patches"]["none"]["value"]["value"] for one in shown)
+    cost = shown[1]["patches"]["none"]["gain"]
+    assert cost["value"] == pytest.approx(behind - clean), "against the network without a defense"
     before = {path: path.read_bytes() for path in (out / "records").rglob("*.*")}
     gear.bench(written(*LEARNING), out=out, record=True)
     assert {path: path.read_bytes() for path in (out / "records").rglob("*.*")} == before

@@ -1,0 +1,77 @@
+"""Every metric of a benchmark by scene, as flat records for metrics.csv and metrics.json."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from gear.measuring.metric_json import known_json
+from gear.values.serial import Json
+from gear.verbs.bench.paper_tables import scenes_of
+from gear.verbs.bench.report import BenchReport, Result
+from gear.verbs.evaluate.report import Difference, Estimate, Metrics, Pool, RowReport
+from gear.verbs.evaluate.table import metric_title
+
+COLUMNS = (
+    "task", "model", "defense", "scene", "patch", "samples", "quantity", "metric", "against", "value", "low", "high",
+    "p", "ceiling",
+)  # fmt: skip
+"""Columns of metrics.csv. `quantity` is `value`; `change`, the difference to the pictures named in `against`; `mean
+change`, the mean over single pictures with its p; `auroc`; `mask`; or `seconds`.
+"""
+
+ALL = "all"
+
+
+def metric_records(report: BenchReport) -> Iterator[dict[str, Json]]:
+    """Yields one record per figure: for each network, defense, kind of patch and scene, and over all scenes."""
+    scenes = scenes_of(report)
+    for task in report.tasks:
+        for one in task.results:
+            who = {"task": task.name, "model": one.model, "defense": one.defense or ""}
+            for pool in one.evaluation.pools:
+                yield from _of(who, ALL, pool.name, pool, pool.differences, {})
+                for name, scene in zip(pool.rows, scenes, strict=True):
+                    row = next(each for each in one.evaluation.rows if each.name == name)
+                    found = tuple(each for each in one.evaluation.differences if each.row == name)
+                    yield from _of(who, scene, pool.name, row, found, _patches(one))
+
+
+def _patches(one: Result) -> dict[str, str]:
+    """The kind of patch of each dataset, by the name of the dataset."""
+    return {name: pool.name for pool in one.evaluation.pools for name in pool.rows}
+
+
+def _of(
+    who: Mapping[str, Json],
+    scene: str,
+    patch: str,
+    found: RowReport | Pool,
+    differences: tuple[Difference, ...],
+    kinds: Mapping[str, str],
+) -> Iterator[dict[str, Json]]:
+    at = {**who, "scene": scene, "patch": patch, "samples": found.samples}
+    yield from _estimates({**at, "quantity": "value"}, found.metrics)
+    for name, mean in known_json(found.defense).items():
+        yield {**at, "quantity": "mask", "metric": name, "value": mean}
+    for name, seconds in found.cost.items():
+        yield {**at, "quantity": "seconds", "metric": name, "value": seconds}
+    for one in differences:
+        against = {**at, "against": kinds.get(one.against, one.against)}
+        yield from _estimates({**against, "quantity": "change"}, one.metrics)
+        for report, tests in one.paired.items():
+            for name, test in tests.items():
+                values = known_json({"value": test.mean, "p": test.p})
+                yield {**against, "quantity": "mean change", "metric": metric_title(report, name), **values}
+        if one.auroc is not None:
+            yield {**against, "quantity": "auroc", "metric": "auroc", **_estimate(one.auroc)}
+
+
+def _estimates(at: Mapping[str, Json], metrics: Metrics) -> Iterator[dict[str, Json]]:
+    for report, values in metrics.items():
+        for name, one in values.items():
+            yield {**at, "metric": metric_title(report, name), **_estimate(one)}
+
+
+def _estimate(one: Estimate) -> dict[str, Json]:
+    found: dict[str, Json] = one.as_json()
+    return found

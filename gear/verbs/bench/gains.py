@@ -1,0 +1,62 @@
+"""What a defense gains under attack and costs without one, against the same network without a defense.
+
+The intervals are those of paired differences: each jackknife replicate leaves the same street out of both evaluations.
+"""
+
+from __future__ import annotations
+
+from gear.contracts.tasks import NO_PATCH
+from gear.measuring.statistics import difference_interval
+from gear.verbs.bench.plan import ADAPTIVE, PATCH
+from gear.verbs.bench.report import Result, TaskResult
+from gear.verbs.evaluate.report import Estimate, Pool
+
+FAILED_P = 0.05
+"""Probability above which the effect of a patch may be chance, so that the attack counts as failed."""
+
+
+def alone(task: TaskResult, one: Result) -> Result:
+    """Returns the results of the same network without a defense."""
+    return next(other for other in task.results if other.model == one.model and other.defense is None)
+
+
+def against_clean(task: TaskResult, one: Result, pool: Pool) -> Estimate | None:
+    """Returns the metric of a pool minus that of the network without a defense and without a patch; None for that
+    pool itself, and where a value is missing.
+    """
+    if one.defense is None and pool.name == NO_PATCH:
+        return None
+    return minus(task, pool, alone(task, one).pool(NO_PATCH))
+
+
+def gain(task: TaskResult, one: Result, pool: Pool) -> Estimate | None:
+    """Returns the metric of a defended network minus that of the network without a defense, under the same kind of
+    patch; adaptive patches are compared with the patches against the network alone.
+
+    None without a defense. Without a patch the gain is the cost of the defense, usually negative.
+    """
+    if one.defense is None:
+        return None
+    other, name = alone(task, one), PATCH if pool.name == ADAPTIVE else pool.name
+    found = next((each for each in other.evaluation.pools if each.name == name), None)
+    return None if found is None else minus(task, pool, found)
+
+
+def minus(task: TaskResult, pool: Pool, other: Pool) -> Estimate | None:
+    """Returns the difference of the task's main metric between two pools of the same scenes, with its interval."""
+    here, there = task.value(pool), task.value(other)
+    if task.metric is None or here is None or there is None:
+        return None
+    one, two = (each.gathered.get(task.metric.report) for each in (pool, other))
+    interval = None if one is None or two is None else difference_interval(one, two, task.metric.name)
+    return Estimate(value=here.value - there.value, interval=interval)
+
+
+def is_failed(task: TaskResult, one: Result, pool: Pool) -> bool:
+    """Whether an optimised patch is no worse for the network than a random patch, or only by chance."""
+    against = one.against(pool)
+    change, test = task.effect(against), task.outside_patch(against)
+    if against is None or against.against == NO_PATCH or task.metric is None or change is None:
+        return False
+    is_harmful = change.value > 0 if task.metric.lower_is_better else change.value < 0
+    return not is_harmful or (test is not None and test[1].pairs > 0 and test[1].p > FAILED_P)

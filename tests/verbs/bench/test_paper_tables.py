@@ -1,0 +1,35 @@
+"""The paper's tables: their layout, numbers and colours."""
+
+from __future__ import annotations
+
+from gear.verbs.bench.paper_page import paper_table
+from gear.verbs.bench.paper_tables import Cell, paper_tables
+from tests.verbs.bench.synthetic import report
+
+
+def test_table_1_has_the_auroc_of_patches_against_none() -> None:
+    table = paper_tables(report())[0]
+    assert (table.name, table.tasks, table.columns) == ("table1", (("semseg", 1),), ("net_1",))
+    found = [(line.scene, line.label, line.cells[0].text) for line in table.lines]
+    assert found == [
+        ("town10-board_1", "detector", "0.90"), ("town10-truck", "detector", "0.80"), ("mean", "detector", "0.85"),
+    ]  # fmt: skip
+
+
+def test_table_2_is_relative_to_the_undefended_clean_network() -> None:
+    _, table, adaptive = paper_tables(report())
+    assert table.tasks == (("semseg (miou)", 2),) and table.columns == ("net_1", "attacked")
+    assert [(line.scene, line.label) for line in table.lines] == [
+        ("town10-board_1", "-"), ("town10-board_1", "clean&er"), ("town10-truck", "-"), ("town10-truck", "clean&er"),
+    ]  # fmt: skip
+    bare, cleaner, _, other = (line.cells for line in table.lines)
+    assert bare == (Cell(text="70.00", tone="reference"), Cell(text="-20.00", is_grey=True))
+    assert cleaner == (Cell(text="-2.00", tone="worse"), Cell(text="-10.00", tone="better", is_grey=True))
+    assert other == (Cell(text="+0.00", tone="same"), Cell(text="-20.00", tone="same", is_grey=True))
+    assert adaptive.lines[1].cells[1] == Cell(text="-25.00", tone="worse", is_grey=True)
+
+
+def test_the_html_has_the_layout_and_the_colours() -> None:
+    text = paper_table(paper_tables(report())[1])
+    assert '<th colspan="2">semseg (miou)</th>' in text and '<td class="better grey">-10.00</td>' in text
+    assert "clean&amp;er" in text and text.count("<tr class=first>") == 2
