@@ -76,6 +76,8 @@ class DriveConfig:
         weather: a weather preset, or a preset and the parameters that differ from it.
         crowd: factor on the scene's numbers of other vehicles and people, 0 to 10.
         video: whether each drive with cameras leaves a video (MP4), which needs the extra `video`.
+        open_loop: whether the predictions of each drive are also evaluated by the metrics of their task, against the
+            ground truth of the very same frames.
         collect: further settings of the pictures, such as `quality`; the keys are those of `gear show-config`.
         places: file, line and column of each given value, by key.
     """
@@ -90,6 +92,7 @@ class DriveConfig:
     weather: WeatherConfig = field(default_factory=WeatherConfig)
     crowd: float = 0.5
     video: bool = False
+    open_loop: bool = False
     collect: Node = field(default_factory=_nothing)
     places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)
 

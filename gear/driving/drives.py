@@ -175,6 +175,7 @@ class Drives:
             "collect": to_plain(self.config.collect),
             "patch": {"label": patch.label, "sha256": patch.digest},
             "versions": versions(),
+            **({"open_loop": True} if self.config.open_loop else {}),
         }
 
     def folder(self, run: DriveRun, patch: PatchSet) -> str:

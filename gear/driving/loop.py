@@ -12,6 +12,7 @@ import numpy as np
 from gear.collecting.session import Session
 from gear.contracts.controllers import Action, Controller
 from gear.contracts.specs import ControllerSpec
+from gear.contracts.tasks import Evaluator
 from gear.driving.log import danger_of, frame_entry
 from gear.driving.simulation import DriveSimulation, Situation
 from gear.driving.start import Draw
@@ -35,11 +36,13 @@ class Sight:
         session: world, renderer and camera of the place, with the patch of the twin.
         rig: the cameras.
         model: the network with its defense; None for a controller that looks at the pictures itself.
+        evaluator: evaluator of the task, which gathers the predictions of all frames; None if they are not evaluated.
     """
 
     session: Session
     rig: Rig
     model: GuardedModel | None
+    evaluator: Evaluator[Any, Any] | None = None
 
     def look(self, simulation: DriveSimulation, frame: int) -> tuple[Mapping[str, UInt8Image], Any]:
         """Renders the current state and predicts; returns (H, W, 3) uint8 pictures by camera, and the prediction."""
@@ -48,7 +51,11 @@ class Sight:
         views = {name: view.rgb for name, view in shown.views.items()}
         if self.model is None:
             return views, None
-        return views, self.model.predict([views], [frame])[0].prediction
+        prediction = self.model.predict([views], [frame])[0].prediction
+        if self.evaluator is not None:
+            with blamed(self.session.plugin, f"frame {frame}"):
+                self.evaluator.update(self.session.task.ground_truth(shown, record), prediction)
+        return views, prediction
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

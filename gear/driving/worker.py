@@ -13,6 +13,7 @@ from gear.collecting.lookup import look_up
 from gear.collecting.session import Session, open_session
 from gear.contracts.executors import MOST_FAILURES, Outcome, Report
 from gear.contracts.rendering import RendererInfo
+from gear.contracts.specs import TaskSpec
 from gear.dataset.claims import Claims
 from gear.dataset.files import explained, read_bytes, write_alone
 from gear.dataset.guarded_paths import owned, remove_tree
@@ -29,6 +30,7 @@ from gear.driving.video import Video
 from gear.measuring.calibration import NOTHING, opened_calibration
 from gear.measuring.guard import OpenedGuard
 from gear.measuring.guarded_model import GuardedModel
+from gear.measuring.metric_json import known_json
 from gear.plugins.build import build
 from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, GearError, PlacementError
@@ -60,6 +62,8 @@ class DriveResult:
         patch: label of the patch that the scene showed.
         weights_sha256: hash of the network's weights; None without a network.
         renderer: the renderer with its driver and device; None where nothing was rendered.
+        open_loop: metrics of the predictions in all frames of the drive, by name; empty if they were not evaluated.
+        open_loop_metric: name of the task's main metric among them; "" for none.
     """
 
     run: DriveRun
@@ -68,6 +72,8 @@ class DriveResult:
     patch: str
     weights_sha256: str | None = None
     renderer: RendererInfo | None = None
+    open_loop: dict[str, float | None] = field(default_factory=dict)
+    open_loop_metric: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -208,7 +214,9 @@ def _made(shop: _Workshop, run: DriveRun) -> bool:
     model, sight = shop.model_of(cast), None
     if place.session is not None and place.job is not None:
         session = replace(place.session, job=replace(place.session.job, patch=patch))
-        sight = Sight(session=session, rig=session.task.rig(), model=model)
+        is_evaluated = drives.config.open_loop and model is not None
+        evaluator = session.task.evaluator() if is_evaluated else None
+        sight = Sight(session=session, rig=session.task.rig(), model=model, evaluator=evaluator)
     wheel = Wheel(plugin=cast.controller.found, controller=build(cast.controller.found, cast.controller.options))
     draw = Draw(name=run.scenario, scenario=drives.scenario(run), speed_mps=run.speed_kmh / 3.6, seed=run.seed)
     video = Video() if drives.has_video(run) else None
@@ -221,11 +229,18 @@ def _made(shop: _Workshop, run: DriveRun) -> bool:
         patch=patch.label,
         weights_sha256=None if model is None else model.weights_sha256,
         renderer=None if place.job is None else place.job.renderer,
+        open_loop={} if sight is None or sight.evaluator is None else known_json(sight.evaluator.result()),
+        open_loop_metric=_main_metric(place.session),
     )
     content = sealed_json({"identity": drives.identity(run, patch), "result": to_json(result)})
     shown = {} if video is None else {VIDEO: video.mp4()}
     _write(drives.root, folder, {LOG: data, **shown, RESULT: content})
     return True
+
+
+def _main_metric(session: Session | None) -> str:
+    spec = None if session is None else session.plugin.spec
+    return spec.metric if isinstance(spec, TaskSpec) else ""
 
 
 def _write(root: Path, folder: str, files: Mapping[str, bytes]) -> None:

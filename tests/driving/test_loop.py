@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from gear.contracts.controllers import Action, Observation
 from gear.contracts.specs import ControllerSpec
-from gear.driving.loop import Wheel, drive
+from gear.driving.loop import Sight, Wheel, drive
 from gear.driving.scenario import Scenario
 from gear.driving.simulation import DriveSimulation, Situation
 from gear.driving.start import Draw
 from gear.plugins.catalogue import Owner, PluginEntry
 from gear.plugins.controllers.baseline import BaselineConfig
+from gear.plugins.manager import catalogue
+from gear.testing.synthetic import synthetic_frame
 from gear.testing.tiny_town import tiny_world
 from gear.values.errors import PluginError
 
@@ -76,3 +79,24 @@ def test_faults_of_other_packages_name_the_package(simulation: DriveSimulation, 
     with pytest.raises(PluginError, match=r"foreign \(other 1.0\) failed at act in frame 0") as caught:
         drive(simulation, SHORT, wheel(Foreign(answer)))
     assert problem in str(caught.value)
+
+
+def test_predictions_are_evaluated_at_the_very_same_frames(simulation: DriveSimulation) -> None:
+    """A perfect network on a synthetic street has no error, and the controller receives its predictions."""
+    found = catalogue().get("task", "depth")
+    task: Any = found.spec.build(found.spec.config(width_px=128, height_px=64))
+    frame, record = synthetic_frame(task.rig())
+    truth = task.as_prediction(task.ground_truth(frame, record))
+    session: Any = SimpleNamespace(
+        pipeline=SimpleNamespace(with_effects=lambda shown: shown),
+        shoot=lambda shown: shown,
+        to_frame=lambda _: frame,
+        task=task,
+        plugin=found,
+    )
+    model: Any = SimpleNamespace(predict=lambda views, numbers: [SimpleNamespace(prediction=truth)])
+    sight = Sight(session=session, rig=task.rig(), model=model, evaluator=task.evaluator())
+    controller = Foreign(Action(acceleration_mps2=0.0, steering_rad=0.0))
+    drive(simulation, SHORT, wheel(controller), sight)
+    assert all(one.prediction is truth and one.cameras == task.rig().cameras for one in controller.seen)
+    assert sight.evaluator is not None and sight.evaluator.result()["rmse_m"] == pytest.approx(0.0, abs=1e-6)

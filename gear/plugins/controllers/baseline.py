@@ -24,6 +24,11 @@ STANDSTILL_GAP_M, HEADWAY_S = 2.5, 1.2
 RELEASE_GAP_M = 1.0
 """Emergency braking ends when the obstacle is no longer approached and is farther away than this, or the car stands."""
 
+HOLD_MPS, HOLD_GAP_M = 0.5, 6.0
+"""A car that has stopped behind a standing obstacle stays there (stop and hold): both are slower than this speed, and
+the gap is below this distance.
+"""
+
 LEAST_LOOK_AHEAD_M, LOOK_AHEAD_S = 5.0, 0.8
 """Pure pursuit aims at the point of the path that the car reaches after this time, but at least at this distance."""
 
@@ -73,9 +78,11 @@ class Baseline(ABC):
             notes["seen_gap_m"] = sighting.gap_m
         gap_m, leader_mps = math.inf, 0.0
         if track is not None:
-            gap_m, leader_mps = track.gap_m, track.speed_mps
+            gap_m, leader_mps = track.gap_m, max(0.0, track.speed_mps)  # traffic ahead does not drive backwards
             notes |= {"gap_m": gap_m, "leader_mps": leader_mps}
         acceleration_mps2 = max(-CRUISE_BRAKING_MPS2, following(speed_mps, observation.cruise_mps, gap_m, leader_mps))
+        if speed_mps < HOLD_MPS and leader_mps < HOLD_MPS and gap_m < HOLD_GAP_M:
+            acceleration_mps2 = min(acceleration_mps2, -CRUISE_BRAKING_MPS2)
         if self._brakes(gap_m, speed_mps - leader_mps, speed_mps):
             acceleration_mps2 = -observation.car.most_braking_mps2
             notes["is_emergency"] = 1.0

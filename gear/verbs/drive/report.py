@@ -81,6 +81,8 @@ class Row:
         lateral_peak_m: mean of the largest distances from the centre line.
         jerk_rms_mps3: mean of the root mean square jerks.
         score: mean driving score.
+        open_loop: mean of the task's main metric over the frames of each drive; None if predictions were not evaluated.
+        open_loop_metric: name of that metric.
         paired: comparisons with the twins `none` and `random`.
     """
 
@@ -97,6 +99,8 @@ class Row:
     lateral_peak_m: float
     jerk_rms_mps3: float
     score: float
+    open_loop: float | None = None
+    open_loop_metric: str = ""
     paired: tuple[Paired, ...] = ()
 
 
@@ -186,6 +190,8 @@ def _row(
         lateral_peak_m=_mean(one.lateral_peak_m for one in measures) or 0.0,
         jerk_rms_mps3=_mean(one.jerk_rms_mps3 for one in measures) or 0.0,
         score=_mean(one.score for one in measures) or 0.0,
+        open_loop=_mean(one.open_loop.get(one.open_loop_metric) for one in here),
+        open_loop_metric=here[0].open_loop_metric,
         paired=tuple(paired),
     )
 

@@ -7,7 +7,7 @@ from gear.verbs.drive.report import DriveReport, Paired, Rate, Row
 
 TITLES = [
     "driver", "scenario", "twin", "drives", "crashes", "impact km/h", "least m", "least TTC s", "braking delay s",
-    "phantom", "left lane", "lateral m", "jerk", "score", "p none", "p random",
+    "phantom", "left lane", "lateral m", "jerk", "score", "open loop", "p none", "p random",
 ]  # fmt: skip
 
 SPEED_TITLES = ["driver", "twin", "speed km/h", "drives", "crashes", "impact km/h", "score"]
@@ -26,7 +26,8 @@ def legend() -> str:
     return (
         "crashes: share of drives, with the exact 95 % interval; impact: mean speed at first contact; least m, least"
         " TTC: means of the least distance and the least time to collision; braking delay: mean, against the twin"
-        " none; phantom: share of drives with hard braking for nothing; score: CARLA's driving score; p: McNemar's"
+        " none; phantom: share of drives with hard braking for nothing; score: CARLA's driving score; open loop:"
+        " the task's main metric over the same frames; p: McNemar's"
         " exact test of the crashes against the twins none and random"
     )
 
@@ -63,6 +64,7 @@ def _cells(row: Row) -> list[str]:
         f"{row.lateral_peak_m:.2f}",
         f"{row.jerk_rms_mps3:.1f}",
         f"{row.score:.2f}",
+        "" if row.open_loop is None else f"{row.open_loop_metric} {row.open_loop:.3f}",
         _p(none),
         _p(against.get("random")),
     ]

@@ -39,7 +39,10 @@ def result(twin: str, seed: int, *, is_crash: bool = False, scenario: str = "sto
     measures = MEASURES
     if is_crash:
         measures = replace(MEASURES, is_crash=True, crash_kind="vehicle", impact_mps=5.0, braking_s=2.0, score=0.5)
-    return DriveResult(run=run, measures=measures, log_sha256="0" * 64, patch=twin)
+    open_loop = {"rmse_m": 2.0 if is_crash else 1.0}
+    return DriveResult(
+        run=run, measures=measures, log_sha256="0" * 64, patch=twin, open_loop=open_loop, open_loop_metric="rmse_m"
+    )
 
 
 def study() -> DriveReport:
@@ -88,6 +91,7 @@ def test_the_tables() -> None:
         ["stopped_lead", "none"], ["stopped_lead", "random"], ["stopped_lead", "patch"], ["free_road", "none"],
         ["all", "none"], ["all", "random"], ["all", "patch"],
     ]  # fmt: skip
+    assert rows[2][head.index("open loop")] == "rmse_m 1.700", "seven of ten crashed, with twice the error"
     assert speed_cells(study())[3][4] == "70 % [35, 93]"
     assert "not made: a <drive>: no place" in text(study())
 
