@@ -16,7 +16,6 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -74,6 +73,8 @@ class Response:
         if not linear_rgb.size:
             return np.zeros(linear_rgb.shape, np.uint8)
         row = np.ascontiguousarray(linear_rgb).reshape(1, -1)
+        import cv2  # here, because configs import this module and need no OpenCV
+
         return np.asarray(cv2.LUT(row, self._table[None]), np.uint8).reshape(linear_rgb.shape)
 
     def curve(self, light: npt.ArrayLike) -> Floats:

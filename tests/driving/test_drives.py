@@ -64,7 +64,7 @@ def test_pictures_have_the_options_of_the_driver() -> None:
     [
         ("controller: truth", "controller: truht", "drive.yml:3:23: drivers.truth.controller: no controller named"),
         ("stopped_lead", "stoped_lead", "did you mean stopped_lead"),
-        ("controller: blind, task: depth", "controller: depth, task: depth", "needs a network"),
+        ("controller: blind, task: depth", "controller: depth_baseline, task: depth", "needs a network"),
         ("task: depth", "task: dept", "did you mean depth"),
         ("width_px: 320", "width_pix: 320", "width_px"),
         ("repeats: 2", "repeats: 0", "must be 1 to 10000"),

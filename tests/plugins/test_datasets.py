@@ -23,6 +23,5 @@ def test_a_folder_of_datasets_names_those_inside(
         shutil.copytree(small("semseg"), tmp_path / "data" / name)
     with pytest.raises(DatasetError, match=r"is a folder of 2 datasets; give one of them: .*none, .*random"):
         gear.open_dataset(tmp_path / "data")
-    for command in ("view", "sheet"):
-        assert main([command, str(tmp_path / "data")]) == 2
-        assert "give one of them" in capsys.readouterr().err
+    assert main(["sheet", str(tmp_path / "data")]) == 2
+    assert "give one of them" in capsys.readouterr().err

@@ -69,7 +69,7 @@ class DepthDriver(Baseline):
 
 
 spec = ControllerSpec(
-    name="depth",
+    name="depth_baseline",
     summary="Brakes for points of a depth map that stand in the corridor.",
     config=DepthDriverConfig,
     build=DepthDriver,

@@ -65,7 +65,7 @@ class Detect2dDriver(Baseline):
 
 
 spec = ControllerSpec(
-    name="detect2d",
+    name="detect2d_baseline",
     summary="Brakes for 2D boxes: the foot of a box on the ground plane.",
     config=Detect2dDriverConfig,
     build=Detect2dDriver,

@@ -89,7 +89,7 @@ def _across(corridor: Corridor, arc_m: Points) -> Points:
 
 
 spec = ControllerSpec(
-    name="semseg",
+    name="semseg_baseline",
     summary="Brakes for the end of the drivable area in the corridor.",
     config=SemsegDriverConfig,
     build=SemsegDriver,

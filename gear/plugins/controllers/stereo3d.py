@@ -72,7 +72,7 @@ def footprint(camera: CameraMount, label: KittiLabel) -> Points:
 
 
 spec = ControllerSpec(
-    name="stereo3d",
+    name="stereo3d_baseline",
     summary="Brakes for 3D boxes that reach into the corridor.",
     config=Stereo3dDriverConfig,
     build=Stereo3dDriver,
