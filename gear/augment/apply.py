@@ -43,7 +43,7 @@ class Framing:
 
     Attributes:
         crop_px: height and width of the network's input; None for the size of the whole picture.
-        scales: range of the factor by which a picture is resized.
+        scales: smallest and largest factor by which a picture is resized before it is cropped.
     """
 
     crop_px: tuple[int, int] | None = None
@@ -51,11 +51,16 @@ class Framing:
 
 
 def shrunk(sample: SampleT, share: float) -> SampleT:
-    """The sample as from a camera with the same view and fewer pixels: pictures and ground truth are resized by
-    the factor `share`.
+    """Returns the sample as from a camera with the same view and fewer pixels: pictures and ground truth are
+    resized.
+
+    Args:
+        sample: the sample; it is not changed.
+        share: factor, above 0 and at most 1, by which width and height are multiplied. For 1 the sample itself is
+            returned.
 
     Raises:
-        GearError: the sample is of a class without registered functions.
+        GearError: the sample is of a class without registered functions (`gear.augment.registry.register`).
     """
     if share == 1:
         return sample
@@ -68,16 +73,16 @@ def shrunk(sample: SampleT, share: float) -> SampleT:
 
 
 def augment(sample: SampleT, how: Augmentation, framing: Framing, rng: np.random.Generator) -> SampleT:
-    """Returns a randomly changed copy of a sample; its ground truth is changed together with its pixels.
+    """Returns a randomly changed copy of a sample: mirrored, cropped, resized and recoloured.
 
-    The logarithm of the scale factor is drawn uniformly. Mirrored, cropped or resized samples have no `surfaces`, and
-    their `record` still describes the rendered scene.
+    The ground truth is changed together with the pixels. The logarithm of the scale factor is drawn uniformly.
+    Mirrored, cropped or resized samples have no `surfaces`, and their `record` still describes the rendered scene.
 
     Args:
-        sample: the sample.
-        how: probabilities and ranges of the changes.
+        sample: the sample; it is not changed.
+        how: probabilities and strengths of the changes.
         framing: size of crops and range of scale factors.
-        rng: random generator.
+        rng: generator of all random draws.
 
     Raises:
         GearError: crops or scales are requested for a sample of a class without registered functions.

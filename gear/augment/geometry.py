@@ -76,7 +76,12 @@ class Geometry(Generic[SampleT]):
 
 
 def whole_window(size_px: tuple[int, int], share: float) -> Window:
-    """The window that covers a whole picture of size (height, width) and resizes it by the factor `share`."""
+    """Returns the window that covers a whole picture and resizes it.
+
+    Args:
+        size_px: height and width of the picture.
+        share: factor by which height and width are multiplied; the results are rounded to whole pixels, at least 1.
+    """
     height, width = size_px
     return Window(
         left_px=0,
@@ -104,6 +109,10 @@ def draw_window(
         scale: output pixels per pixel of the picture.
         rng: generator of the window's position.
         is_centred: whether the window must have the same centre as the picture.
+
+    Returns:
+        The window; its position is in whole pixels of the picture. With `is_centred` nothing is drawn, and the size is
+        rounded so that both centres coincide.
     """
     (height, width), (out_height, out_width) = size_px, out_px
     h, w = max(1, round(out_height / scale)), max(1, round(out_width / scale))
@@ -126,25 +135,51 @@ def _between(room_px: int, rng: np.random.Generator) -> int:
 
 
 def flip_array(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Mirrors an (H, W, ...) array, left to right."""
+    """Returns a copy of an (H, W, ...) array that is mirrored left to right.
+
+    Args:
+        array: the array.
+    """
     return np.ascontiguousarray(array[:, ::-1])
 
 
 def cut_picture(picture: UInt8Image, window: Window) -> UInt8Image:
-    """Crops and resizes an (H, W, 3) picture: by area averages if it gets smaller, bilinearly if it gets larger."""
+    """Crops and resizes an (H, W, 3) picture: by area averages if it gets smaller, bilinearly if it gets larger.
+
+    Args:
+        picture: (H, W, 3) uint8.
+        window: the part to crop, and the size after resizing. What lies beyond the picture gets the grey level
+            `PADDING_LEVEL`.
+
+    Returns:
+        (`window.out_height_px`, `window.out_width_px`, 3) uint8.
+    """
     part = _part(picture, window, PADDING_LEVEL)
     method = cv2.INTER_AREA if window.scale < 1 else cv2.INTER_LINEAR
     return np.asarray(_resized(part, window, method), dtype=np.uint8)
 
 
 def cut_map(values: npt.NDArray[Any], window: Window, fill: float) -> npt.NDArray[Any]:
-    """Crops and resizes an (H, W) map by nearest neighbour; cells beyond the map get the value `fill`."""
+    """Crops and resizes an (H, W) map, such as depth or label ids, by nearest neighbour.
+
+    Args:
+        values: (H, W) map of any dtype.
+        window: the part to crop, and the size after resizing.
+        fill: value of cells beyond the map.
+
+    Returns:
+        (`window.out_height_px`, `window.out_width_px`) map of the same dtype.
+    """
     return _resized(_part(values, window, fill), window, cv2.INTER_NEAREST_EXACT)
 
 
 def cut_box(box_px: BoxPx, window: Window) -> BoxPx:
     """Converts a box from edge pixels of the picture to edge pixels of the window's output; the result is not
     clipped.
+
+    Args:
+        box_px: left, top, right and bottom; edge pixels count from 0 at the picture's left or upper border.
+        window: the part to crop, and the size after resizing.
     """
     left, top, right, bottom = box_px
     return (
@@ -156,18 +191,24 @@ def cut_box(box_px: BoxPx, window: Window) -> BoxPx:
 
 
 def flip_box(box_px: BoxPx, width_px: int) -> BoxPx:
-    """Mirrors a box, in edge pixels of a picture of width `width_px`, left to right."""
+    """Returns a box (left, top, right, bottom) that is mirrored left to right with its picture.
+
+    Args:
+        box_px: the box in edge pixels, which count from 0 at the picture's left or upper border.
+        width_px: width of the picture.
+    """
     left, top, right, bottom = box_px
     return (width_px - right, top, width_px - left, bottom)
 
 
 def clipped(box_px: BoxPx, frame_px: BoxPx) -> BoxPx:
-    """Intersection of two boxes. For boxes that do not intersect, the result has a right side left of its left
-    side, or a bottom above its top.
+    """Returns the intersection of two boxes (left, top, right, bottom).
+
+    For boxes that do not intersect, the result has a right side left of its left side, or a bottom above its top.
 
     Args:
-        box_px: left, top, right and bottom of the first box.
-        frame_px: left, top, right and bottom of the second box.
+        box_px: the first box.
+        frame_px: the second box, such as the borders of a picture, in the same pixels.
     """
     return (
         max(box_px[0], frame_px[0]),
@@ -178,13 +219,22 @@ def clipped(box_px: BoxPx, frame_px: BoxPx) -> BoxPx:
 
 
 def box_area(box_px: BoxPx) -> float:
-    """Area of a box in square pixels; 0 if right is left of left, or bottom above top."""
+    """Returns the area of a box in square pixels; 0 if right is left of left, or bottom above top.
+
+    Args:
+        box_px: left, top, right and bottom.
+    """
     left, top, right, bottom = box_px
     return max(0.0, right - left) * max(0.0, bottom - top)
 
 
 def share_in_frame(box_px: BoxPx, frame_px: BoxPx) -> float:
-    """Share, 0..1, of a box's area that lies inside the box `frame_px`."""
+    """Returns the share, 0..1, of a box's area that lies inside another box; 0 for a box without area.
+
+    Args:
+        box_px: left, top, right and bottom of the box.
+        frame_px: the other box, such as the borders of a picture, in the same pixels.
+    """
     whole = box_area(box_px)
     return box_area(clipped(box_px, frame_px)) / whole if whole > 0 else 0.0
 

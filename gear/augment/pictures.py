@@ -69,13 +69,14 @@ class Colours:
 
 
 def recolour(images: Mapping[str, UInt8Image], colours: Colours, rng: np.random.Generator) -> dict[str, UInt8Image]:
-    """The recoloured pictures of one sample by camera. All views are changed in the same way; only the noise
-    differs between views.
+    """Returns recoloured copies of the pictures of one sample, by camera name.
+
+    All views are changed in the same way; only the noise differs between views.
 
     Args:
         images: (H, W, 3) uint8 pictures by camera name.
-        colours: ranges of the colour changes.
-        rng: random generator.
+        colours: strengths of the colour changes.
+        rng: generator of all random draws.
     """
     table, saturation = _table(colours, rng), 1 + rng.uniform(-colours.saturation, colours.saturation)
     blur_px = rng.uniform(min(0.3, colours.blur_px), colours.blur_px) if rng.random() < colours.blur else 0.0

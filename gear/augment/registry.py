@@ -29,10 +29,13 @@ def register(kind: type[SampleT], geometry: Geometry[SampleT]) -> None:
 
 
 def geometry_of(sample: Sample) -> Geometry[Any] | None:
-    """The functions that mirror, crop and resize samples, as registered for the sample's class; None if there are
+    """Returns the functions that mirror, crop and resize a sample, as registered for its class; None if there are
     none.
 
     A subclass does not inherit the functions of its parent, because it may have fields that these functions do not
     change.
+
+    Args:
+        sample: a sample of any task.
     """
     return _GEOMETRIES.get(type(sample))

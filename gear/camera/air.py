@@ -142,7 +142,8 @@ class Air:
         return veiled
 
     def transmittance(self, depth_m: FloatImage, camera: CameraRecord) -> FloatImage:
-        """The transmittance of the air between surface and camera: (H, W, 3) float32, 0..1, the share of a surface's
+        """The transmittance of the air between surface and camera: (H, W, 3) float32, 0..1, the share of a
+        surface's
         light that reaches the camera, for each pixel and channel.
 
         Args:

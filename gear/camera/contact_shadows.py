@@ -74,7 +74,8 @@ class SkyOcclusion:
 
     @staticmethod
     def of(shape: Shape) -> SkyOcclusion:
-        """Computes the shares as the mean of shadows from directions with a cosine distribution.
+        """Computes the shares as the mean of shadows from `DIRECTIONS` directions, more of them steep than flat
+        (cosine distribution).
 
         The asset is treated as solid from its underside up.
 
@@ -212,13 +213,14 @@ class ContactShadows:
     def factors(
         self, depth_m: FloatImage, is_ground: Mask, camera: CameraRecord, record: SceneRecord
     ) -> FloatImage | None:
-        """The (H, W) float32 factors 0..1 by which contact shadows darken a frame; None if no pixel is darkened.
+        """Returns the (H, W) float32 factors 0..1 by which contact shadows darken a frame; None if no pixel is
+        darkened.
 
         Args:
-            depth_m: (H, W) planar depth in metres.
-            is_ground: (H, W) bool mask of the ground.
-            camera: camera of the frame.
-            record: scene record with the road users.
+            depth_m: (H, W) float32 planar z, NaN where nothing was hit.
+            is_ground: (H, W) bool, True where a pixel shows ground.
+            camera: the camera that takes the picture.
+            record: the scene, for its actors.
         """
         left: FloatImage | None = None
         world_from_camera = camera.world_from_camera_transform
@@ -319,8 +321,11 @@ def _soften_outlines(left: FloatImage, is_ground: Mask) -> None:
 
 
 def sky_share_beside(even_share: float) -> float:
-    """The sky's share, 0..1, of the light on the ground beside an actor: the mean of 1 (ground in shade) and
-    `even_share` (in the sun).
+    """Returns the sky's share, 0..1, of the light on the ground beside an actor: the mean of 1 (ground in shade)
+    and of the share in the sun.
+
+    Args:
+        even_share: share of the light on open level ground that does not come from the sun directly, 0..1.
     """
     return (1 + even_share) / 2
 

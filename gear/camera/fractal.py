@@ -67,8 +67,14 @@ def sampled(
 
 
 def smooth_step(value: npt.NDArray[np.float32], edge: float, width: float) -> npt.NDArray[np.float32]:
-    """A smooth step function from 0 to 1, elementwise: 0 up to `edge`, 1 from `edge + width` on, and a cubic polynomial
+    """A smooth step function from 0 to 1, elementwise: 0 up to `edge`, 1 from `edge + width` on, and a cubic
+    polynomial
     in between.
+
+    Args:
+        value: array of any shape; it is not changed.
+        edge: value up to which the result is 0.
+        width: distance above 0 over which the result rises to 1.
     """
     t = value - np.float32(edge)
     t *= np.float32(1 / width)

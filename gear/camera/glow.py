@@ -53,15 +53,15 @@ class LitWindows:
     reach_m: float = 1200.0
 
     def seen(self, geom_id: IdImage, depth_m: FloatImage, camera: CameraRecord) -> npt.NDArray[np.int32]:
-        """The index of the lit window that each pixel shows: (H, W) int32, -1 for no window.
+        """Returns the index of the lit window that each pixel shows: (H, W) int32, -1 for no window.
 
         A pixel shows a window if it has the window's geom id and its world position lies in the window's plane. The
         geom id alone is not sufficient, because one geom may contain many houses, and one house may hide another.
 
         Args:
             geom_id: (H, W) geom ids; -1 for none.
-            depth_m: (H, W) planar depth in metres.
-            camera: camera of the frame.
+            depth_m: (H, W) float32 planar z, NaN where nothing was hit.
+            camera: the camera that takes the picture.
         """
         pose = camera.world_from_camera_transform
         found = np.full(geom_id.shape, -1, np.int32)
@@ -107,7 +107,7 @@ class LampGlare:
 
     @staticmethod
     def of(lamps: Lamps, camera: CameraRecord, glare: float, depth_m: FloatImage) -> LampGlare:
-        """Finds the lamps that are in front of the camera and that no surface hides.
+        """Finds the lamps that are in front of the camera, shine towards it, and are hidden by no surface.
 
         Args:
             lamps: lamps of one kind.

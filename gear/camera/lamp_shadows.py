@@ -45,12 +45,13 @@ _LARGE_M = 2.5
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Casters:
-    """Triangles of a town's static objects without the ground, sorted into spatial pieces with bounding boxes.
+    """Triangles of a town's static objects without the ground, sorted by squares of the ground plan (24 m), so
+    that those near a lamp are found fast.
 
     Attributes:
-        corners_m: (N, 3, 3) float32 corners in world coordinates.
-        ends: (M,) for each piece, the index after its last triangle.
-        low_m, high_m: (M, 3) float32 lower and upper corners of the pieces' bounding boxes.
+        corners_m: (N, 3, 3) float32 corners in world coordinates, square by square.
+        ends: (M,) for each square, the index after its last triangle.
+        low_m, high_m: (M, 3) float32 lower and upper corners of the bounding boxes of the squares' triangles.
     """
 
     corners_m: Floats
@@ -60,7 +61,11 @@ class Casters:
 
     @staticmethod
     def of(corners_m: Floats) -> Casters:
-        """Sorts (N, 3, 3) triangles, the corners in world coordinates, into spatial pieces."""
+        """Sorts triangles by the square of the ground plan in which their first corner lies.
+
+        Args:
+            corners_m: (N, 3, 3) float32 corners in world coordinates.
+        """
         cells = np.floor(corners_m[:, 0, :2] / np.float32(_PIECE_M)).astype(np.int64)
         keys = cells[:, 0] * (1 << 32) + cells[:, 1]
         order = np.argsort(keys, kind="stable")
@@ -74,8 +79,11 @@ class Casters:
         return Casters(corners_m=corners_m, ends=ends, low_m=low_m, high_m=high_m)
 
     def near(self, place_m: Floats, reach_m: float) -> Floats:
-        """The (K, 3, 3) triangles that may reach into a sphere of radius `reach_m` around the world position `place_m`,
-        (3,).
+        """Returns the (K, 3, 3) triangles that may reach into a sphere; some of them may lie outside it.
+
+        Args:
+            place_m: (3,) centre of the sphere, world coordinates.
+            reach_m: radius of the sphere, metres.
         """
         away = np.maximum(np.maximum(self.low_m - place_m, place_m - self.high_m), 0)
         chosen = np.flatnonzero(lengths(away.T) < reach_m).tolist()
@@ -137,8 +145,12 @@ class LampShadows:
     _scenes: list[SceneShadows] = field(default_factory=list, init=False, repr=False)
 
     def scene(self, record: SceneRecord) -> SceneShadows:
-        """The shadow casters of one scene: those of the town and the scene's road users. The result is cached, because
-        a scene has several views.
+        """Returns the shadow casters of one scene: those of the town and the scene's road users.
+
+        The result of the last call is kept and returned for the same record, because a scene has several views.
+
+        Args:
+            record: the scene, for its actors.
         """
         if not self._scenes or self._scenes[0].record is not record:
             users = [

@@ -50,7 +50,11 @@ class Lamps:
     down_m: float
 
     def shares_towards(self, place_m: Array) -> Array:
-        """The share of its intensity that each lamp sends towards the world position `place_m` (3,): an (N,) array."""
+        """Returns the share of its intensity that each lamp sends towards a position: an (N,) array.
+
+        Args:
+            place_m: (3,) world position, such as the camera's.
+        """
         away = place_m - self.position_m
         away = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
         across = np.einsum("nd,nd->n", away, sides_of(self.axis))
@@ -59,7 +63,11 @@ class Lamps:
 
 
 def sides_of(axis: Array) -> Array:
-    """The (N, 3) horizontal unit vectors that point to the left of (N, 3) axes; 0 for vertical axes."""
+    """Returns the (N, 3) horizontal unit vectors that point to the left of axes; 0 for vertical axes.
+
+    Args:
+        axis: (N, 3) unit vectors in world coordinates.
+    """
     side = np.stack([-axis[:, 1], axis[:, 0], np.zeros(len(axis))], axis=1)
     length = np.linalg.norm(side, axis=1, keepdims=True)
     return np.asarray(np.where(length > _UPRIGHT, side / np.maximum(length, _UPRIGHT), 0.0))
@@ -120,7 +128,12 @@ def low_beam(along: FloatImage, across: FloatImage, up: FloatImage) -> FloatImag
 
 
 def drivers(record: SceneRecord, vehicles: Mapping[str, Headlamps]) -> list[ActorRecord]:
-    """The vehicles of a scene whose lamps are on: those that take part in traffic and have headlamps."""
+    """Returns the vehicles of a scene whose lamps are on: those that take part in traffic and have headlamps.
+
+    Args:
+        record: the scene, for its actors.
+        vehicles: positions of headlamps by asset name; assets that are missing in this mapping have no headlamps.
+    """
     return [actor for actor in record.actors if actor.asset in vehicles and actor.role in DRIVING]
 
 

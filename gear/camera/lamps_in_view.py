@@ -37,7 +37,12 @@ class LampsInView:
 
     @staticmethod
     def of(lamps: Lamps, camera: CameraRecord) -> LampsInView:
-        """Finds the part of a camera's picture that each lamp may light."""
+        """Finds the part of a camera's picture that each lamp may light.
+
+        Args:
+            lamps: all lamps of one kind.
+            camera: the camera that takes the picture.
+        """
         pose = camera.world_from_camera_transform
         sides = np.array([(x, y) for x in (-1, 1) for y in (-1, 1)]) * lamps.reach_m
         corners = np.array([(*side, z) for side in sides for z in (-lamps.down_m, lamps.up_m)])
@@ -57,7 +62,11 @@ class LampsInView:
         return LampsInView(lamps=lamps, sides=sides_of(lamps.axis), boxes=boxes, origin_m=pose.translation_m)
 
     def near(self, within_m: float) -> list[int]:
-        """Indices of the lamps that may light part of the picture and are within `within_m` metres of the camera."""
+        """Returns the indices of the lamps that may light part of the picture and are near the camera.
+
+        Args:
+            within_m: largest distance from the camera, metres.
+        """
         away_m = np.linalg.norm(self.lamps.position_m - self.origin_m, axis=1)
         first, last, above, below = self.boxes.T
         return np.flatnonzero((first < last) & (above < below) & (away_m < within_m)).tolist()

@@ -74,8 +74,11 @@ class NightLight:
         return result
 
     def apply_reflections(self, linear_rgb: UInt16Image) -> UInt16Image:
-        """Adds the reflections of lamps on wet ground to a frame; the result is `linear_rgb` itself if the ground is
-        dry.
+        """Adds the reflections of lamps on wet ground to a frame, as a new array; `linear_rgb` itself if the
+        ground is dry.
+
+        Args:
+            linear_rgb: (H, W, 3) uint16 frame at night, after `apply`.
         """
         if self.streaks is None:
             return linear_rgb

@@ -46,8 +46,11 @@ class CameraPipeline:
     effects: CameraEffects
 
     def with_effects(self, record: SceneRecord) -> SceneRecord:
-        """Adds the parameters of the active camera effects that ground truth depends on, such as the lens, to the
-        cameras of a scene record.
+        """Returns the scene record with cameras that also record the parameters of the active camera effects on
+        which ground truth depends, such as the lens.
+
+        Args:
+            record: record of the scene with pinhole cameras; it is not changed.
         """
         cameras = record.cameras
         for effect in self.effects.active():
@@ -68,22 +71,28 @@ class CameraPipeline:
         return self.night.light(truth, camera, record, geoms) if self.night is not None else None
 
     def mirror_camera(self, camera: CameraRecord, record: SceneRecord) -> CameraRecord | None:
-        """The camera below the ground that renders the reflections on wet ground; None if the ground is dry.
+        """Returns the camera below the ground that renders the reflections on wet ground; None if the ground is
+        dry or not in view.
 
         At night the result is also None: `NightLight` contains the reflections of lamps, and other reflections are too
         dark.
+
+        Args:
+            camera: the camera that takes the picture.
+            record: the scene; the ego car's height is that of the ground.
         """
         if self.night is not None or (self.water.share <= 0 and self.water.film <= 0):
             return None
         return mirror_camera(camera, record.ego.world_from_actor.position_m[2])
 
     def reflection(self, below: MirrorView | None, record: SceneRecord) -> Reflection | None:
-        """The reflections on wet ground, from a rendered view of the mirrored camera; None without such a view.
+        """Makes the reflections on wet ground from a rendered view of the mirrored camera; None without such a
+        view.
 
         Args:
-            below: a render by `mirror_camera` in which the ground is left out and surfaces are neutral; None for no
-                reflections.
-            record: the scene.
+            below: a render by `mirror_camera` in which the ground is left out and patch surfaces are neutral, and that
+                camera; None for no reflections.
+            record: the scene; the ego car's height is that of the ground.
         """
         if below is None:
             return None
@@ -103,16 +112,16 @@ class CameraPipeline:
         night_light: NightLight | None = None,
         reflection: Reflection | None = None,
     ) -> View:
-        """The finished view of a camera: colour with weather and camera effects, and depth and ids aligned with the
-        colour.
+        """Returns the finished view of a camera: colour with weather and camera effects, and depth and ids aligned
+        with the colour.
 
         Args:
-            raw: linear colour, depth and ids from a renderer.
+            raw: linear colour, depth and ids from a renderer; not changed.
             camera: the camera that takes the picture.
             record: the scene, for its seed and the ego car's motion.
             geoms: label, object and surface of each geom.
-            night_light: result of `night_light` for this view (it may be shared by renders with other patches);
-                computed here if None.
+            night_light: result of `CameraPipeline.night_light` for this view (it may be shared by renders with other
+                patches); computed here if None.
             reflection: reflections on wet ground; if None, puddles reflect only the sky.
         """
         seen = replace(raw, linear_rgb=self._weathered(raw, camera, record, geoms, night_light, reflection))

@@ -51,7 +51,7 @@ class Rain:
 
     @staticmethod
     def of(precipitation: float, wind_intensity: float, light: Array) -> Rain:
-        """The rain for CARLA's weather parameters.
+        """Makes the rain for CARLA's weather parameters.
 
         Args:
             precipitation: strength of the rain, percent.
@@ -90,13 +90,13 @@ class Rain:
     def cover(
         self, depth_m: FloatImage, camera: CameraRecord, velocity_world_mps: Vec3, rng: np.random.Generator
     ) -> FloatImage:
-        """The share of each pixel that falling drops cover: (H, W) float32 in 0..1.
+        """Returns the share of each pixel that falling drops cover: (H, W) float32 in 0..1.
 
         Args:
-            depth_m: (H, W) planar depth in metres.
-            camera: camera of the frame.
-            velocity_world_mps: velocity of the camera in world coordinates.
-            rng: random generator of the drops.
+            depth_m: (H, W) float32 planar z, NaN where nothing was hit; surfaces hide the drops behind them.
+            camera: the camera that takes the picture.
+            velocity_world_mps: velocity of the camera in world coordinates, m/s.
+            rng: random generator of this sample and camera.
         """
         falling = np.array([*self.wind_world_mps[:2], -FALL_MPS]) - np.asarray(velocity_world_mps)
         motion = camera.world_from_camera_transform.rotation.T @ falling * SHUTTER_S

@@ -97,7 +97,8 @@ class Reflection:
 
 
 def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
-    """The mirrored camera, whose view is what a level mirror reflects to `camera`; None if `camera` sees no ground.
+    """Returns the mirrored camera, whose view is what a level mirror reflects to a camera; None if the camera sees
+    no ground or is not above the mirror.
 
     The mirrored camera has no roll, and its principal point is the middle of its picture. The picture is just large
     enough for all reflected rays.
@@ -141,13 +142,16 @@ def mirror_camera(camera: CameraRecord, height_m: float) -> CameraRecord | None:
 
 
 def beyond_mirror(depth_m: FloatImage, camera: CameraRecord, height_m: float) -> tuple[FloatImage, CameraRecord]:
-    """The part above the mirror of each ray of the mirrored camera, as a depth map and a camera at the height of the
-    mirror.
+    """Cuts the rays of the mirrored camera at the mirror, so that fog can be applied to the part above it.
 
     Args:
         depth_m: (h, w) planar z of the mirrored camera.
-        camera: the mirrored camera.
+        camera: the mirrored camera, below the mirror.
         height_m: height of the mirror in world coordinates.
+
+    Returns:
+        The (h, w) float32 planar z that remains above the mirror, at least 0, and the same camera moved up to the
+        mirror.
     """
     x, y, z = camera.world_from_camera.position_m
     leg_m = np.float32(height_m - z) / np.maximum(_climb(camera), np.float32(1e-6))

@@ -97,10 +97,15 @@ IDENTITY = Response(encoding="none")
 
 
 def response_for(renderer_name: str, weather: Weather) -> Response:
-    """The response that belongs to a renderer and a weather.
+    """Returns the response that belongs to a renderer and a weather; `IDENTITY` for `classic`, whose frames
+    already hold display values.
 
     When the sun is low, streets lie in shadow and the exposure is raised. Under clouds the exposure is lower. Clouds
     also lower the contrast of light, so the tone curve adds contrast.
+
+    Args:
+        renderer_name: name of the renderer.
+        weather: the weather, for the sun's altitude and the clouds.
     """
     if renderer_name == "classic":
         return IDENTITY

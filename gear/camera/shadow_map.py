@@ -90,10 +90,13 @@ class LampFrame:
         return LampFrame(place_m=place_m.astype(np.float32), frame=frame.astype(np.float32), layout=layout)
 
     def places(self, unit: Floats) -> tuple[Floats, Floats]:
-        """The columns and rows in the shadow map, (N,) each, of the directions `unit` (3, N); whole numbers are centres
+        """Returns the columns and rows in the shadow map of some directions, (N,) each; whole numbers are centres
         of cells.
 
         Directions behind the lamp get positions outside the map.
+
+        Args:
+            unit: (3, N) unit vectors from the lamp, world axes.
         """
         across, up, along = self.frame @ unit
         scale = np.float32(self.layout.zoom * self.layout.cells / 2) / np.maximum(1 + along, np.float32(1e-3))
@@ -101,7 +104,12 @@ class LampFrame:
         return across * scale + middle, up * scale + middle
 
     def directions(self, column: Indices, row: Indices) -> Floats:
-        """The (N, 3) world unit vectors from the lamp through the centres of the cells at (N,) columns and rows."""
+        """Returns the (N, 3) world unit vectors from the lamp through the centres of cells; the inverse of
+        `places`.
+
+        Args:
+            column, row: (N,) positions of the cells in the shadow map.
+        """
         across, up = ((2 * (cell + 0.5) / self.layout.cells - 1) / self.layout.zoom for cell in (column, row))
         square = across * across + up * up
         unit = np.stack([2 * across, 2 * up, 1 - square], axis=1) / (1 + square)[:, None]
@@ -109,7 +117,11 @@ class LampFrame:
 
 
 def lengths(vectors: Floats) -> Floats:
-    """The (N,) lengths of N vectors, which are the columns of a (3, N) array."""
+    """Returns the (N,) lengths of N vectors.
+
+    Args:
+        vectors: (3, N): the vectors are the columns.
+    """
     x, y, z = vectors
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
@@ -177,12 +189,13 @@ def _weights(share: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def first_hits(corners_m: Floats, lamp_frame: LampFrame) -> Floats:
-    """The shadow map of triangles: (cells, cells) float32 distances in metres at which they stop a lamp's light.
+    """Computes the shadow map of triangles: (cells, cells) float32 distances in metres at which they stop a lamp's
+    light, infinite where they do not.
 
     Back faces of triangles are skipped, because the front of the same body is nearer.
 
     Args:
-        corners_m: (N, 3, 3) triangles in world coordinates.
+        corners_m: (N, 3, 3) corners of the triangles in world coordinates.
         lamp_frame: position and axes of the lamp.
     """
     layout = lamp_frame.layout

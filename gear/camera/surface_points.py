@@ -12,7 +12,11 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 
 def longest_edges(corners: npt.NDArray[Real]) -> npt.NDArray[Real]:
-    """The (N,) lengths of the longest edges of (N, 3, 3) triangles."""
+    """Returns the (N,) lengths of the longest edges of triangles.
+
+    Args:
+        corners: (N, 3, 3) corners of the triangles.
+    """
     along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     longest = np.maximum(np.linalg.norm(along, axis=1), np.linalg.norm(across, axis=1))
     return np.asarray(np.maximum(longest, np.linalg.norm(across - along, axis=1)), corners.dtype)

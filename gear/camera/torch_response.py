@@ -46,6 +46,10 @@ def face_light(renderer_name: str, face: torch.Tensor) -> torch.Tensor:
 
     A frame that shows the face is B + w (W - B), where B and W are the frames with a black and a white face. w is the
     picture value for the classic renderer, and the albedo decoded from sRGB for all other renderers.
+
+    Args:
+        renderer_name: name of the renderer that made the frames.
+        face: sRGB values of the face (a patch) in 0..1, any shape.
     """
     return face if renderer_name == "classic" else decode_srgb(face)
 

@@ -29,11 +29,12 @@ CACHE_BYTES = 4 << 30
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """One view of one sample, prepared for patches of certain sizes, so the next composition is fast.
+    """One view of one sample, prepared for patches of certain sizes, so that `BaseCompositor.compose` can be
+    repeated fast with other patches of these sizes.
 
     Attributes:
         picture: (3, H, W) uint8, the stored picture.
-        where: (N,) int64 row-major indices of the pixels that are composed.
+        where: (N,) int64 row-major indices (row * W + column) of the pixels that a patch may change.
         inner: data for these pixels, of a type that each compositor chooses.
         inner_bytes: memory of `inner` in bytes.
     """
@@ -87,6 +88,8 @@ class BaseCompositor:
 
         The result is differentiable with respect to the patches. Pixels that no patch can change are equal to the
         dataset's pixels, bit for bit.
+
+        Prepared data of the samples is kept in the cache, so a second call with patches of the same sizes is faster.
 
         Args:
             patches: one tensor for each surface, sRGB in 0..1: (3, h, w) for all samples, or (B, 3, h, w) with a patch
@@ -178,14 +181,15 @@ class _Paste(torch.autograd.Function):
 
 
 def products(matrices: Sequence[SparseMatrix], columns: Tensor) -> Tensor:
-    """Multiplies the sparse sampling matrix of each view with a patch's texels, which gives the light of the pixels.
+    """Multiplies the sparse sampling matrix of each view with a patch's texels (pixels of the patch at all mip
+    levels), which gives the patch's colour at the composed pixels.
 
     Args:
-        matrices: for each view, a sparse matrix (N_i, columns) of one surface.
-        columns: the texels, (columns, 3) for all views, or (B, columns, 3) with one entry for each view.
+        matrices: for each view, a sparse matrix (N_i, T), which samples T texels for N_i pixels.
+        columns: the texels, (T, 3) for all views, or (B, T, 3) with one entry for each view.
 
     Returns:
-        (sum of N_i, 3).
+        (sum of N_i, 3), the pixels of all views one after the other.
     """
     if columns.ndim == 2:
         return stacked_product(matrices, columns)
@@ -193,13 +197,22 @@ def products(matrices: Sequence[SparseMatrix], columns: Tensor) -> Tensor:
 
 
 def rounded(values: Tensor) -> Tensor:
-    """Rounds values in 0..1 to multiples of 1/255; gradients pass unchanged (straight-through estimator)."""
+    """Rounds values in 0..1 to multiples of 1/255; gradients pass unchanged (straight-through estimator).
+
+    Args:
+        values: tensor of any shape.
+    """
     stepped = torch.floor(values.detach() * 255 + 0.5) / 255
     return values + (stepped - values.detach())
 
 
 def picture_of(sample: Any, view: str, dataset: Dataset[Any]) -> UInt8Image:
-    """The stored picture of one view of a sample, (H, W, 3) uint8.
+    """Returns the stored picture of one view of a sample, (H, W, 3) uint8.
+
+    Args:
+        sample: a sample of any task, with `images` by camera name.
+        view: name of the camera.
+        dataset: the split of the sample, for the error's message.
 
     Raises:
         DatasetError: the dataset has no such view.

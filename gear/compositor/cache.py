@@ -23,9 +23,17 @@ class Cache(Generic[ThingT]):
     """A dictionary of objects with a limit in bytes, which drops the least recently used object first.
 
     It is not thread-safe.
+
+    Attributes:
+        nbytes: memory of all stored objects in bytes.
     """
 
     def __init__(self, max_bytes: int) -> None:
+        """Makes an empty cache.
+
+        Args:
+            max_bytes: memory limit of all stored objects together, bytes.
+        """
         self._max_bytes = max_bytes
         self._things: OrderedDict[Hashable, ThingT] = OrderedDict()
         self.nbytes = 0
@@ -37,6 +45,10 @@ class Cache(Generic[ThingT]):
         """Returns the object for a key; a missing object is created by `make` and stored.
 
         An object that is larger than the whole cache is returned but not stored, and the cache is emptied.
+
+        Args:
+            key: key of the object.
+            make: function that creates the object; it is called only if the object is not stored.
         """
         if key in self._things:
             self._things.move_to_end(key)

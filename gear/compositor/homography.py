@@ -58,7 +58,8 @@ class _Outline:
 class HomographyCompositor(BaseCompositor):
     """The compositor of the CARLA-GeAR paper: patches are pasted by homography, without light or occluders.
 
-    It works with every dataset. `BaseCompositor` documents the arguments.
+    It works with every dataset, also without probes (samples rendered with each patch surface black and white).
+    `BaseCompositor` documents the arguments.
     """
 
     def _columns(self, patches: Sequence[Tensor]) -> list[Tensor]:

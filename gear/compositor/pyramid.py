@@ -32,7 +32,8 @@ each new texel covers. With an even number of texels, both rules average pairs.
 
 
 def halving_of(renderer: str, driver: str) -> Halving:
-    """The rule by which a renderer with a graphics driver computes the next mip level of a texture.
+    """Returns the rule by which a renderer with a graphics driver computes the next mip level of a texture:
+    `middles` or `areas` (see `Halving`).
 
     Filament uses its own rule on every driver. With OpenGL the driver decides: Mesa interpolates at texel centres,
     NVIDIA averages areas. On an H100, composed pictures differ from renders by up to 7 levels of 255 with the wrong
@@ -40,18 +41,19 @@ def halving_of(renderer: str, driver: str) -> Halving:
 
     Args:
         renderer: name of the renderer.
-        driver: description of the OpenGL driver.
+        driver: description of the OpenGL driver, as in the dataset's manifest.
     """
     return "areas" if renderer != "filament" and "nvidia" in driver.casefold() else "middles"
 
 
 @cache
 def halving_matrix(size: int, halving: Halving = "middles") -> Array:
-    """The (max(1, size // 2), size) matrix that computes the next mip level along one axis; read-only.
+    """Returns the (max(1, size // 2), size) matrix that computes the next mip level along one axis; cached and
+    read-only.
 
     Args:
         size: number of texels along the axis.
-        halving: rule of halving.
+        halving: rule for an odd number of texels, see `Halving`.
     """
     target = max(1, size // 2)
     if halving == "areas":
@@ -67,15 +69,16 @@ def halving_matrix(size: int, halving: Halving = "middles") -> Array:
 
 @lru_cache(maxsize=16)
 def axis_matrices(patch_px: int, face_px: int, halving: Halving = "middles") -> tuple[Array, ...]:
-    """One matrix per mip level, from the finest to a single texel: patch pixels to texels along one axis.
+    """Returns, for each mip level, the matrix that computes its texels along one axis from the patch's pixels;
+    cached.
 
     Args:
         patch_px: number of the patch's pixels along the axis.
         face_px: number of the texture's texels along the axis.
-        halving: rule of halving.
+        halving: rule for an odd number of texels, see `Halving`.
 
     Returns:
-        (texels of the level, patch_px) matrices; rows sum to 1.
+        One (texels of the level, patch_px) matrix per level, from the full texture to a single texel; rows sum to 1.
     """
     matrices = [box_matrix(patch_px, face_px)]
     while matrices[-1].shape[0] > 1:
@@ -85,10 +88,13 @@ def axis_matrices(patch_px: int, face_px: int, halving: Halving = "middles") -> 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reads:
-    """The weighted sum by which each texel along one axis of a mip level is read from k columns.
+    """Where each texel along one axis of a mip level is read: a weighted sum of k stored texels along this axis.
+
+    If the level is stored, k is 1. If it is not, because it is finer than the patch, the patch's pixels are read
+    instead.
 
     Attributes:
-        index: (texels, k) int64 indices of columns.
+        index: (texels, k) int64 positions along the axis, in the level or in the patch.
         weight: (texels, k) float64 weights; rows sum to 1.
     """
 
@@ -98,15 +104,20 @@ class Reads:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pyramid:
-    """The texels of all mip levels of a texture as one list of columns, for patches of one size.
+    """How the texels of all mip levels of a patch's texture are stored in one array, for patches of one size.
+
+    The array begins with the patch's own pixels, row by row. The levels that are coarser than the patch follow, each
+    row by row. Finer levels are not stored; their texels are weighted sums of the patch's pixels.
 
     Attributes:
         height_px, width_px: size of the patch.
-        halving: rule of halving.
-        rows, columns: for each level, the matrices of both axes.
-        folded: number of the finest levels that are not computed; their texels are read from the patch.
-        starts: for each level, the index of its first column; 0 (the patch) for the levels that are not computed.
-        size: number of columns.
+        halving: rule by which a level with an odd number of texels is halved.
+        rows, columns: for each level, from the finest on, the matrices that compute its rows and columns from the
+            patch: level = rows @ patch @ columns.T.
+        folded: number of the finest levels that are not stored.
+        starts: for each level, the position of its first texel in the array; 0 (the patch) for levels that are not
+            stored.
+        size: number of texels in the array.
     """
 
     height_px: int
@@ -130,7 +141,15 @@ class Pyramid:
         return self.rows[level].shape[0], self.columns[level].shape[0]
 
     def reads(self, level: int) -> tuple[Reads, Reads, int]:
-        """How the texels of a mip level are read: reads along both axes, and the number of columns per texel row."""
+        """Says how the texels of a mip level are read from the array that `spread` returns.
+
+        Args:
+            level: the mip level; 0 is the finest.
+
+        Returns:
+            The reads along the rows and along the columns, and the stride: how many texels each stored row has. The
+                texel at (row, column) of the array's part is at `starts[level] + row * stride + column`.
+        """
         if level < self.folded:
             return _nonzero(self.rows[level]), _nonzero(self.columns[level]), self.width_px
         height, width = self.shape(level)
@@ -140,10 +159,11 @@ class Pyramid:
         """Computes the texels of all mip levels in one array; differentiable.
 
         Args:
-            patch: (..., 3, h, w) pixels of the patch in 0..1.
+            patch: (..., 3, h, w) patch of the pyramid's size, as weights in 0..1: sRGB values, or the light of these
+                values.
 
         Returns:
-            (..., size, 3) texels, level by level and row by row, in the order of `starts`.
+            (..., size, 3) texels: the patch, then the coarser levels, row by row, in the order of `starts`.
         """
         import torch
 
@@ -181,11 +201,11 @@ class Pyramid:
 
 @lru_cache(maxsize=16)
 def pyramid_of(height_px: int, width_px: int, halving: Halving = "middles") -> Pyramid:
-    """The mip levels (pyramid) for patches of one size; cached.
+    """Returns the mip levels for patches of one size; cached.
 
     Args:
         height_px, width_px: size of the patches.
-        halving: rule by which a level with an odd number of texels is halved.
+        halving: rule by which a level with an odd number of texels is halved, see `Halving`.
     """
     rows = list(axis_matrices(height_px, FACE_SIZE_PX[1], halving))
     columns = list(axis_matrices(width_px, FACE_SIZE_PX[0], halving))

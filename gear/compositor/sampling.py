@@ -61,7 +61,13 @@ class SampleScheme:
 
     @staticmethod
     def of(renderer_name: str, quality: Quality, effects: tuple[Effect, ...]) -> SampleScheme:
-        """Makes the sampling rules of a renderer and a quality setting, with the camera's active effects."""
+        """Makes the sampling rules of a renderer and a quality setting.
+
+        Args:
+            renderer_name: name of the renderer that made the pictures.
+            quality: `film` (anti-aliased) or `fast`.
+            effects: the camera's active effects, in the order in which they are applied.
+        """
         is_film = quality == "film"
         return SampleScheme(
             supersampled=is_film and renderer_name != "classic",
@@ -72,10 +78,16 @@ class SampleScheme:
 
 
 def unit_from_image(truth: SurfaceTruth, surface: SurfaceRecord, camera: CameraRecord) -> Array:
-    """The (3, 3) homography from index pixels of the pinhole picture to patch coordinates in 0..1.
+    """Returns the (3, 3) homography from index pixels of the pinhole picture to positions on a patch surface, 0..1
+    to the right and down.
 
     Its third row gives the inverse of depth, positive in front of the camera. It also exists for surfaces that reach
     behind the camera.
+
+    Args:
+        truth: ground truth of the surface in this view, for its pose relative to the camera.
+        surface: the surface, for its width and height in metres.
+        camera: the camera, for its pinhole intrinsics.
     """
     camera_from_surface = RigidTransform("camera", "surface", np.array(truth.camera_from_surface).reshape(4, 4))
     right_m = camera_from_surface.rotation[:, 0] * surface.width_m
@@ -96,6 +108,9 @@ def take_samples(
         pixels: (N,) columns and (N,) rows, index pixels.
         mask: (H, W) bool, True for pixels whose id is that of the surface.
         exposure: camera and scene.
+
+    Returns:
+        The samples of the N pixels, in the order of `pixels`.
     """
     x, y = (np.asarray(axis, dtype=np.float64)[:, None] for axis in pixels)
     weight = np.ones_like(x)

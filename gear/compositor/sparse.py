@@ -26,7 +26,12 @@ class SparseMatrix:
 
     @staticmethod
     def of(matrix: Any, device: torch.device) -> SparseMatrix:
-        """Converts a SciPy CSR matrix of float32 and puts it, with its transpose, on a torch device."""
+        """Converts a SciPy CSR matrix of float32 and puts it, with its transpose, on a torch device.
+
+        Args:
+            matrix: (N, M) SciPy CSR matrix; its indices are sorted in place.
+            device: torch device of the result.
+        """
         return SparseMatrix(_csr(matrix, device), _csr(matrix.T.tocsr(), device))
 
     @property

@@ -13,14 +13,16 @@ from gear.values.geometry import Array
 
 
 def warp_matrix(samples: Samples, pyramid: Pyramid) -> Any:
-    """The sparse matrix of weights with which pixels read a patch's texels: trilinear filtering, repeating texture.
+    """Returns the sparse matrix of weights with which pixels read a patch's texels: trilinear filtering, repeating
+    texture.
 
     Args:
         samples: texture samples of N pixels.
-        pyramid: mip levels for patches of one size.
+        pyramid: mip levels for patches of one size, whose texels `Pyramid.spread` puts in one array.
 
     Returns:
-        (N, columns) SciPy CSR matrix of float32; rows sum to 1.
+        (N, `pyramid.size`) SciPy CSR matrix of float32, by which the texels of `Pyramid.spread` are multiplied; rows
+        sum to 1.
     """
     count, each = samples.weight.shape
     pixel = np.repeat(np.arange(count), each)

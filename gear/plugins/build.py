@@ -24,6 +24,10 @@ NO_OPTIONS = Mapping({}, Place("defaults"))
 def find(kind: Kind, name: str) -> PluginEntry:
     """Finds a plugin by its kind and name in this environment's catalogue.
 
+    Args:
+        kind: kind of plugin, such as `model` or `attack`.
+        name: name of the plugin, or `package/name`.
+
     Raises:
         UnknownNameError: there is no such plugin.
         DuplicateNameError: several packages have a plugin of this name.
@@ -32,7 +36,11 @@ def find(kind: Kind, name: str) -> PluginEntry:
 
 
 def plugins_of_kind(kind: Kind) -> tuple[PluginEntry, ...]:
-    """All plugins of a kind in this environment, sorted by name."""
+    """Returns all plugins of a kind in this environment, sorted by name.
+
+    Args:
+        kind: kind of plugin, such as `model` or `attack`.
+    """
     return catalogue().of_kind(kind)
 
 
@@ -58,6 +66,10 @@ def name_of_task(written: JsonMapping[str, Any]) -> str:
 def build(plugin: PluginEntry, options: Node = NO_OPTIONS) -> Any:
     """Builds a plugin's product (a task, model, attack, defense, controller or metric) from its options.
 
+    Args:
+        plugin: the plugin, from `find`.
+        options: the options as read from a config or the command line; options that are left out have their defaults.
+
     Raises:
         ConfigError: the options do not fit.
         PluginError: the `build` function of another package failed.
@@ -69,7 +81,12 @@ def build(plugin: PluginEntry, options: Node = NO_OPTIONS) -> Any:
 
 @contextlib.contextmanager
 def blamed(plugin: PluginEntry, stage: str) -> Iterator[None]:
-    """A context for running a plugin's code: exceptions get the plugin's name, and output to stdout goes to stderr.
+    """A context for running a plugin's code: exceptions get the plugin's name, and output to stdout goes to
+    stderr.
+
+    Args:
+        plugin: the plugin whose code runs.
+        stage: what the code does, for the message, such as `build`.
 
     Raises:
         PluginError: code of another package raised something other than a `GearError`. Exceptions of built-in plugins
@@ -117,7 +134,12 @@ def traced(founds: Iterable[PluginEntry], stage: str) -> Iterator[None]:
 
 
 def build_task(name: str, options: Node = NO_OPTIONS) -> tuple[TaskSpec[Any], Task[Any, Any]]:
-    """Builds a task from its options, and returns its spec (the plugin's description) and the task."""
+    """Builds a task from its options, and returns the plugin's description (spec) and the task.
+
+    Args:
+        name: name of the task's plugin, or `package/name`.
+        options: the task's options; options that are left out have their defaults.
+    """
     found = find("task", name)
     assert isinstance(found.spec, TaskSpec)
     return found.spec, build(found, options)

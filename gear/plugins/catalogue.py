@@ -27,7 +27,13 @@ class Owner:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PluginEntry:
-    """A working plugin in the catalogue: its kind, its spec and its package."""
+    """A working plugin in the catalogue: its kind, its spec and its package.
+
+    Attributes:
+        kind: kind of plugin, such as `model` or `attack`.
+        spec: the plugin's description: name, options and `build` function.
+        owner: the package that contains the plugin.
+    """
 
     kind: Kind
     spec: AnySpec
@@ -71,7 +77,11 @@ class Catalogue:
     broken: tuple[Broken, ...] = field(default=())
 
     def of_kind(self, kind: Kind) -> tuple[PluginEntry, ...]:
-        """The plugins of a kind, sorted by name, then by package."""
+        """The plugins of a kind, sorted by name, then by package.
+
+        Args:
+            kind: kind of plugin, such as `model` or `attack`.
+        """
         return tuple(sorted((f for f in self.found if f.kind == kind), key=lambda f: (f.spec.name, f.owner.package)))
 
     def names(self, kind: Kind) -> tuple[str, ...]:
@@ -81,7 +91,11 @@ class Catalogue:
         return tuple(f.spec.name if short.count(f.spec.name) == 1 else f.full_name for f in found)
 
     def get(self, kind: Kind, name: str) -> PluginEntry:
-        """The plugin of a kind with a unique short name, or with a full name `package/name`.
+        """Returns the plugin of a kind with a unique short name, or with a full name `package/name`.
+
+        Args:
+            kind: kind of plugin, such as `model` or `attack`.
+            name: short or full name of the plugin.
 
         Raises:
             UnknownNameError: there is no such plugin; the message suggests similar names and lists plugins that failed

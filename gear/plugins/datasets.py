@@ -66,7 +66,11 @@ def task_of(root: Path, plan: Plan) -> Task[Any, Any]:
 
 
 def root_and_split(path: str | Path) -> tuple[Path, str | None]:
-    """Splits a path written as `DIR` or `DIR:SPLIT` into the dataset's root and the split's name (None for `DIR`)."""
+    """Splits a path written as `DIR` or `DIR:SPLIT` into the dataset's root and the split's name (None for `DIR`).
+
+    Args:
+        path: the path; a path that exists is not split, even with a colon.
+    """
     if not Path(path).exists() and ":" in str(path):
         text, _, split = str(path).rpartition(":")
         return Path(text), split
@@ -74,7 +78,12 @@ def root_and_split(path: str | Path) -> tuple[Path, str | None]:
 
 
 def roots_of(folder: Path) -> list[Path]:
-    """The folder itself if it is the root of a dataset, otherwise the sorted roots of datasets inside the folder."""
+    """Returns the folder itself if it is the root of a dataset, otherwise the sorted roots of datasets inside the
+    folder.
+
+    Args:
+        folder: the folder; it is searched `DEEPEST` levels deep.
+    """
     if next(folder.glob("gear/*/plan.json"), None) is not None:
         return [folder]
     plans = (plan for depth in range(DEEPEST + 1) for plan in folder.glob("*/" * depth + "gear/*/plan.json"))

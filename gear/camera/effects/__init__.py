@@ -53,6 +53,8 @@ def _parameters() -> Iterator[DerivedField]:
 class CameraEffects:
     """Parameters of all camera effects in one object, for the config's `camera` section; by default all effects
     are off.
+
+    The constructor takes them by name and raises `FieldError` for a value out of range.
     """
 
     if TYPE_CHECKING:
@@ -85,8 +87,11 @@ class CameraEffects:
 
 
 def recorded_effects(camera: CameraRecord) -> tuple[Effect, ...]:
-    """The pixel-moving effects, such as lens distortion, with which the pictures of a camera were made, from the
-    camera's record.
+    """Restores the effects that move pixels, such as lens distortion, from the record of a camera with which
+    pictures were made.
+
+    Args:
+        camera: the camera's record in a scene record.
 
     Returns:
         An empty tuple for a pinhole camera, otherwise a tuple with one effect.

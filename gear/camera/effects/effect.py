@@ -155,7 +155,11 @@ class Effect(ABC):
         return samples
 
     def check(self, camera: CameraRecord) -> None:
-        """Checks that the effect's parameters are valid for a camera. The default implementation accepts every camera.
+        """Checks that the effect's parameters are valid for a camera. The default implementation accepts every
+        camera.
+
+        Args:
+            camera: the camera, for its size and intrinsics.
 
         Raises:
             FieldError: a parameter is not valid; the message names it.
@@ -163,23 +167,31 @@ class Effect(ABC):
         return
 
     def recorded(self, camera: CameraRecord) -> CameraRecord:
-        """The camera's record, completed with the parameters of the effect.
+        """Returns the camera's record, completed with the parameters of the effect, so that `from_record` can
+        restore it.
 
-        `from_record` restores the effect from this record. The default returns the record unchanged, for effects that
-        do not move pixels.
+        The default returns the record unchanged, for effects that do not move pixels.
+
+        Args:
+            camera: record of the camera without the effect.
         """
         return camera
 
     @classmethod
     def from_record(cls, camera: CameraRecord) -> Effect | None:
-        """Restores the effect from a camera's record, for effects with `MOVES_PIXELS`.
+        """Restores the effect from a camera's record, for effects with `MOVES_PIXELS`; None if the record has no
+        such effect.
 
-        The result is None if the record has no such effect.
+        Args:
+            camera: record of a camera that `recorded` completed.
         """
         return None
 
     def pixel_map(self, camera: CameraRecord) -> PixelMap:
-        """The mapping between the pixels with and without the effect, for effects with `MOVES_PIXELS`.
+        """Returns the mapping between the pixels with and without the effect, for effects with `MOVES_PIXELS`.
+
+        Args:
+            camera: the camera, for its size and pinhole intrinsics.
 
         Raises:
             NotImplementedError: the effect does not move pixels.

@@ -82,6 +82,10 @@ class LensDistortion(Effect):
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
         """Distorts a view: colour is resampled bilinearly and rounded; depth and ids are taken from the nearest
         pixel.
+
+        Args:
+            view: view of the pinhole camera, with colour.
+            exposure: camera and scene of the picture.
         """
         return distort(view, self.lens, exposure.camera.intrinsics)
 
@@ -119,8 +123,12 @@ class LensDistortion(Effect):
         )
 
     def check(self, camera: CameraRecord) -> None:
-        """Checks that the distortion does not fold the picture over: no two points of the pinhole picture appear at the
+        """Checks that the distortion does not fold the picture over: no two points of the pinhole picture appear
+        at the
         same point.
+
+        Args:
+            camera: the camera, for its pinhole intrinsics.
 
         Raises:
             FieldError: the picture would fold over.
@@ -131,13 +139,21 @@ class LensDistortion(Effect):
             raise FieldError("lens", f"{error}; take k1 and k2 nearer to 0, or a narrower field of view") from error
 
     def recorded(self, camera: CameraRecord) -> CameraRecord:
-        """The camera's record, completed with the coefficients of the distortion."""
+        """The camera's record, completed with the coefficients of the distortion.
+
+        Args:
+            camera: record of the pinhole camera.
+        """
         found = lens_map(self.lens, camera.intrinsics)
         return replace(camera, lens=LensRecord(k1=self.lens.k1, k2=self.lens.k2, focal_px=found.focal_px))
 
     @classmethod
     def from_record(cls, camera: CameraRecord) -> LensDistortion | None:
-        """The lens distortion that a camera's record describes; None for a pinhole camera."""
+        """The lens distortion that a camera's record describes; None for a pinhole camera.
+
+        Args:
+            camera: the camera's record.
+        """
         return None if camera.lens is None else cls(lens=Lens(k1=camera.lens.k1, k2=camera.lens.k2))
 
     def pixel_map(self, camera: CameraRecord) -> PixelMap:
@@ -145,6 +161,9 @@ class LensDistortion(Effect):
 
         Outside the picture's corners, `forward` is extended linearly, because the polynomial would fold over there or
         grow without bounds.
+
+        Args:
+            camera: the camera, for its pinhole intrinsics.
 
         Raises:
             ValueError: the distortion folds the picture over.

@@ -53,8 +53,13 @@ class MotionBlur(Effect):
         return self.shutter_s > 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
-        """Blurs the colour of a view and rounds it. Depth and ids are not blurred: they belong to the middle moment of
+        """Blurs the colour of a view and rounds it. Depth and ids are not blurred: they belong to the middle
+        moment of
         the exposure.
+
+        Args:
+            view: the sharp view, with colour.
+            exposure: camera and scene of the picture, for the ego car's velocity.
         """
         import cv2  # not at the top: configs are read without OpenCV
 
@@ -78,8 +83,13 @@ class MotionBlur(Effect):
         return total / MOMENTS
 
     def trace(self, samples: PixelSamples, exposure: Exposure) -> PixelSamples:
-        """Replaces (N, S) samples of the blurred picture by the (N, 9 S) samples of the sharp picture that are averaged
+        """Replaces (N, S) samples of the blurred picture by the (N, 9 S) samples of the sharp picture that are
+        averaged
         (`MOMENTS` = 9).
+
+        Args:
+            samples: pixels of the blurred picture.
+            exposure: camera and scene of the picture.
         """
         pinhole = exposure.camera.intrinsics
         inverse = np.maximum(samples.inverse_depth(samples.x, samples.y), 0.0)

@@ -49,7 +49,12 @@ class Noise(Effect):
         return self.shot_noise > 0 or self.read_noise > 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
-        """Adds noise to the colour of a view, rounded and clipped to 0..`LINEAR_FULL_SCALE`."""
+        """Adds noise to the colour of a view, rounded and clipped to 0..`LINEAR_FULL_SCALE`.
+
+        Args:
+            view: the view without noise, with colour.
+            exposure: camera and scene of the picture; they determine the random draws.
+        """
         assert view.linear_rgb is not None
         light = view.linear_rgb.astype(np.float32)
         variance = light * np.float32((self.shot_noise / 100) ** 2 * LINEAR_FULL_SCALE)

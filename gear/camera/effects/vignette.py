@@ -39,7 +39,12 @@ class Vignette(Effect):
         return self.vignette > 0
 
     def apply(self, view: RawView, exposure: Exposure) -> RawView:
-        """Darkens the corners of a view; colours are rounded."""
+        """Darkens the corners of a view; colours are rounded.
+
+        Args:
+            view: the view without vignette, with colour.
+            exposure: not used.
+        """
         import cv2  # imported here, so that configs can be read without OpenCV
 
         assert view.linear_rgb is not None

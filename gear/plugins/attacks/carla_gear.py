@@ -44,10 +44,14 @@ class CarlaGearConfig:
 
 
 class CarlaGear:
-    """The attack `carla_gear`: the gradient of each loss term is scaled to length 1, and the learning rate is constant.
+    """The attack `carla_gear`: the gradient of each loss term is scaled to length 1, and the learning rate is
+    constant.
 
     The weight gamma of the first loss term is 1 for segmentation and 0.8 for depth
     (`gear.plugins.attacks.optimisation.objectives` defines the terms).
+
+    Args:
+        config: options of the attack.
     """
 
     def __init__(self, config: CarlaGearConfig) -> None:
@@ -75,6 +79,9 @@ class CarlaGear:
             budget: number of steps, and of queries for black-box attacks.
             rng: random generator of the attack.
             monitor: receives the progress and the patches of each step; None for no monitor.
+
+        Returns:
+            Patches named `patch_0`, `patch_1`, …, in the order of the scene's surfaces.
         """
         from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
 
@@ -85,7 +92,11 @@ class CarlaGear:
         )
 
     def settings(self, sample: Any) -> Settings:
-        """The paper's settings of the optimisation, chosen by the task to which the sample belongs."""
+        """Returns the paper's settings of the optimisation for the task of a sample.
+
+        Args:
+            sample: any sample of the dataset; its ground truth shows the task.
+        """
         task = task_of(sample)
         return Settings(
             height_px=self._config.height_px,
@@ -98,7 +109,11 @@ class CarlaGear:
         )
 
     def objective(self, sample: Any) -> Objective:
-        """The paper's objective (what the attack maximises), chosen by the task to which the sample belongs."""
+        """Returns the paper's objective (what the attack maximises) for the task of a sample.
+
+        Args:
+            sample: any sample of the dataset; its ground truth shows the task.
+        """
         from gear.plugins.attacks.optimisation.objectives import DepthObjective, LossObjective, SemsegObjective
 
         task = task_of(sample)
@@ -119,7 +134,12 @@ BRIGHTNESS: dict[PaperTask, float] = {"semseg": 0.02 / 0.224, "depth": 0.02, "de
 
 
 def task_of(sample: Any) -> PaperTask:
-    """The name of the task to which a sample belongs, found by its ground truth and its number of cameras."""
+    """Returns the name of the task to which a sample belongs, found by its ground truth and its number of cameras.
+
+    Args:
+        sample: with `label_ids` `semseg`, with `depth_m` `depth`; otherwise `stereo3d` with several cameras, `detect2d`
+            with one.
+    """
     from gear.plugins.attacks.optimisation.objectives import kind_of
 
     kind = kind_of(sample)

@@ -17,6 +17,10 @@ def check_classes(source_class: str, target: str) -> None:
     Each option is empty or the name of a class that Cityscapes evaluates, and `source_class` is allowed only with
     `target`.
 
+    Args:
+        source_class: name of the class whose pixels are attacked; "" for all pixels.
+        target: name of the class into which they shall be turned; "" for an untargeted attack.
+
     Raises:
         FieldError: an option is wrong; the message names it.
     """

@@ -51,13 +51,20 @@ class ControlConfig:
 
 
 class Control:
-    """The attack `control`: makes patches without optimisation and never runs the model."""
+    """The attack `control`: makes patches without optimisation and never runs the model.
+
+    Args:
+        config: options of the attack.
+    """
 
     def __init__(self, config: ControlConfig) -> None:
         self._config = config
 
     def read_sha256(self) -> str | None:
-        """The SHA-256 hash of the unrounded patches in the folder `reference_patches`; None if the option is not used.
+        """Returns the SHA-256 hash of the unrounded patches in the folder `reference_patches`, so that a run
+        records what it read.
+
+        The result is None if the option is not used.
 
         Raises:
             GearError: the folder has no file with unrounded patches.
@@ -87,6 +94,9 @@ class Control:
             budget: number of steps, and of queries for black-box attacks.
             rng: random generator of the attack.
             monitor: receives the progress and the patches of each step; None for no monitor.
+
+        Returns:
+            Patches named `patch_0`, `patch_1`, …, in the order of the scene's surfaces.
 
         Raises:
             GearError: the folder `reference_patches` has fewer patches than the scene has surfaces, or no unrounded
@@ -132,7 +142,11 @@ def matched(original: Floats, rng: np.random.Generator) -> Floats:
 
 
 def read_exact(folder: Path) -> list[Floats]:
-    """The unrounded patches in a folder that `gear attack` wrote: (H, W, 3) in 0..1 each, in the order of the surfaces.
+    """Reads the unrounded patches from a folder that `gear attack` wrote: (H, W, 3) float64 in 0..1 each, in the
+    order of the surfaces.
+
+    Args:
+        folder: the folder with the file `patch.safetensors`.
 
     Raises:
         GearError: the folder has no file with unrounded patches, or the file is damaged.

@@ -39,20 +39,29 @@ class DetectionGoal:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One term for each loss of the detector: the negative loss against the labels that it shall predict.
+        """Returns one term for each loss of the detector: the negative loss against the labels that it shall
+        predict.
 
         Args:
             model: the attacked network.
             views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
             samples: the B samples with their ground truth.
-            indices: indices of these samples in the dataset.
+            indices: indices of these samples in the dataset; not used.
+
+        Returns:
+            The terms by the names of the losses, without `left_out`.
         """
         wanted = [self.rewritten(sample) for sample in samples]
         losses = model.forward(views, wanted)
         return {name: Term(value=-loss) for name, loss in losses.items() if name not in self.left_out}
 
     def rewritten(self, sample: Any) -> Any:
-        """A copy of the sample with the labels that shall be predicted: none, or an object on each visible surface."""
+        """Returns a copy of a sample with the labels that shall be predicted: none, or an object on each visible
+        surface.
+
+        Args:
+            sample: sample with `objects`; for the goal `appear` of 2D detection.
+        """
         objects = self._on_surfaces(sample) if self.goal == "appear" else ()
         return dataclasses.replace(sample, objects=objects)
 

@@ -57,7 +57,11 @@ class EotConfig(Settings):
 
 
 class Eot:
-    """The attack `eot`: optimises patches that are pasted at random positions, without the scene's compositor."""
+    """The attack `eot`: optimises patches that are pasted at random positions, without the scene's compositor.
+
+    Args:
+        config: options of the attack.
+    """
 
     def __init__(self, config: EotConfig) -> None:
         self._config = config
@@ -72,7 +76,8 @@ class Eot:
         rng: np.random.Generator,
         monitor: Monitor | None = None,
     ) -> tuple[Patch, ...]:
-        """Optimises one patch for each patch surface of the scene; all of the patches are pasted into every picture.
+        """Optimises one patch for each patch surface of the scene; all of the patches are pasted into every
+        picture.
 
         Args:
             model: the attacked network.
@@ -81,6 +86,9 @@ class Eot:
             budget: number of steps, and of queries for black-box attacks.
             rng: random generator of the attack.
             monitor: receives the progress and the patches of each step; None for no monitor.
+
+        Returns:
+            Patches named `patch_0`, `patch_1`, …, in the order of the scene's surfaces.
         """
         from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
         from gear.plugins.attacks.optimisation.objectives import default_objective

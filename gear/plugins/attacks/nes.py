@@ -54,7 +54,11 @@ class NesConfig:
 
 
 class Nes:
-    """The attack `nes`: in each step every value changes by `step` along the sign of its estimated gradient."""
+    """The attack `nes`: in each step every value changes by `step` along the sign of its estimated gradient.
+
+    Args:
+        config: options of the attack.
+    """
 
     def __init__(self, config: NesConfig) -> None:
         self._config = config
@@ -78,6 +82,9 @@ class Nes:
             budget: number of steps, and of queries for black-box attacks.
             rng: random generator of the attack.
             monitor: receives the progress and the patches of each step; None for no monitor.
+
+        Returns:
+            Patches named `patch_0`, `patch_1`, …, in the order of the scene's surfaces.
         """
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
         from gear.plugins.attacks.optimisation.loop import batch_of

@@ -75,7 +75,11 @@ class Rp2Config(TextureSettings):
 
 
 class Rp2:
-    """The attack `rp2`: Adam on the sum of all terms."""
+    """The attack `rp2`: Adam on the sum of all terms.
+
+    Args:
+        config: options of the attack.
+    """
 
     def __init__(self, config: Rp2Config) -> None:
         self._config = config
@@ -99,6 +103,9 @@ class Rp2:
             budget: number of steps, and of queries for black-box attacks.
             rng: random generator of the attack.
             monitor: receives the progress and the patches of each step; None for no monitor.
+
+        Returns:
+            Patches named `patch_0`, `patch_1`, …, in the order of the scene's surfaces.
         """
         from gear.plugins.attacks.optimisation.loop import Problem, one_gradient, optimise_textures
 
@@ -112,7 +119,11 @@ class Rp2:
         return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
 
     def objective(self, sample: Any) -> Objective:
-        """The objective for a sample: towards the class `target` if the option is set, otherwise untargeted.
+        """Returns the objective for the task of a sample: towards the class `target` if the option is set,
+        otherwise untargeted.
+
+        Args:
+            sample: any sample of the dataset; its ground truth shows the task.
 
         Raises:
             GearError: `target` or `source_class` is set, but the sample has no semantic labels.

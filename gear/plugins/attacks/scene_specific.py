@@ -81,7 +81,11 @@ SIGNS = {"+": 1.0, "-": -1.0, "0": 0.0}
 
 
 class SceneSpecific:
-    """The attack `scene_specific`: Adam on the textures of all surfaces together."""
+    """The attack `scene_specific`: Adam on the textures of all surfaces together.
+
+    Args:
+        config: options of the attack.
+    """
 
     def __init__(self, config: SceneSpecificConfig) -> None:
         self._config = config
@@ -105,6 +109,9 @@ class SceneSpecific:
             budget: number of steps, and of queries for black-box attacks.
             rng: random generator of the attack.
             monitor: receives the progress and the patches of each step; None for no monitor.
+
+        Returns:
+            Patches named `patch_0`, `patch_1`, …, in the order of the scene's surfaces.
         """
         from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
 
@@ -117,7 +124,12 @@ class SceneSpecific:
         )
 
     def settings(self, sample: Any) -> SceneSpecificConfig:
-        """The attack's options with the learning rate that fits the task of a sample."""
+        """Returns the attack's options with the learning rate that fits the task of a sample, unless the options
+        name one.
+
+        Args:
+            sample: any sample of the dataset; its ground truth shows the task.
+        """
         from gear.plugins.attacks.optimisation.objectives import kind_of
 
         if self._config.learning_rate is not None:
@@ -125,7 +137,10 @@ class SceneSpecific:
         return replace(self._config, learning_rate=LEARNING_RATES.get(kind_of(sample), USUAL_RATE))
 
     def objective(self, sample: Any) -> Objective:
-        """The objective (what the attack maximises) that fits the task of a sample and the options.
+        """Returns the objective (what the attack maximises) that fits the task of a sample and the options.
+
+        Args:
+            sample: any sample of the dataset; its ground truth shows the task.
 
         Raises:
             GearError: an option is set that belongs to another task.

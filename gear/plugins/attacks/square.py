@@ -51,7 +51,11 @@ class SquareConfig:
 
 
 class Square:
-    """The attack `square`: random search that changes one square of one colour at a time."""
+    """The attack `square`: random search that changes one square of one colour at a time.
+
+    Args:
+        config: options of the attack.
+    """
 
     def __init__(self, config: SquareConfig) -> None:
         self._config = config
@@ -75,6 +79,9 @@ class Square:
             budget: number of steps, and of queries for black-box attacks.
             rng: random generator of the attack.
             monitor: receives the progress and the patches of each step; None for no monitor.
+
+        Returns:
+            Patches named `patch_0`, `patch_1`, …, in the order of the scene's surfaces.
         """
         from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
         from gear.plugins.attacks.optimisation.loop import batch_of

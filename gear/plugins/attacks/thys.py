@@ -59,7 +59,11 @@ class ThysConfig(TextureSettings):
 
 
 class Thys:
-    """The attack `thys`: minimises the score of the most confident detection in every picture."""
+    """The attack `thys`: minimises the score of the most confident detection in every picture.
+
+    Args:
+        config: options of the attack.
+    """
 
     def __init__(self, config: ThysConfig) -> None:
         self._config = config
@@ -84,6 +88,9 @@ class Thys:
             rng: random generator of the attack.
             monitor: receives the progress and the patches of each step; None for no monitor.
 
+        Returns:
+            Patches named `patch_0`, `patch_1`, …, in the order of the scene's surfaces.
+
         Raises:
             GearError: the detector has no raw output of objectness or class scores.
         """
@@ -98,7 +105,11 @@ class Thys:
         return optimise_textures(problem, one_gradient(harm, self._penalties), budget=budget, rng=rng, monitor=monitor)
 
     def objective(self, sample: Any) -> Objective:
-        """The objective of the attack: it grows as the score of the most confident detection falls."""
+        """Returns the objective of the attack: it grows as the score of the most confident detection falls.
+
+        Args:
+            sample: not used; the attack is for detectors only.
+        """
         return MaxScoreObjective()
 
     def _harm(self, model: Model, objective: Objective, seen: PatchedBatch) -> Mapping[str, Tensor]:
@@ -132,13 +143,12 @@ class MaxScoreObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One term, `objectness`: the negative mean over the pictures of the highest detection score.
+        """Returns one term, `objectness`: the negative mean over the pictures of the highest detection score.
 
         Args:
             model: the attacked network.
             views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
-            samples: the B samples with their ground truth.
-            indices: indices of these samples in the dataset.
+            samples, indices: not used.
         """
         from gear.contracts.attacks import Term
 
@@ -146,7 +156,10 @@ class MaxScoreObjective:
 
 
 def max_score(outputs: Mapping[str, Tensor]) -> Tensor:
-    """The (B,) highest detection score in each picture, 0 to 1, from a detector's raw outputs.
+    """Returns the (B,) highest detection score in each picture, 0 to 1.
+
+    Args:
+        outputs: a detector's raw outputs by name, (B, ...) logits; the first of `SCORES` that exists is read.
 
     Raises:
         GearError: the detector has no raw output of objectness or class scores.

@@ -52,7 +52,11 @@ class BaselineConfig:
 
 
 class Baseline(ABC):
-    """A driver that keeps to the lane and brakes for the nearest obstacle that its reader finds."""
+    """A driver that keeps to the lane and brakes for the nearest obstacle that its reader (`nearest`) finds.
+
+    Args:
+        config: options of the driver.
+    """
 
     def __init__(self, config: BaselineConfig) -> None:
         self._emergency_ttc_s = config.emergency_ttc_s
@@ -60,15 +64,33 @@ class Baseline(ABC):
 
     @abstractmethod
     def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
-        """The nearest obstacle in the corridor that this frame shows; None for a free corridor."""
+        """Returns the nearest obstacle in the corridor that this frame shows; None for a free corridor.
+
+        Args:
+            observation: what the driver knows in this frame: speed, lane, cameras and the network's prediction.
+            corridor: the strip of road that the car needs, in the ego frame.
+        """
 
     def reset(self, seed: int) -> None:
-        """Forgets the obstacles of an earlier drive; these controllers draw no random numbers."""
+        """Forgets the obstacles of an earlier drive.
+
+        Args:
+            seed: not used, because these controllers draw no random numbers.
+        """
         self._tracker = Tracker()
         self._is_braking = False
 
     def act(self, observation: Observation) -> Action:
-        """Acceleration from the nearest obstacle and the cruising speed, steering from the known lane."""
+        """Chooses the acceleration from the nearest obstacle and the cruising speed, and the steering from the
+        known lane.
+
+        Args:
+            observation: what the driver knows in this frame.
+
+        Returns:
+            The action. Its notes say whether the emergency brake acts (`is_emergency`, 0 or 1), and, where known, the
+            gap in this frame (`seen_gap_m`), the tracked gap (`gap_m`) and the obstacle's speed (`leader_mps`).
+        """
         corridor = Corridor.of(observation)
         sighting = self.nearest(observation, corridor)
         speed_mps = observation.ego.speed_mps
@@ -97,16 +119,13 @@ class Baseline(ABC):
 
 
 def following(speed_mps: float, cruise_mps: float, gap_m: float, leader_mps: float) -> float:
-    """Acceleration of the intelligent driver model.
+    """Returns the acceleration of the intelligent driver model in m/s², negative for braking.
 
     Args:
         speed_mps: speed of the car.
         cruise_mps: desired speed on a free road.
         gap_m: free distance to the obstacle ahead; infinite without one.
         leader_mps: speed of the obstacle.
-
-    Returns:
-        The acceleration in m/s², negative for braking.
     """
     closing_m = speed_mps * (speed_mps - leader_mps) / (2 * math.sqrt(ACCELERATION_MPS2 * COMFORTABLE_MPS2))
     wanted_m = STANDSTILL_GAP_M + max(0.0, speed_mps * HEADWAY_S + closing_m)
@@ -115,7 +134,12 @@ def following(speed_mps: float, cruise_mps: float, gap_m: float, leader_mps: flo
 
 
 def steering(observation: Observation) -> float:
-    """Steering angle in radians by which the middle of the rear axle follows the path (pure pursuit)."""
+    """Returns the steering angle in radians by which the middle of the rear axle follows the path (pure pursuit);
+    positive to the left.
+
+    Args:
+        observation: path in the ego frame, speed and wheelbase.
+    """
     rear = np.array([-observation.car.wheelbase_m / 2, 0.0])
     look_ahead_m = max(LEAST_LOOK_AHEAD_M, LOOK_AHEAD_S * observation.ego.speed_mps)
     distances_m = np.linalg.norm(observation.path_m - rear, axis=1)

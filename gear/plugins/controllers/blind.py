@@ -14,7 +14,11 @@ class Blind(Baseline):
     """The baseline driver without a reader of obstacles."""
 
     def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
-        """Finds nothing."""
+        """Returns None: the driver sees no obstacle.
+
+        Args:
+            observation, corridor: not used.
+        """
         return None
 
 

@@ -16,7 +16,8 @@ SIDE_MARGIN_M = 0.3
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Corridor:
-    """The strip along the centre line of the lane, in the ego frame.
+    """The strip of road along the centre line of the lane that the car needs, in the ego frame (metres ahead,
+    metres to the left).
 
     Attributes:
         path_m: (N, 2) points of the centre line, the first one next to the middle of the car.
@@ -30,7 +31,11 @@ class Corridor:
 
     @staticmethod
     def of(observation: Observation) -> Corridor:
-        """The corridor of the ego car in one frame."""
+        """Makes the corridor of the ego car in one frame: `SIDE_MARGIN_M` wider than the car on each side.
+
+        Args:
+            observation: the frame, for the path and the size of the car.
+        """
         return Corridor(
             path_m=observation.path_m,
             half_width_m=observation.car.half_width_m + SIDE_MARGIN_M,
@@ -62,7 +67,12 @@ class Corridor:
         return arc_m, unit[:, 0] * offsets[:, 1] - unit[:, 1] * offsets[:, 0]
 
     def directions(self, arc_m: Points) -> Points:
-        """(M, 2) unit vectors along the path at (M,) arc lengths, in the ego frame."""
+        """Returns (M, 2) unit vectors along the path, in the ego frame.
+
+        Args:
+            arc_m: (M,) arc lengths from the path's first point, metres; beyond the ends the first or last direction is
+                taken.
+        """
         steps = np.diff(self.path_m, axis=0)
         lengths_m = np.linalg.norm(steps, axis=1)
         index = np.clip(np.searchsorted(np.cumsum(lengths_m), arc_m, side="right"), 0, len(steps) - 1)
@@ -107,7 +117,13 @@ def ground_points(camera: CameraMount, pixels: Points) -> Points:
 
 
 def pixel_rays(camera: CameraMount, pixels: Points) -> Points:
-    """(M, 3) rays of (M, 2) pixels in the axes of the ego frame, with length 1 along the camera's optical axis."""
+    """Returns the (M, 3) rays of pixels in the axes of the ego frame, with length 1 along the camera's optical
+    axis.
+
+    Args:
+        camera: the camera with its pose on the car.
+        pixels: (M, 2) columns and rows, index pixels.
+    """
     pinhole = camera.intrinsics
     rays = np.stack(
         [

@@ -44,14 +44,24 @@ class DepthDriverConfig(BaselineConfig):
 
 
 class DepthDriver(Baseline):
-    """The baseline driver with a depth map."""
+    """The baseline driver with a depth map.
+
+    Args:
+        config: options of the driver.
+    """
 
     def __init__(self, config: DepthDriverConfig) -> None:
         super().__init__(config)
         self._percentile = config.percentile
 
     def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
-        """The nearest part of the points in the corridor that are higher than the ground."""
+        """Returns the nearest part (a percentile) of the points in the corridor that are higher than the ground;
+        None if there are too few.
+
+        Args:
+            observation: the frame; its prediction is the (H, W) depth map of the first camera, metres.
+            corridor: the strip of road that the car needs, in the ego frame.
+        """
         camera = observation.cameras[0]
         depth_m = np.asarray(observation.prediction, np.float64)[::STRIDE_PX, ::STRIDE_PX]
         rows, columns = np.mgrid[0 : camera.height_px : STRIDE_PX, 0 : camera.width_px : STRIDE_PX]

@@ -41,14 +41,23 @@ class Detect2dDriverConfig(BaselineConfig):
 
 
 class Detect2dDriver(Baseline):
-    """The baseline driver with a detector of 2D boxes."""
+    """The baseline driver with a detector of 2D boxes.
+
+    Args:
+        config: options of the driver.
+    """
 
     def __init__(self, config: Detect2dDriverConfig) -> None:
         super().__init__(config)
         self._min_score = config.min_score
 
     def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
-        """The box of a road user whose foot is in the corridor with the smallest gap."""
+        """Returns the road user whose box has its foot in the corridor with the smallest gap; None without one.
+
+        Args:
+            observation: the frame; its prediction is the detections in the first camera's picture.
+            corridor: the strip of road that the car needs, in the ego frame.
+        """
         camera, gaps_m = observation.cameras[0], []
         for detection in observation.prediction:
             if detection.score < self._min_score or detection.category_id not in ROAD_USERS:

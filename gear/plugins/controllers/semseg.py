@@ -47,14 +47,23 @@ class SemsegDriverConfig(BaselineConfig):
 
 
 class SemsegDriver(Baseline):
-    """The baseline driver with a map of labels."""
+    """The baseline driver with a map of labels.
+
+    Args:
+        config: options of the driver.
+    """
 
     def __init__(self, config: SemsegDriverConfig) -> None:
         super().__init__(config)
         self._least_drivable = config.least_drivable
 
     def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
-        """The end of the drivable area in the corridor."""
+        """Returns the end of the drivable area in the corridor as an obstacle; None if none is in view.
+
+        Args:
+            observation: the frame; its prediction is the (H, W) map of label ids of the first camera.
+            corridor: the strip of road that the car needs, in the ego frame.
+        """
         labels = np.asarray(observation.prediction)
         arc_m = np.arange(corridor.front_m, min(FARTHEST_M, corridor.length_m), STEP_M)
         if not len(arc_m):

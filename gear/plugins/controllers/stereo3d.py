@@ -38,14 +38,23 @@ class Stereo3dDriverConfig(BaselineConfig):
 
 
 class Stereo3dDriver(Baseline):
-    """The baseline driver with a detector of 3D boxes."""
+    """The baseline driver with a detector of 3D boxes.
+
+    Args:
+        config: options of the driver.
+    """
 
     def __init__(self, config: Stereo3dDriverConfig) -> None:
         super().__init__(config)
         self._min_score = config.min_score
 
     def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
-        """The 3D box that reaches into the corridor with the smallest gap."""
+        """Returns the 3D box that reaches into the corridor with the smallest gap; None without one.
+
+        Args:
+            observation: the frame; its prediction is KITTI labels in the frame of the first camera.
+            corridor: the strip of road that the car needs, in the ego frame.
+        """
         gaps_m = [
             corridor.gap_m(footprint(observation.cameras[0], label), corridor.length_m)
             for label in observation.prediction

@@ -68,7 +68,9 @@ class Track:
 
 
 class Tracker:
-    """Follows obstacles over the frames of a drive."""
+    """Follows obstacles over the frames of a drive: confirms them, estimates their speed and remembers them for
+    `MEMORY_S`.
+    """
 
     def __init__(self) -> None:
         self._tracks: list[Track] = []

@@ -27,7 +27,13 @@ class Truth(Baseline):
     """The baseline driver with the true positions of all road users, and their motion over the next seconds."""
 
     def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
-        """The nearest road user that is in the corridor, or that will be there when the car arrives."""
+        """Returns the nearest road user that is in the corridor, or that will be there when the car arrives; None
+        without one.
+
+        Args:
+            observation: the frame with the true road users.
+            corridor: the strip of road that the car needs, in the ego frame.
+        """
         seen = [self._sighting(observation, corridor, obstacle) for obstacle in observation.obstacles]
         return min((one for one in seen if one is not None), key=lambda one: one.gap_m, default=None)
 
@@ -58,7 +64,11 @@ class Truth(Baseline):
 
 
 def outline(obstacle: Obstacle) -> Points:
-    """(8, 2) corners and middles of the sides of an obstacle's footprint, in the ego frame."""
+    """Returns (8, 2) corners and middles of the sides of a road user's footprint, in order, in the ego frame.
+
+    Args:
+        obstacle: position, size and yaw of the road user.
+    """
     c, s = math.cos(obstacle.yaw_rad), math.sin(obstacle.yaw_rad)
     signs = np.array([(1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1)], np.float64)
     local = signs * np.array([obstacle.half_length_m, obstacle.half_width_m])

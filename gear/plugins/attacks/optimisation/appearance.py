@@ -11,7 +11,10 @@ from gear.plugins.attacks.optimisation.settings import Appearance
 
 
 def vary(appearance: Appearance, patch: Tensor, rng: np.random.Generator) -> Tensor:
-    """A random change of a patch's appearance: noise, brightness, contrast and box blur, in this order; differentiable.
+    """Returns a patch with a randomly changed appearance, as printing and photographing would change it;
+    differentiable.
+
+    The changes are noise, brightness, contrast and box blur, in this order.
 
     Args:
         appearance: strengths of the changes.

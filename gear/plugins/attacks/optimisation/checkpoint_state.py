@@ -12,7 +12,12 @@ TEXTURE_AXES = 4
 
 
 def check_saved(saved: State, fresh: State) -> None:
-    """Checks that a saved state has every array of an initial state, with the same shape and dtype and without NaN.
+    """Checks that a saved state has every array of an initial state, with the same shape and dtype and without
+    NaN.
+
+    Args:
+        saved: the saved state, arrays by name; it may have further arrays.
+        fresh: an initial state of the same attack, whose values do not count.
 
     Raises:
         GearError: the saved state is incomplete or damaged, or its patches have another size; the message names the

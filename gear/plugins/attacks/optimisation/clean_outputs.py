@@ -18,12 +18,12 @@ class CleanOutputs:
         self._kept: dict[tuple[int, int], Tensor] = {}
 
     def of(self, model: Model, samples: Sequence[Any], indices: Sequence[int], ask: Callable[[Any], Tensor]) -> Tensor:
-        """The cached values of a batch, (B, ...) in main memory; missing values are computed and stored.
+        """Returns the values of a batch, (B, ...) in main memory; missing values are computed and stored.
 
         Args:
             model: network on whose outputs the values depend.
             samples: samples of the batch.
-            indices: indices of the samples in the dataset.
+            indices: indices of the samples in the dataset, under which the values are stored.
             ask: function that computes the value of one sample; it runs without gradients.
         """
         for sample, index in zip(samples, indices, strict=True):

@@ -13,7 +13,10 @@ def networks_of(model: Any) -> Iterator[tuple[str, nn.Module]]:
     """Yields (name, module) for every torch module of a model.
 
     A `model` that is a module itself yields only ("model", model). Otherwise first its attributes that are modules
-    follow, then its taps (layers with feature maps) as "tap NAME", each sorted by name.
+    follow, then its taps (layers with feature maps) as "tap NAME", each sorted by name. A module may be yielded twice.
+
+    Args:
+        model: a torch module, or any object with `taps()`.
     """
     if isinstance(model, nn.Module):
         yield "model", model
@@ -29,7 +32,10 @@ def networks_of(model: Any) -> Iterator[tuple[str, nn.Module]]:
 def frozen(model: Any) -> Iterator[None]:
     """A context in which no parameter of a model requires a gradient; `requires_grad` is restored at the end.
 
-    Backward passes then compute only the gradients of the pictures.
+    Backward passes then compute only the gradients of the pictures, which is what attacks need.
+
+    Args:
+        model: a torch module, or any object with `taps()`.
     """
     parameters = {id(p): p for _, network in networks_of(model) for p in network.parameters() if p.requires_grad}
     for parameter in parameters.values():

@@ -41,8 +41,19 @@ class TextureOptimiser:
     `state` returns all arrays and numbers from which an interrupted optimisation can be resumed.
 
     Attributes:
+        textures: (S, 3, h, w) float32 in 0..1.
+        mean, square: (S, 3, h, w) running means of the gradient and of its square.
+        rate: peak learning rate, a scalar or (3, 1, 1).
+        done: number of completed steps.
+        seed: seed of the run's further random draws.
         has_gradient: whether any gradient other than zero has reached the textures.
         steps_without: number of successive steps whose gradient was zero, up to now.
+
+    Args:
+        surfaces: number S of patch surfaces.
+        settings: size of the patches, and the learning rate.
+        rng: generator of the first textures and of the seed; not used with a saved state.
+        saved: result of an earlier `state`, to resume from; None to start anew.
     """
 
     def __init__(self, surfaces: int, settings: TextureSettings, rng: np.random.Generator, saved: State | None) -> None:
@@ -61,7 +72,11 @@ class TextureOptimiser:
         self.has_gradient, self.steps_without = bool(saved["has_gradient"]), int(saved["steps_without"])
 
     def note_gradient(self, gradient: float | None) -> None:
-        """Records the length of the objective's gradient in a step; None if nothing could be harmed in the step."""
+        """Records the length of the objective's gradient in a step, in `has_gradient` and `steps_without`.
+
+        Args:
+            gradient: length of the gradient; None if nothing could be harmed in the step.
+        """
         self.steps_without = self.steps_without + 1 if gradient == 0 else 0
         self.has_gradient |= (gradient or 0.0) > 0
 
@@ -117,7 +132,7 @@ class Problem:
         return count
 
     def compose_batch(self, textures: Tensor, indices: Sequence[int], step: int, seed: int) -> PatchedBatch:
-        """A batch of samples with the textures composed into their pictures.
+        """Returns a batch of samples with the textures composed into their pictures.
 
         Changes of the patch's appearance are drawn for each sample; they are the same in both views of a stereo pair.
 
@@ -180,6 +195,9 @@ def optimise_textures(
         monitor: called after every step; it can end the run and provide a saved state to start from.
         before: called before every step with the number of completed steps.
 
+    Returns:
+        Patches named `patch_0`, `patch_1`, …, in the order of the scene's surfaces.
+
     Raises:
         GearError: no gradient of the objective reaches the textures, a gradient is not finite, or there is nothing to
             attack.
@@ -230,10 +248,16 @@ def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
 
 
 def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -> Direction:
-    """Makes the ascent direction of the scene-specific attack, from the objective's and the regularisers' gradients.
+    """Makes the ascent direction of the scene-specific attack, from the objective's and the regularisers'
+    gradients.
 
     The gradient of each term is scaled to length 1 (with `per_term`) and multiplied by the term's weight; the sum is
     scaled to length 1 again. The gradients of the regularisers, scaled to the lengths in the settings, are subtracted.
+
+    Args:
+        problem: the attacked model or group, whose defenses add terms of their own.
+        objective: objective of the attack, a sum of weighted terms.
+        settings: lengths of the regularisers' gradients, and `per_term`.
     """
 
     def ascend(textures: Tensor, batch: PatchedBatch) -> tuple[Tensor, dict[str, float]]:
@@ -294,7 +318,11 @@ def one_gradient(
 
 
 def unit(gradient: Tensor) -> Tensor:
-    """A tensor divided by its length (2-norm over all values); a tensor of zeros is returned unchanged."""
+    """Returns a tensor divided by its length (2-norm over all values); a tensor of zeros is returned unchanged.
+
+    Args:
+        gradient: tensor of any shape.
+    """
     norm = gradient.norm()
     return gradient / norm if norm > 0 else gradient
 

@@ -27,6 +27,9 @@ class Group(nn.Module):
     Attributes:
         members: the models by name.
         device: name of the first member's device.
+
+    Args:
+        members: the models by name, at least one.
     """
 
     def __init__(self, members: Mapping[str, Model]) -> None:
@@ -36,11 +39,21 @@ class Group(nn.Module):
         self.networks = _networks(*members.values())
 
     def predict(self, views: Mapping[str, UInt8Image]) -> dict[str, Any]:
-        """The prediction of every member for one sample, by the member's name."""
+        """Returns the prediction of every member for one sample, by the member's name.
+
+        Args:
+            views: (H, W, 3) uint8 pictures of the sample by camera name.
+        """
         return {name: member.predict(views) for name, member in self.members.items()}
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """The outputs of all members for a batch, or their losses if `targets` are given, named `<member>/<name>`."""
+        """Returns the outputs of all members for a batch, or their losses if `targets` are given, named
+        `<member>/<name>`.
+
+        Args:
+            views: (B, 3, H, W) pictures by camera name, float in 0..1.
+            targets: the B samples with their ground truth; None for outputs.
+        """
         return {
             f"{name}/{key}": value
             for name, member in self.members.items()
@@ -106,23 +119,34 @@ class Defended(nn.Module):
         self.networks = _networks(*(one for one in inside if one is not model or not isinstance(one, nn.Module)))
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """The model's prediction for pictures of one sample, which are not cleaned by the defense.
+        """Returns the model's prediction for pictures of one sample, which are not cleaned by the defense.
 
         Attacks use `forward`, which cleans the pictures.
+
+        Args:
+            views: (H, W, 3) uint8 pictures of the sample by camera name.
         """
         return self.model.predict(views)
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """The model's outputs, or losses if `targets` are given, on the cleaned pictures.
+        """Returns the model's outputs by name, or its losses if `targets` are given, on the cleaned pictures.
 
         Gradients pass the defense as its spec declares.
+
+        Args:
+            views: (B, 3, H, W) pictures by camera name, float in 0..1.
+            targets: the B samples with their ground truth; None for outputs.
         """
         return self.model.forward(self.defended(views).views, targets)
 
     def defended(self, views: Mapping[str, Tensor]) -> DefendedBatch:
-        """The cleaned pictures of a (B, 3, H, W) batch by camera name, with the defense's scores and masks if any.
+        """Returns the cleaned pictures of a batch, with the defense's scores and masks if any.
 
-        The last result is cached with its autograd graph.
+        The last result is kept with its autograd graph, so that outputs and terms of one step clean the pictures only
+        once.
+
+        Args:
+            views: (B, 3, H, W) pictures by camera name, float in 0..1.
         """
         has_gradients = torch.is_grad_enabled()
         if self._last is None or self._last[0] is not views or self._last[1] != has_gradients:
@@ -135,7 +159,8 @@ class Defended(nn.Module):
 
 
 class Cleaned(Defended):
-    """A model in front of which a defense without gradients cleans the pictures, for attacks that need no gradients.
+    """A model in front of which a defense without gradients cleans the pictures, for attacks that need no
+    gradients.
 
     The defense receives uint8 pictures, one sample at a time.
 
@@ -143,7 +168,8 @@ class Cleaned(Defended):
         model: the model as the defense's `wrap` returned it.
         defense: the defense.
         bare: the model before `wrap`.
-        clean: function that cleans the pictures of one sample.
+        clean: function that cleans the (H, W, 3) uint8 pictures of one sample, by camera name.
+        calibrate: function that calibrates the defense; the method `calibrate` calls it.
     """
 
     def __init__(
@@ -157,7 +183,13 @@ class Cleaned(Defended):
         super().__init__(model, defense, bare, partial(_cleaned_as_bytes, clean), calibrate=calibrate)
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """The model's outputs, or losses if `targets` are given, on the cleaned pictures; without gradients."""
+        """Returns the model's outputs by name, or its losses if `targets` are given, on the cleaned pictures; no
+        gradients.
+
+        Args:
+            views: (B, 3, H, W) pictures by camera name, float in 0..1; they are rounded to bytes.
+            targets: the B samples with their ground truth; None for outputs.
+        """
         with torch.no_grad():
             return super().forward(views, targets)
 
@@ -188,12 +220,21 @@ def _networks(*models: Model) -> nn.ModuleList:
 
 
 def device_name(model: Model) -> str:
-    """The name of a model's device; `cpu` if the model has no attribute `device`."""
+    """Returns the name of a model's device, such as `cuda:0`; `cpu` if the model has no attribute `device`.
+
+    Args:
+        model: any model.
+    """
     return str(getattr(model, "device", "cpu"))
 
 
 def members_of(model: Model) -> Mapping[str, Model]:
-    """The attacked models by the prefix of their term names: `<member>/` in a group, "" for a single model."""
+    """Returns the attacked models by the prefix of their term names: `<member>/` in a group, "" for a single
+    model.
+
+    Args:
+        model: a model or a `Group`.
+    """
     if isinstance(model, Group):
         return {f"{name}/": member for name, member in model.members.items()}
     return {"": model}

@@ -47,7 +47,11 @@ def default_objective(sample: Any) -> Objective:
 
 
 def kind_of(sample: Any) -> Kind:
-    """The kind of objective that fits a sample: `semseg` for labels, `depth` for a depth map, else `losses`."""
+    """The kind of objective that fits a sample: `semseg` for labels, `depth` for a depth map, else `losses`.
+
+    Args:
+        sample: a sample of any task.
+    """
     if hasattr(sample, "label_ids"):
         return "semseg"
     return "depth" if hasattr(sample, "depth_m") else "losses"
@@ -373,7 +377,14 @@ def not_finite(what: str, indices: Sequence[int]) -> GearError:
 
 
 def loss_names(model: Model, sample: Any) -> list[str]:
-    """The names of the training losses of a model, or of all members of a group, in the order of `forward`."""
+    """The names of a model's training losses, in the order in which its `forward` with targets returns them.
+
+    For a `Group` of models: the names of all members' losses, without the members' prefixes, each name once.
+
+    Args:
+        model: the attacked model, or a group of models; it runs once, without gradients.
+        sample: one sample with pictures and ground truth.
+    """
     views = as_batch([sample.images], list(sample.images))
     with torch.no_grad(), frozen(model):
         found = [name for member in members_of(model).values() for name in member.forward(views, [sample])]
@@ -381,7 +392,11 @@ def loss_names(model: Model, sample: Any) -> list[str]:
 
 
 def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
-    """The (B, H, W) int64 target classes of samples, for logits over 19 train ids or 34 label ids; 255 is ignored.
+    """Returns the (B, H, W) int64 target classes of samples; 255 is ignored.
+
+    Args:
+        samples: the B samples with `label_ids`.
+        classes: number of channels of the logits: 19 for train ids, more for label ids.
 
     Raises:
         ValueError: there are fewer classes than Cityscapes has train ids.
@@ -396,7 +411,12 @@ def train_labels(samples: Sequence[Any], classes: int) -> Tensor:
 
 
 def class_of(label_id: int, classes: int) -> int:
-    """The channel of a Cityscapes label id in logits with `classes` channels: its train id for 19, otherwise the id."""
+    """Returns the channel of a class in logits: its train id for 19 channels, otherwise its label id.
+
+    Args:
+        label_id: label id of the class (Cityscapes).
+        classes: number of channels of the logits.
+    """
     return int(TRAIN_IDS[label_id]) if classes == TRAIN_CLASSES else label_id
 
 

@@ -31,6 +31,13 @@ class BlackBoxObjective:
 
     Attributes:
         left: number of remaining queries.
+
+    Args:
+        model: the attacked model, or a group of models.
+        dataset: samples of the scene.
+        compositor: renderer of patches into the pictures of these samples.
+        objective: the harm that is computed.
+        budget: its `queries` is the number of queries; it must not be None.
     """
 
     def __init__(
@@ -47,7 +54,10 @@ class BlackBoxObjective:
         return {"left": np.array(self.left), "paid": np.array(sorted(self._seen), np.int64)}
 
     def restore(self, state: State) -> None:
-        """Restores the number of queries and the counted samples from a checkpoint that contains the arrays of `state`.
+        """Restores the number of queries and the counted samples from a checkpoint.
+
+        Args:
+            state: checkpoint that contains the arrays of `state`.
 
         Raises:
             GearError: the checkpoint lacks these arrays, or they are damaged.
@@ -56,16 +66,22 @@ class BlackBoxObjective:
         self.left, self._seen = int(state["left"]), {int(index) for index in state["paid"]}
 
     def cost(self, indices: Sequence[int]) -> int:
-        """The number of queries that one evaluation of the harm on these samples costs."""
+        """Returns the number of queries that one evaluation of the harm costs.
+
+        Args:
+            indices: indices of the samples in the dataset.
+        """
         asks = isinstance(self._objective, HarmObjective) and self._objective.needs_clean_output
         clean = len(set(indices) - self._seen) if asks else 0
         return len(members_of(self._model)) * (1 + clean)
 
     def harm(self, textures: Textures, indices: Sequence[int]) -> float:
-        """The harm of textures on some samples as one number, from forward passes without gradients.
+        """Returns the harm of textures on some samples as one number, from forward passes without gradients;
+        `left` falls by `cost`.
 
         Args:
-            indices: indices of these samples in the dataset.
+            textures: (S, 3, h, w) in 0..1, one texture for each surface.
+            indices: indices of the samples in the dataset.
 
         Raises:
             RuntimeError: fewer queries are left than the evaluation costs.

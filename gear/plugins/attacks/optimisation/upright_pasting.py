@@ -49,7 +49,11 @@ class Upright(Sequence[Any]):
         self._step = 0
 
     def begin(self, step: int) -> None:
-        """Starts a step of the attack: positions are drawn anew for each step."""
+        """Starts a step of the attack: positions are drawn anew for each step.
+
+        Args:
+            step: number of the completed steps, on which the random draws depend.
+        """
         self._step = step
 
     def __len__(self) -> int:
@@ -100,7 +104,12 @@ class Upright(Sequence[Any]):
         return torch.stack(pictures)
 
     def places(self, index: int) -> list[Place]:
-        """The positions of a sample's patches in the current step: side by side, then scaled and shifted at random."""
+        """Returns the positions of a sample's patches in the current step: side by side, then scaled and shifted
+        at random.
+
+        Args:
+            index: index of the sample in the dataset.
+        """
         sample = self._dataset[index]
         height, width = next(iter(sample.images.values())).shape[:2]
         count = len(sample.record.surfaces)

@@ -89,9 +89,14 @@ def tapped(model: Model, batch: Mapping[str, Tensor], names: Iterable[str]) -> d
 
 
 def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:
-    """The name of the tap (readable layer) whose feature map has the fewest cells; `ct1` for BiSeNet.
+    """Returns the name of the tap (readable layer) whose feature map has the fewest cells; `ct1` for BiSeNet.
 
-    If several feature maps have the fewest cells, it is the last of these taps.
+    If several feature maps have the fewest cells, it is the last of these taps. The model runs once, without gradients,
+    except for BiSeNet.
+
+    Args:
+        model: model with taps.
+        views: (H, W, 3) uint8 pictures of one sample by camera name.
 
     Raises:
         GearError: the model has no taps.
@@ -106,6 +111,11 @@ def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:
 
 
 def spread(items: Sequence[Any], max_count: int) -> Iterator[Any]:
-    """Yields at most `max_count` items of a sequence, evenly spaced, starting with the first."""
+    """Returns at most `max_count` items of a sequence, evenly spaced, starting with the first.
+
+    Args:
+        items: the sequence.
+        max_count: largest number of items, at least 1.
+    """
     count = min(max_count, len(items))
     return (items[index * len(items) // count] for index in range(count))

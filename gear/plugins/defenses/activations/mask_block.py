@@ -48,10 +48,13 @@ class MaskBlock:
     numbers: Tensor
 
     def mask(self, shallow: Tensor, deep: Tensor) -> Tensor:
-        """The probability in 0..1 that each cell shows a patch; for two heat maps of any common shape.
+        """Returns the probability in 0..1 that each cell shows a patch, in the shape of the heat maps.
 
         The deep map opens a gate for the shallow map: M = sigmoid(w tanh(w' (H_S G) + b') + b) with G = sigmoid(v
         tanh(v' H_D + c') + c).
+
+        Args:
+            shallow, deep: heat maps H_S of the shallow and H_D of the deep layers, of any common shape.
         """
         gate_in, gate_in_offset, gate_out, gate_out_offset, mask_in, mask_in_offset, mask_out, mask_out_offset = (
             self.numbers
@@ -64,6 +67,9 @@ class MaskBlock:
         """The raw score of an attack, 0 or more: sum(H_D H_S M) / (1 + sum M).
 
         It is high if the shallow heat map H_S and the deep heat map H_D are both high under the mask M.
+
+        Args:
+            shallow, deep: (rows, columns) heat maps of the shallow and of the deep layers.
         """
         return float(self.score_tensor(shallow, deep))
 
@@ -129,7 +135,12 @@ class Fit:
 
 
 def fit_of(block: MaskBlock, examples: Sequence[Example]) -> Fit:
-    """Measures the quality of a fusion block on examples that share one grid."""
+    """Measures the quality of a fusion block on training examples.
+
+    Args:
+        block: the fusion block with its parameters.
+        examples: examples that share one grid, at least one.
+    """
     shallow, deep, truth = _stacked(examples)
     said = block.mask(shallow, deep)
     share = float(truth.double().mean())

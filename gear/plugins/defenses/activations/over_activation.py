@@ -30,15 +30,24 @@ class ChannelStatistics:
     deviation: Tensor
 
     def z_scores(self, features: Tensor) -> Tensor:
-        """The z-scores of a (C, rows, columns) feature map, with the mean and the deviation of each channel."""
+        """Returns the z-scores of a feature map: deviations from the channel's mean, in standard deviations of the
+        channel.
+
+        Args:
+            features: (C, rows, columns) feature map.
+        """
         mean, deviation = self.mean[:, None, None], self.deviation[:, None, None]
         return (features - mean) / (deviation + LEAST_DEVIATION)
 
 
 def channel_statistics(features: Tensor, grid: Cells) -> ChannelStatistics:
-    """Mean and standard deviation of each channel of one (C, h, w) feature map that is resized to a grid.
+    """Returns the mean and standard deviation of each channel of a feature map that is resized to a grid.
 
     The map is not actually resized: each cell has as much weight as there are grid cells to which it is the nearest.
+
+    Args:
+        features: (C, h, w) feature map of one picture.
+        grid: numbers of rows and columns of the grid.
     """
     down, across = (_nearest(*sizes).sum(dim=0) for sizes in zip(features.shape[1:], grid, strict=True))
     times, count = down[:, None] * across, grid[0] * grid[1]
@@ -48,9 +57,11 @@ def channel_statistics(features: Tensor, grid: Cells) -> ChannelStatistics:
 
 
 def mean_of(many: Sequence[ChannelStatistics]) -> ChannelStatistics:
-    """The mean of the channel statistics of several pictures (at least one).
+    """Returns the mean of the channel statistics of several pictures. Means and deviations are averaged
+    separately, as published.
 
-    Means and deviations are averaged separately, as published.
+    Args:
+        many: statistics of each picture, at least one.
     """
     return ChannelStatistics(
         mean=torch.stack([one.mean for one in many]).mean(dim=0),
@@ -59,10 +70,10 @@ def mean_of(many: Sequence[ChannelStatistics]) -> ChannelStatistics:
 
 
 def on_grid(features: Tensor, grid: Cells) -> Tensor:
-    """A (C, h, w) tensor resized by nearest neighbour to (C, rows, columns).
+    """Returns a tensor that is resized by nearest neighbour to (C, rows, columns).
 
     Args:
-        features: feature maps.
+        features: (C, h, w) feature map.
         grid: numbers of rows and columns.
     """
     return functional.interpolate(features[None], size=grid, mode="nearest")[0]
@@ -96,10 +107,13 @@ def pooled_sizes(z: Tensor, grid: Cells, kernels: Sequence[Cells]) -> list[Tenso
 
 
 def refined(pooled: Sequence[Tensor]) -> Tensor:
-    """The heat map of one layer from its pooled magnitudes, given from the largest to the smallest windows.
+    """Returns the (rows, columns) heat map of one layer, from its pooled magnitudes.
 
     H starts as the first map. For each next map, H becomes H / (1 + max H) times that map, so small windows count only
     where large windows are active.
+
+    Args:
+        pooled: (rows, columns) maps of `pooled_sizes`, from the largest to the smallest windows.
     """
     result = pooled[0]
     for one in pooled[1:]:

@@ -41,7 +41,7 @@ class DetectorState:
         layer: name of the tap (layer) whose feature map is read.
         statistics: mean and standard deviation of the features on clean pictures.
         level: raw score above which the alarm is raised.
-        report: figures on the calibration, for the user.
+        report: numbers on the calibration, for the user.
     """
 
     layer: str
@@ -50,7 +50,10 @@ class DetectorState:
     report: FitReport
 
     def fit_report(self) -> FitReport:
-        """Figures on the calibration: the alarm level, and the share of similar clean pictures expected above it."""
+        """Returns numbers on the calibration: of clean pictures (`clean_pictures`), the alarm level (`level`), and
+        the 95 % interval of the share of similar clean pictures above it (`false_alarms_low`,
+        `false_alarms_high`).
+        """
         return self.report
 
 
@@ -105,24 +108,28 @@ class Detector:
         return DetectorState(layer=layer, statistics=statistics, level=level, report=FitReport(values=values))
 
     def apply(self, views: Views, model: Model | None, state: DetectorState, rng: np.random.Generator) -> DefenseResult:
-        """Returns the unchanged pictures of one sample and their score, 0.5 at the alarm level.
+        """Returns the unchanged pictures of one sample and their score in 0..1, which is 0.5 at the alarm level.
 
         Args:
             views: (H, W, 3) uint8 pictures of the sample by camera name.
             model: the network whose feature maps are read.
             state: result of the calibration.
-            rng: random generator of the sample.
+            rng: not used.
         """
         assert model is not None
         raw = self._raw(state.statistics, self._numbers(model, views, state.layer))
         return DefenseResult(views=dict(views), score=normalised_score(raw, state.level))
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Returns the (B, 3, H, W) pictures unchanged."""
+        """Returns the pictures unchanged.
+
+        Args:
+            views: (B, 3, H, W) pictures by camera name, float in 0..1.
+        """
         return dict(views)
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: DetectorState) -> DefendedBatch:
-        """The unchanged (B, 3, H, W) pictures, and (B,) scores with gradients with respect to the pictures.
+        """Returns the unchanged pictures, and (B,) scores in 0..1 with gradients with respect to the pictures.
 
         Args:
             views: (B, 3, H, W) pictures by camera name, float in 0..1.
@@ -134,7 +141,11 @@ class Detector:
         return DefendedBatch(views=dict(views), scores=normalised_score_tensor(raw, state.level))
 
     def wrap(self, model: Model) -> Model:
-        """Returns the model unchanged, because the detector only reads feature maps."""
+        """Returns the model unchanged, because the detector only reads feature maps.
+
+        Args:
+            model: the network to be defended.
+        """
         return model
 
     def _numbers(self, model: Model, views: Views, layer: str) -> Tensor:

@@ -33,7 +33,11 @@ class CleanStatistics:
     deviation: Tensor
 
     def z_scores(self, values: Tensor) -> Tensor:
-        """The z-scores of features: (values - mean) / deviation.
+        """Returns the z-scores of features: (values - mean) / deviation, float64. A share `FLOOR` of the mean
+        deviation is added to each deviation.
+
+        Args:
+            values: features in the shape of `mean`.
 
         Raises:
             GearError: the features have another shape than in the calibration, because the pictures have another size.
@@ -61,7 +65,10 @@ class Moments:
     squares: Tensor
 
     def merged(self, other: Moments) -> Moments:
-        """The moments of two sets of feature tensors taken together (Chan, Golub and LeVeque, 1979).
+        """Returns the moments of two sets of feature tensors taken together (Chan, Golub and LeVeque, 1979).
+
+        Args:
+            other: moments of the second set.
 
         Raises:
             GearError: the features of the two sets have different shapes.
@@ -76,7 +83,7 @@ class Moments:
         return Moments(count=count, mean=mean, squares=squares)
 
     def clean_statistics(self) -> CleanStatistics:
-        """Mean and standard deviation of each feature.
+        """Returns mean and standard deviation of each feature.
 
         Raises:
             GearError: the moments cover fewer than two tensors.
@@ -90,7 +97,10 @@ NO_MOMENTS = Moments(count=0, mean=torch.zeros(()), squares=torch.zeros(()))
 
 
 def moments(samples: Iterable[Tensor]) -> Moments:
-    """Count, mean and sum of squared deviations over feature tensors of one shape, computed in one pass.
+    """Computes count, mean and sum of squared deviations over feature tensors, in one pass.
+
+    Args:
+        samples: feature tensors of one shape, one per picture.
 
     Raises:
         GearError: the shapes differ.
@@ -103,7 +113,10 @@ def moments(samples: Iterable[Tensor]) -> Moments:
 
 
 def clean_statistics(samples: Iterable[Tensor]) -> CleanStatistics:
-    """Mean and standard deviation of each feature over tensors of one shape, computed in one pass.
+    """Computes mean and standard deviation of each feature over feature tensors, in one pass.
+
+    Args:
+        samples: feature tensors of one shape, one per clean picture.
 
     Raises:
         GearError: there are fewer than two tensors, or their shapes differ.
@@ -112,11 +125,15 @@ def clean_statistics(samples: Iterable[Tensor]) -> CleanStatistics:
 
 
 def alarm_level(clean: Sequence[float], false_alarms: float) -> float:
-    """The score that a new clean picture exceeds with a probability of at most `false_alarms`.
+    """Returns the score that a new clean picture exceeds with a probability of at most `false_alarms`.
 
     It is the score of rank ceil((n + 1)(1 - false_alarms)) among the n clean scores. Averaged over all draws of the
     calibration pictures, the bound holds for any distribution of the scores (Vovk et al., 2005). It would not hold for
     a quantile that is interpolated between scores.
+
+    Args:
+        clean: scores of the n clean calibration pictures, in any order.
+        false_alarms: share of clean pictures that may exceed the level, between 0 and 1.
 
     Raises:
         GearError: there are too few scores for such a rank.
@@ -154,12 +171,23 @@ def _rank(count: int, false_alarms: float) -> int:
 
 
 def normalised_score(raw: float, level: float) -> float:
-    """Converts a raw score of 0 or more to a score in 0..1: raw / (raw + level), which is 0.5 at the alarm level."""
+    """Converts a raw score to a score in 0..1: raw / (raw + level), which is 0.5 at the alarm level; 1 if it is
+    not finite.
+
+    Args:
+        raw: raw score, 0 or more.
+        level: alarm level of raw scores.
+    """
     if not math.isfinite(raw):
         return 1.0
     return raw / (raw + max(level, LEAST_LEVEL))
 
 
 def normalised_score_tensor(raw: Tensor, level: float) -> Tensor:
-    """Converts (B,) raw scores of 0 or more to scores in 0..1: raw / (raw + level), with gradients."""
+    """Converts raw scores to scores in 0..1: raw / (raw + level), with gradients.
+
+    Args:
+        raw: (B,) raw scores, 0 or more.
+        level: alarm level of raw scores.
+    """
     return raw / (raw + max(level, LEAST_LEVEL))
