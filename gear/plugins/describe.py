@@ -28,7 +28,13 @@ UNITS = {
 
 
 def summary(plugin: PluginEntry) -> dict[str, Any]:
-    """A plugin's kind, name, package, version, summary and capabilities as a JSON object."""
+    """Describes a plugin as a JSON object: `kind`, `name`, `package`, `version`, `summary` and `capabilities`.
+
+    The capabilities are the spec's further fields, without those that `training` and other commands show.
+
+    Args:
+        plugin: the plugin, from the catalogue.
+    """
     capabilities = {
         field.name: sorted(value) if isinstance(value := getattr(plugin.spec, field.name), frozenset) else value
         for field in dataclasses.fields(plugin.spec)
@@ -45,10 +51,13 @@ def summary(plugin: PluginEntry) -> dict[str, Any]:
 
 
 def training(spec: AnySpec) -> dict[str, Any]:
-    """A network's training recipe (None if gear cannot train it) and its starting points, as a JSON object.
+    """Describes how a network is trained, as a JSON object: `recipe` (null if gear cannot train it) and `starts`.
 
-    The starting points are the names that `gear train --init` accepts in addition to `shipped` and files. The result is
-    empty for plugins that are not models.
+    `starts` are the names that `gear train --init` accepts in addition to `shipped` and files. The result is empty for
+    plugins that are not models.
+
+    Args:
+        spec: the plugin's description.
     """
     if not isinstance(spec, ModelSpec):
         return {}
@@ -56,7 +65,11 @@ def training(spec: AnySpec) -> dict[str, Any]:
 
 
 def options(config: type[Any]) -> list[dict[str, Any]]:
-    """Every option of a plugin as a JSON object with name, type, default, meaning and unit; nested names have dots."""
+    """Describes every option of a plugin as a JSON object with `name`, `type`, `default`, `meaning` and `unit`.
+
+    Args:
+        config: the dataclass of the plugin's options; options inside a nested dataclass get names with dots.
+    """
     return _options(config(), "")
 
 
@@ -84,9 +97,12 @@ def _options(defaults: Any, prefix: str) -> list[dict[str, Any]]:
 
 
 def meanings_of(config: type[Any]) -> dict[str, str]:
-    """The descriptions of a config's fields, one line each, by name of the field.
+    """Returns the descriptions of a config's fields, one line each, by name of the field.
 
     They stand below `Attributes:` in the docstrings of the class and its base classes.
+
+    Args:
+        config: the dataclass of the options.
     """
     result: dict[str, str] = {}
     for owner in reversed(config.__mro__):
@@ -107,7 +123,11 @@ def meanings_of(config: type[Any]) -> dict[str, str]:
 
 
 def source_of(spec: AnySpec) -> str:
-    """The path of the source file that defines the plugin's `build`; "" if Python does not know it."""
+    """Returns the path of the source file that defines the plugin's `build`; "" if Python does not know it.
+
+    Args:
+        spec: the plugin's description.
+    """
     try:
         return inspect.getsourcefile(spec.build) or ""
     except TypeError:

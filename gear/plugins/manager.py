@@ -87,7 +87,12 @@ def discover(entry_points: Iterable[importlib.metadata.EntryPoint], disabled: st
 
 
 def owner_of(entry_point: importlib.metadata.EntryPoint) -> Owner:
-    """The package (distribution) of an entry point; if it is unknown, the name of the entry point's module."""
+    """Returns the package (distribution) of an entry point; if it is unknown, the name of the entry point's module
+    and the version `?`.
+
+    Args:
+        entry_point: the entry point by which a package registers a plugin.
+    """
     package, version = entry_point.value.split(":")[0], "?"
     if entry_point.dist is not None:
         package, version = identity(entry_point.dist)
@@ -174,6 +179,9 @@ class PluginRaisedError(Exception):
     Attributes:
         error: the raised exception, which need not be an `Exception`.
         problem: the exception as one printable line.
+
+    Args:
+        error: the raised exception.
     """
 
     def __init__(self, error: BaseException) -> None:
@@ -183,7 +191,10 @@ class PluginRaisedError(Exception):
 
 
 def guarded(call: Callable[[], Any]) -> Any:
-    """Runs a plugin's code and discards what it prints to stdout.
+    """Runs a plugin's code, discards what it prints to stdout, and returns its result.
+
+    Args:
+        call: the code to run, without arguments.
 
     Raises:
         PluginRaisedError: the code raised any exception, including SystemExit, GeneratorExit and KeyboardInterrupt.

@@ -24,7 +24,12 @@ OBJECT_COLOUR: Rgb = (255, 255, 255)
 
 
 def prediction_pictures(task: Task[Any, Any], sample: Sample, prediction: Any) -> dict[str, UInt8Image]:
-    """Draws a prediction of a sample.
+    """Draws a prediction of a sample, by the task's own method or as boxes of objects and detections.
+
+    Args:
+        task: the task of the sample.
+        sample: the sample with its pictures and ground truth.
+        prediction: a network's prediction in the task's format.
 
     Returns:
         (H, W, 3) uint8 RGB pictures by name; empty for a task that draws no predictions and has no objects.
@@ -41,7 +46,12 @@ def prediction_pictures(task: Task[Any, Any], sample: Sample, prediction: Any) -
 
 
 def picture_legends(task: Task[Any, Any]) -> dict[str, Legend]:
-    """Returns the legends of a task's previews and predictions, by name of the picture."""
+    """Returns the legends (colours and what they mean) of a task's previews and predictions, by name of the
+    picture.
+
+    Args:
+        task: any task.
+    """
     legends: dict[str, Legend] = dict(task.legends()) if isinstance(task, WithLegends) else {}
     if isinstance(task, WithObjects) and not isinstance(task, DrawsPredictions):
         legends[OBJECTS] = ColourNames(entries=(("dashed: object of the ground truth", OBJECT_COLOUR),))
@@ -49,7 +59,12 @@ def picture_legends(task: Task[Any, Any]) -> dict[str, Legend]:
 
 
 def label_colour(label: str) -> Rgb:
-    """Returns the colour of a class in pictures of detections, RGB; it depends only on the name of the class."""
+    """Returns the colour of a class in pictures of detections, RGB bytes; it depends only on the name of the
+    class.
+
+    Args:
+        label: name of the class.
+    """
     return category_colour(sum((place + 1) * ord(letter) for place, letter in enumerate(label)) % 180)
 
 
@@ -71,7 +86,12 @@ def _indices(box_px: tuple[float, float, float, float]) -> tuple[float, float, f
 
 
 def legends_json(legends: Mapping[str, Legend]) -> dict[str, Any]:
-    """Returns legends as JSON: `names`, a list of [name, RGB], or `quantity`, `colours` and `ticks` of a bar."""
+    """Returns legends as JSON, by name of the picture: `names`, a list of [name, RGB], or `quantity`, `colours`
+    and `ticks` of a colour bar.
+
+    Args:
+        legends: legends by name of the picture, from `picture_legends`.
+    """
     return {
         name: {"names": [[entry, list(rgb)] for entry, rgb in one.entries]}
         if isinstance(one, ColourNames)

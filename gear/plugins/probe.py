@@ -47,10 +47,16 @@ UNKNOWN: Verdict = ("", "")
 
 
 def unsafe_plugins(entry_points: Iterable[EntryPoint]) -> dict[EntryPoint, Verdict]:
-    """The plugins that must not be loaded into this process, with their failures in the separate process.
+    """Finds the plugins that must not be loaded into this process, by loading new ones in a separate process each.
+
+    The results are read from and written to the cache file. A plugin whose files have not changed is taken from the
+    cache.
 
     Args:
-        entry_points: entry points of other packages. A plugin whose files have not changed is taken from the cache.
+        entry_points: entry points of other packages.
+
+    Returns:
+        For each unsafe plugin, the stage and the problem of its failure in the separate process.
     """
     importlib.invalidate_caches()  # a package may have been installed since this process began
     stamped = {one: stamp(one) for one in entry_points}
@@ -132,7 +138,14 @@ main(*sys.argv[2:])
 
 
 def stamp(entry_point: EntryPoint) -> str:
-    """A hash that changes whenever a plugin may load differently: of its files, its Python environment and gear."""
+    """Returns a hash that changes whenever a plugin may load differently: of its files, its Python environment and
+    gear.
+
+    It is the key of the plugin's result in the cache.
+
+    Args:
+        entry_point: entry point of the plugin.
+    """
     facts: list[Any] = [sys.executable, sys.version, entry_point.name, entry_point.value, __file__]
     with contextlib.suppress(Exception):  # damaged metadata, or a finder that raises: then there is less to look at
         if entry_point.dist is not None:

@@ -33,18 +33,30 @@ class BitDepthConfig:
 
 
 class BitDepth(PerPicture):
-    """A defense that rounds each value to the nearest of 2^bits evenly spaced levels."""
+    """A defense that rounds each value to the nearest of 2^bits evenly spaced levels.
+
+    Args:
+        config: options of the defense.
+    """
 
     def __init__(self, config: BitDepthConfig) -> None:
         steps = 2**config.bits - 1
         self._table = np.rint(np.rint(np.arange(256) / 255 * steps) / steps * 255).astype(np.uint8)
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The (H, W, 3) uint8 picture with fewer bits per channel, and None instead of a mask."""
+        """Returns the picture with fewer bits per channel, and None instead of a mask.
+
+        Args:
+            picture: (H, W, 3) uint8 sRGB.
+        """
         return self._table[picture], None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The (B, 3, H, W) pictures with fewer bits per channel; the gradient is that of the identity (BPDA)."""
+        """Returns the pictures with fewer bits per channel; the gradient is that of the identity (BPDA).
+
+        Args:
+            pictures: (B, 3, H, W) in 0..1.
+        """
         return straight_through(pictures, each_as_uint8(pictures, lambda picture: self._table[picture]))
 
 

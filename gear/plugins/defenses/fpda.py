@@ -34,7 +34,11 @@ class FpdaConfig(DetectorConfig):
 
 
 def build(config: FpdaConfig) -> Defense:
-    """Makes the defense `fpda` from its options."""
+    """Makes the defense `fpda` from its options.
+
+    Args:
+        config: options of the defense.
+    """
     from torch.nn import functional
 
     from gear.plugins.defenses.activations.score_detector import Detector

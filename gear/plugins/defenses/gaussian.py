@@ -36,7 +36,11 @@ class GaussianConfig:
 
 
 class Gaussian(PerPicture):
-    """A defense that blurs sRGB values with a separable kernel; borders are mirrored without repeating the edge."""
+    """A defense that blurs sRGB values with a separable kernel; borders are mirrored without repeating the edge.
+
+    Args:
+        config: options of the defense.
+    """
 
     def __init__(self, config: GaussianConfig) -> None:
         radius = max(1, math.ceil(3 * config.sigma_px))
@@ -45,14 +49,22 @@ class Gaussian(PerPicture):
         self._kernel: npt.NDArray[np.float32] = (kernel / kernel.sum()).astype(np.float32)
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The blurred (H, W, 3) uint8 picture, and None instead of a mask."""
+        """Returns the blurred picture, and None instead of a mask.
+
+        Args:
+            picture: (H, W, 3) uint8 sRGB.
+        """
         blurred = cv2.sepFilter2D(
             picture.astype(np.float32), -1, self._kernel, self._kernel, borderType=cv2.BORDER_REFLECT_101
         )
         return np.clip(np.rint(blurred), 0, 255).astype(np.uint8), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The blurred (B, 3, H, W) pictures, by the same convolution in torch; differentiable."""
+        """Returns the blurred pictures, by the same convolution in torch; differentiable.
+
+        Args:
+            pictures: (B, 3, H, W) in 0..1.
+        """
         import torch
         from torch.nn import functional
 

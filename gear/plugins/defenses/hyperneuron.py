@@ -35,7 +35,11 @@ class HyperNeuronConfig(DetectorConfig):
 
 
 def build(config: HyperNeuronConfig) -> Defense:
-    """Makes the defense `hyperneuron` from its options."""
+    """Makes the defense `hyperneuron` from its options.
+
+    Args:
+        config: options of the defense.
+    """
     from gear.plugins.defenses.activations.score_detector import Detector
 
     def compress(features: Tensor) -> Tensor:

@@ -34,17 +34,29 @@ class JpegConfig:
 
 
 class Jpeg(PerPicture):
-    """A defense that compresses and decompresses every picture."""
+    """A defense that compresses and decompresses every picture.
+
+    Args:
+        config: options of the defense.
+    """
 
     def __init__(self, config: JpegConfig) -> None:
         self._parameters = [cv2.IMWRITE_JPEG_QUALITY, config.quality]
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The (H, W, 3) uint8 picture after JPEG compression, and None instead of a mask."""
+        """Returns the picture after JPEG compression, and None instead of a mask.
+
+        Args:
+            picture: (H, W, 3) uint8 sRGB.
+        """
         return self._recode(picture), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The (B, 3, H, W) pictures after JPEG compression; the gradient is that of the identity (BPDA)."""
+        """Returns the pictures after JPEG compression; the gradient is that of the identity (BPDA).
+
+        Args:
+            pictures: (B, 3, H, W) in 0..1.
+        """
         return straight_through(pictures, each_as_uint8(pictures, self._recode))
 
     def _recode(self, picture: UInt8Image) -> UInt8Image:

@@ -54,6 +54,9 @@ class Lgs(PerPicture):
     The gradient g holds first-order differences of the grey picture, normalised to 0..1 for each picture. B is 1 in the
     windows whose mean gradient exceeds the threshold, otherwise 0. Windows that reach over the right or lower border
     are averaged over their part inside, so no strip of the picture is left out.
+
+    Args:
+        config: options of the defense.
     """
 
     def __init__(self, config: LgsConfig) -> None:
@@ -61,7 +64,11 @@ class Lgs(PerPicture):
         self._stride_px = config.window_px - config.overlap_px
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The darkened (H, W, 3) uint8 picture, and the (H, W) mask of how much each pixel was darkened, 0..1."""
+        """Returns the darkened picture, and the (H, W) mask of how much each pixel was darkened, 0..1.
+
+        Args:
+            picture: (H, W, 3) uint8 sRGB.
+        """
         unit = picture.astype(np.float32) / 255
         grey = unit @ np.array(GREY, np.float32)
         dx, dy = np.zeros_like(grey), np.zeros_like(grey)
@@ -92,7 +99,12 @@ class Lgs(PerPicture):
         return np.arange(count) * self._stride_px
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The darkened (B, 3, H, W) pictures, by the same operation in torch; the choice of windows has no gradient."""
+        """Returns the darkened pictures, by the same operation in torch; differentiable, but the choice of windows
+        has no gradient.
+
+        Args:
+            pictures: (B, 3, H, W) in 0..1.
+        """
         import torch
 
         grey = (pictures * pictures.new_tensor(GREY).view(1, 3, 1, 1)).sum(1, keepdim=True)

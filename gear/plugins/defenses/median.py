@@ -34,17 +34,30 @@ class MedianConfig:
 
 
 class Median(PerPicture):
-    """A defense that replaces each value by the median of its channel over a square window; borders are replicated."""
+    """A defense that replaces each value by the median of its channel over a square window; borders are
+    replicated.
+
+    Args:
+        config: options of the defense.
+    """
 
     def __init__(self, config: MedianConfig) -> None:
         self._side_px = 2 * config.radius_px + 1
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
-        """The median-filtered (H, W, 3) uint8 picture, and None instead of a mask."""
+        """Returns the median-filtered picture, and None instead of a mask.
+
+        Args:
+            picture: (H, W, 3) uint8 sRGB.
+        """
         return np.asarray(cv2.medianBlur(np.ascontiguousarray(picture), self._side_px), np.uint8), None
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """The median-filtered (B, 3, H, W) pictures; the gradient goes to the median pixel of each window."""
+        """Returns the median-filtered pictures; the gradient goes to the median pixel of each window.
+
+        Args:
+            pictures: (B, 3, H, W) in 0..1.
+        """
         from torch.nn import functional
 
         batch, channels, height, width = pictures.shape

@@ -38,7 +38,11 @@ class PerPicture(ABC):
 
     @abstractmethod
     def clean_tensor(self, pictures: Tensor) -> Tensor:
-        """Cleans (B, 3, H, W) pictures in 0..1, with the gradient that the plugin's spec declares."""
+        """Cleans a batch of pictures, with the gradient that the plugin's spec declares.
+
+        Args:
+            pictures: (B, 3, H, W) in 0..1.
+        """
 
     def fit(
         self,
@@ -50,10 +54,7 @@ class PerPicture(ABC):
         """Does nothing, since these defenses need no calibration.
 
         Args:
-            clean: pictures without a patch, (H, W, 3) uint8 by camera name, one mapping per sample.
-            patched: pictures of the same scenes with a patch; [] if there are none.
-            model: the network whose feature maps are read.
-            rng: random generator of the calibration.
+            clean, patched, model, rng: not used.
         """
         return
 
@@ -64,9 +65,7 @@ class PerPicture(ABC):
 
         Args:
             views: (H, W, 3) uint8 pictures of the sample by camera name.
-            model: the network whose feature maps are read.
-            state: result of the calibration.
-            rng: random generator of the sample.
+            model, state, rng: not used.
         """
         cleaned: dict[str, UInt8Image] = {}
         masks: dict[str, Mask] = {}
@@ -78,23 +77,41 @@ class PerPicture(ABC):
         return DefenseResult(views=cleaned, mask=masks or None, score=score)
 
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Cleans the (B, 3, H, W) pictures of each camera, in 0..1."""
+        """Returns the cleaned pictures of each camera, in 0..1.
+
+        Args:
+            views: (B, 3, H, W) pictures by camera name, float in 0..1.
+        """
         return {name: self.clean_tensor(pictures) for name, pictures in views.items()}
 
     def wrap(self, model: Model) -> Model:
-        """Returns the model unchanged, because these defenses only change pictures."""
+        """Returns the model unchanged, because these defenses only change pictures.
+
+        Args:
+            model: the network to be defended.
+        """
         return model
 
 
 def straight_through(pictures: Tensor, cleaned: Tensor) -> Tensor:
-    """The cleaned values, whose gradient is that of the unchanged pictures (BPDA; Athalye et al., ICML 2018)."""
+    """Returns the cleaned values with the gradient of the unchanged pictures (BPDA; Athalye et al., ICML 2018).
+
+    Args:
+        pictures: the pictures before cleaning, which carry the gradient.
+        cleaned: the cleaned pictures, of the same shape.
+    """
     return pictures + (cleaned - pictures).detach()
 
 
 def each_as_uint8(pictures: Tensor, clean: Any) -> Tensor:
-    """Applies a NumPy function for one (H, W, 3) uint8 picture to every picture of a (B, 3, H, W) batch in 0..1.
+    """Applies a NumPy function to every picture of a batch, as bytes; the result has no gradient.
 
-    The result has no gradient.
+    Args:
+        pictures: (B, 3, H, W) in 0..1; they are rounded to bytes.
+        clean: function from one (H, W, 3) uint8 picture to another.
+
+    Returns:
+        (B, 3, H, W) in 0..1 on the device of `pictures`.
     """
     import torch
 

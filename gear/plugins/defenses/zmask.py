@@ -9,7 +9,11 @@ from gear.plugins.defenses.activations.zmask_options import ZMaskConfig
 
 
 def build(config: ZMaskConfig) -> Defense:
-    """Makes the defense Z-Mask from its options."""
+    """Makes the defense Z-Mask from its options.
+
+    Args:
+        config: options of the defense.
+    """
     from gear.plugins.defenses.activations.zmask import ZMask
 
     return ZMask(config)

@@ -19,6 +19,9 @@ NAME = "adabins"
 def build(options: AdaBinsOptions) -> Model:
     """Builds AdaBins and loads its weights.
 
+    Args:
+        options: options of the network, such as device and weights.
+
     Raises:
         GearError: timm, torchvision or the weights are missing.
     """
@@ -32,7 +35,14 @@ def build(options: AdaBinsOptions) -> Model:
 
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
-    """Renames the tensors of the AdaBins authors' checkpoint to the names in gear's network."""
+    """Renames the tensors of the AdaBins authors' checkpoint to the names in gear's network.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
+
+    Returns:
+        Tensors by the names in gear's network.
+    """
     from gear.networks.depth.adabins_official import from_official
 
     return from_official(state)

@@ -21,7 +21,11 @@ AUXILIARY_WEIGHT = 1.0
 
 
 def build(options: SegmentationOptions) -> SemsegNetwork:
-    """Builds BiSeNet with Xception39 and loads its weights."""
+    """Builds BiSeNet with Xception39 and loads its weights.
+
+    Args:
+        options: options of the network, such as device and weights.
+    """
     from gear.networks.input_scale import input_scale_of
     from gear.networks.segmentation.bisenet import BiSeNetX39
     from gear.networks.segmentation.losses import SegmentationLosses
@@ -37,7 +41,14 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Renames the tensors of a published BiSeNet checkpoint to the names in gear's network."""
+    """Renames the tensors of a published BiSeNet checkpoint to the names in gear's network.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
+
+    Returns:
+        Tensors by the names in gear's network.
+    """
     from gear.networks.segmentation.bisenet_official import from_official
 
     return from_official(state)

@@ -21,7 +21,11 @@ AUXILIARY_WEIGHT = 0.4
 
 
 def build(options: SegmentationOptions) -> SemsegNetwork:
-    """Builds DDRNet-23-slim and loads its weights."""
+    """Builds DDRNet-23-slim and loads its weights.
+
+    Args:
+        options: options of the network, such as device and weights.
+    """
     from gear.networks.input_scale import input_scale_of
     from gear.networks.segmentation.ddrnet import DDRNet23Slim
     from gear.networks.segmentation.losses import SegmentationLosses
@@ -37,7 +41,14 @@ def build(options: SegmentationOptions) -> SemsegNetwork:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Renames the tensors of a published DDRNet checkpoint to the names in gear's network."""
+    """Renames the tensors of a published DDRNet checkpoint to the names in gear's network.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
+
+    Returns:
+        Tensors by the names in gear's network.
+    """
     from gear.networks.segmentation.ddrnet_official import from_official
 
     return from_official(state)

@@ -18,6 +18,9 @@ Little accuracy is lost, because depth is smooth nearly everywhere.
 def build(options: DepthOptions) -> Model:
     """Builds the depth network on DDRNet-23-slim and loads its weights.
 
+    Args:
+        options: options of the network, such as device and weights.
+
     Raises:
         GearError: the weights are missing.
     """

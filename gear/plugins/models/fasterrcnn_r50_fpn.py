@@ -17,7 +17,11 @@ NAME = "fasterrcnn_r50_fpn"
 
 
 def build(options: OfficialDetectorOptions) -> FasterRcnnDetector:
-    """Builds Faster R-CNN with ResNet-50 and a feature pyramid, and loads its weights."""
+    """Builds Faster R-CNN with ResNet-50 and a feature pyramid, and loads its weights.
+
+    Args:
+        options: options of the network, such as device and weights.
+    """
     from gear.networks.detection.fasterrcnn import FasterRcnnDetector
     from gear.networks.detection.graphs import fasterrcnn_r50_fpn
     from gear.networks.detection.network import OFFICIAL_CATEGORIES, Sizing, fitted
@@ -32,7 +36,14 @@ def build(options: OfficialDetectorOptions) -> FasterRcnnDetector:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Converts a published checkpoint to the tensors of gear's Faster R-CNN."""
+    """Converts a published checkpoint to the tensors of gear's Faster R-CNN.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
+
+    Returns:
+        Tensors by the names in gear's network.
+    """
     from gear.networks.detection.torchvision_official import from_official
 
     return from_official(state)

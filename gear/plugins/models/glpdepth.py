@@ -19,6 +19,9 @@ NAME = "glpdepth"
 def build(options: GlpnOptions) -> Model:
     """Builds GLPDepth with the encoder MiT-b4 and loads its weights.
 
+    Args:
+        options: options of the network, such as device and weights.
+
     Raises:
         GearError: transformers or the weights are missing.
     """
@@ -31,7 +34,14 @@ def build(options: GlpnOptions) -> Model:
 
 
 def convert(state: Mapping[str, Tensor]) -> Mapping[str, Any]:
-    """Renames the tensors of a GLPDepth checkpoint (the authors' or transformers') to the names in gear's network."""
+    """Renames the tensors of a GLPDepth checkpoint (the authors' or transformers') to the names in gear's network.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
+
+    Returns:
+        Tensors by the names in gear's network.
+    """
     from gear.networks.depth.glpn_official import from_official
 
     return from_official(state)

@@ -14,6 +14,9 @@ NAME = "glpn_b0"
 def build(options: GlpnB0Options) -> Model:
     """Builds GLPDepth with the encoder MiT-b0 and loads its weights.
 
+    Args:
+        options: options of the network, such as device and weights.
+
     Raises:
         GearError: transformers or the weights are missing.
     """

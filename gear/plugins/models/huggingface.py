@@ -23,7 +23,11 @@ RECIPE = Recipe(learning_rate=6e-5, weight_decay=1e-2, batch=8, epochs=20, gradi
 
 
 def build_semseg(options: FolderOptions) -> FolderSegmenter:
-    """Builds a semantic segmentation network, such as SegFormer, from a local Hugging Face folder."""
+    """Builds a semantic segmentation network, such as SegFormer, from a local Hugging Face folder.
+
+    Args:
+        options: options of the network, such as the folder and the device.
+    """
     from gear.networks.huggingface.folder import open_folder
     from gear.networks.huggingface.network import FolderSegmenter
 
@@ -31,7 +35,11 @@ def build_semseg(options: FolderOptions) -> FolderSegmenter:
 
 
 def build_depth(options: DepthFolderOptions) -> FolderDepth:
-    """Builds a depth network, such as GLPN or Depth Anything, from a local Hugging Face folder."""
+    """Builds a depth network, such as GLPN or Depth Anything, from a local Hugging Face folder.
+
+    Args:
+        options: options of the network, such as the folder and the device.
+    """
     from gear.networks.huggingface.folder import open_folder
     from gear.networks.huggingface.network import FolderDepth
 
@@ -39,7 +47,11 @@ def build_depth(options: DepthFolderOptions) -> FolderDepth:
 
 
 def build_detect2d(options: DetectorFolderOptions) -> FolderDetector:
-    """Builds a 2D detector, such as DETR or RT-DETR, from a local Hugging Face folder."""
+    """Builds a 2D detector, such as DETR or RT-DETR, from a local Hugging Face folder.
+
+    Args:
+        options: options of the network, such as the folder and the device.
+    """
     from gear.networks.huggingface.folder import open_folder
     from gear.networks.huggingface.network import FolderDetector
 

@@ -17,7 +17,11 @@ NAME = "nanodet_coco"
 
 
 def build(options: OfficialDetectorOptions) -> NanoDetDetector:
-    """Builds NanoDet-g and loads its weights."""
+    """Builds NanoDet-g and loads its weights.
+
+    Args:
+        options: options of the network, such as device and weights.
+    """
     from gear.networks import torchvision_import
     from gear.networks.detection.nanodet import NanoDetDetector
     from gear.networks.detection.nanodet_graph import NanoDetGraph
@@ -28,7 +32,14 @@ def build(options: OfficialDetectorOptions) -> NanoDetDetector:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Converts a graph file or a published checkpoint to the tensors of gear's NanoDet."""
+    """Converts a graph file or a published checkpoint to the tensors of gear's NanoDet.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
+
+    Returns:
+        Tensors by the names in gear's network.
+    """
     from gear.networks.detection.nanodet_official import from_published
 
     return from_published(state)

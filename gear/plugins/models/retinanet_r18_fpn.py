@@ -36,7 +36,11 @@ RECIPE = Recipe(
 
 
 def build_r18(options: ReferenceDetectorOptions) -> RetinaNetDetector:
-    """Builds RetinaNet with ResNet-18 and loads its weights."""
+    """Builds RetinaNet with ResNet-18 and loads its weights.
+
+    Args:
+        options: options of the network, such as device and weights.
+    """
     from gear.networks.detection.graphs import retinanet_r18_fpn
     from gear.networks.detection.network import Sizing, scaled
     from gear.networks.detection.retinanet import RetinaNetDetector
@@ -51,7 +55,11 @@ def build_r18(options: ReferenceDetectorOptions) -> RetinaNetDetector:
 
 
 def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
-    """Builds RetinaNet with EfficientNet-Lite0 and loads its weights."""
+    """Builds RetinaNet with EfficientNet-Lite0 and loads its weights.
+
+    Args:
+        options: options of the network, such as device and weights.
+    """
     from gear.networks.detection.graphs import retinanet_lite0_fpn
     from gear.networks.detection.network import Sizing, scaled
     from gear.networks.detection.retinanet import LiteRetinaNetDetector
@@ -67,14 +75,24 @@ def build_lite0(options: ReferenceDetectorOptions) -> RetinaNetDetector:
 
 
 def scale_of(options: ReferenceDetectorOptions, name: str) -> float:
-    """The factor by which input pictures are resized: from the options, otherwise from the weights, otherwise 0.5."""
+    """Returns the factor by which input pictures are resized: from the options, otherwise from the weights,
+    otherwise 0.5.
+
+    Args:
+        options: options of the network.
+        name: name of the network, whose weights may state the factor.
+    """
     from gear.networks.input_scale import input_scale_of
 
     return input_scale_of(options, name, INPUT_SCALE)
 
 
 def start_from_imagenet(model: Any) -> None:
-    """Loads ImageNet weights into the network's EfficientNet-Lite0 trunk, as a starting point of training."""
+    """Loads ImageNet weights into the network's EfficientNet-Lite0 trunk, as a starting point of training.
+
+    Args:
+        model: the network; its weights are changed in place.
+    """
     from gear.networks.efficientnet_lite0 import start_from_imagenet
 
     start_from_imagenet(model.graph.get_submodule("backbone"))

@@ -17,7 +17,11 @@ NAME = "retinanet_r50_fpn"
 
 
 def build(options: OfficialDetectorOptions) -> RetinaNetDetector:
-    """Builds RetinaNet with ResNet-50 and a feature pyramid, and loads its weights."""
+    """Builds RetinaNet with ResNet-50 and a feature pyramid, and loads its weights.
+
+    Args:
+        options: options of the network, such as device and weights.
+    """
     from gear.networks.detection.graphs import retinanet_r50_fpn
     from gear.networks.detection.network import OFFICIAL_CATEGORIES, Sizing, fitted
     from gear.networks.detection.retinanet import RetinaNetDetector
@@ -32,7 +36,14 @@ def build(options: OfficialDetectorOptions) -> RetinaNetDetector:
 
 
 def convert(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Converts a published checkpoint to the tensors of gear's RetinaNet."""
+    """Converts a published checkpoint to the tensors of gear's RetinaNet.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
+
+    Returns:
+        Tensors by the names in gear's network.
+    """
     from gear.networks.detection.torchvision_official import from_official
 
     return from_official(state)

@@ -22,7 +22,11 @@ RECIPE = Recipe(learning_rate=1e-3, weight_decay=1e-2, batch=4, epochs=20, gradi
 
 
 def build_resnet(options: StereoCentreOptions) -> StereoCentreNetwork:
-    """Builds the stereo network on ResNet-18 and loads its weights."""
+    """Builds the stereo network on ResNet-18 and loads its weights.
+
+    Args:
+        options: options of the network, such as device and weights.
+    """
     from gear.networks.network import Normalise
     from gear.networks.stereo.centre_network import StereoCentreNetwork
     from gear.networks.stereo.centre_resnet import StereoCentre
@@ -31,7 +35,11 @@ def build_resnet(options: StereoCentreOptions) -> StereoCentreNetwork:
 
 
 def build_lite0(options: StereoCentreOptions) -> StereoCentreNetwork:
-    """Builds the stereo network on EfficientNet-Lite0 and loads its weights."""
+    """Builds the stereo network on EfficientNet-Lite0 and loads its weights.
+
+    Args:
+        options: options of the network, such as device and weights.
+    """
     from gear.networks.efficientnet_lite0 import MEAN, STD
     from gear.networks.network import Normalise
     from gear.networks.stereo.centre_lite0 import StereoCentreLite0
@@ -42,7 +50,11 @@ def build_lite0(options: StereoCentreOptions) -> StereoCentreNetwork:
 
 
 def start_from_imagenet(model: Any) -> None:
-    """Loads ImageNet weights into the network's EfficientNet-Lite0 trunk, as a starting point of training."""
+    """Loads ImageNet weights into the network's EfficientNet-Lite0 trunk, as a starting point of training.
+
+    Args:
+        model: the network; its weights are changed in place.
+    """
     from gear.networks.efficientnet_lite0 import start_from_imagenet
 
     start_from_imagenet(model.graph)

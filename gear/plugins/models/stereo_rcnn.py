@@ -12,14 +12,25 @@ from gear.networks.stereo.options import LEFT, RIGHT, StereoRcnnOptions
 
 
 def build(options: StereoRcnnOptions) -> Model:
-    """Builds Stereo R-CNN and loads its weights."""
+    """Builds Stereo R-CNN and loads its weights.
+
+    Args:
+        options: options of the network, such as device and weights.
+    """
     from gear.networks.stereo.rcnn_network import StereoRcnnNetwork
 
     return StereoRcnnNetwork(options)
 
 
 def from_official(state: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Converts a published Stereo R-CNN checkpoint to gear's tensors; missing loss variances are initialised."""
+    """Converts a published Stereo R-CNN checkpoint to gear's tensors; missing loss variances are initialised.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
+
+    Returns:
+        Tensors by the names in gear's network.
+    """
     from gear.networks.stereo.rcnn_official import from_official
 
     return from_official(state)

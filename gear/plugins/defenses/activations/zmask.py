@@ -61,7 +61,7 @@ class ZMaskState:
         statistics: mean and deviation of the channels on clean pictures, by layer.
         block: the fusion block, which computes masks and raw scores from heat maps.
         level: raw score that at most the share `false_alarms` of clean pictures exceeds.
-        report: quality of the fit on the calibration pictures.
+        report: quality of the calibration on its own pictures.
     """
 
     layers: Layers
@@ -71,14 +71,19 @@ class ZMaskState:
     report: FitReport
 
     def fit_report(self) -> FitReport:
-        """Figures on the calibration: loss and mask IoU of the fusion block on these data, and the alarm level."""
+        """Returns numbers on the calibration, by name, such as `loss` and `mask_iou` of the fusion block on the
+        calibration pictures and the alarm level (`level`); with a problem if the block separates no patches.
+        """
         return self.report
 
 
 class ZMask:
     """The defense Z-Mask: covers regions that over-activate shallow and deep layers of the protected network.
 
-    Its statistics and its fusion block are fitted to pictures of the reference camera.
+    Its statistics and its fusion block are calibrated on pictures of the reference camera.
+
+    Args:
+        settings: options of the defense.
     """
 
     def __init__(self, settings: ZMaskConfig) -> None:
@@ -88,11 +93,12 @@ class ZMask:
     def fit(
         self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
     ) -> ZMaskState:
-        """Computes statistics from clean pictures, and fits the fusion block to the same scenes with patches.
+        """Calibrates the defense: statistics from clean pictures, and the fusion block from the same scenes with
+        patches.
 
         Args:
             clean: pictures without a patch, (H, W, 3) uint8 by camera name, one mapping per sample.
-            patched: pictures of the same scenes with a patch; [] if there are none.
+            patched: pictures of the same scenes with a patch, in the same order.
             model: the network whose feature maps are read.
             rng: random generator of the calibration.
 
@@ -128,13 +134,17 @@ class ZMask:
         return ZMaskState(layers=layers, statistics=statistics, block=block, level=level, report=report)
 
     def apply(self, views: Views, model: Model | None, state: ZMaskState, rng: np.random.Generator) -> DefenseResult:
-        """Covers regions of a sample's pictures that over-activate the network; the score is the cameras' maximum.
+        """Covers regions of a sample's pictures that over-activate the network.
 
         Args:
             views: (H, W, 3) uint8 pictures of the sample by camera name.
             model: the network whose feature maps are read.
             state: result of the calibration.
-            rng: random generator of the sample.
+            rng: not used.
+
+        Returns:
+            The cleaned pictures, (H, W) masks in 0..1 before the threshold, by camera name, and the largest score of
+            the cameras, 0..1, which is 0.5 at the alarm level.
         """
         assert model is not None
         masks = {name: np.zeros(picture.shape[:2], np.float32) for name, picture in views.items()}
@@ -153,30 +163,36 @@ class ZMask:
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """Always fails, because Z-Mask needs the model and the calibrated state; `forward_fitted` takes both.
 
+        Args:
+            views: not used.
+
         Raises:
             ValueError: always.
         """
         raise ValueError("Z-Mask looks into the model: it has `forward_fitted`")
 
     def forward_fitted(self, views: Mapping[str, Tensor], model: Model, state: ZMaskState) -> Mapping[str, Tensor]:
-        """Cleans (B, 3, H, W) pictures by camera name; masks and scores of `defend_batch` are left out.
+        """Returns the cleaned pictures of `defend_batch` without its masks and scores.
 
         Args:
-            views: pictures, float in 0..1.
+            views: (B, 3, H, W) pictures by camera name, float in 0..1.
             model: the network whose feature maps are read.
             state: result of the calibration.
         """
         return self.defend_batch(views, model, state).views
 
     def defend_batch(self, views: Mapping[str, Tensor], model: Model, state: ZMaskState) -> DefendedBatch:
-        """Cleans (B, 3, H, W) pictures by camera name as `apply` does, and returns masks and scores with gradients.
+        """Cleans pictures as `apply` does, and returns them with masks and scores that have gradients.
 
-        The gradient of the covered pictures is that of the mask before rounding.
+        The gradient of the covered pictures is that of the mask before the threshold.
 
         Args:
             views: (B, 3, H, W) pictures by camera name, float in 0..1.
             model: the network whose feature maps are read.
             state: result of the calibration.
+
+        Returns:
+            Cleaned pictures and (B, H, W) masks in 0..1 by camera name, and (B,) scores in 0..1.
         """
         covers = {name: torch.zeros_like(pictures[:, :1]) for name, pictures in views.items()}
         masks = {name: pictures.new_zeros(pictures[:, 0].shape) for name, pictures in views.items()}
@@ -207,7 +223,11 @@ class ZMask:
         return DefendedBatch(views=cleaned, masks=masks, scores=score)
 
     def wrap(self, model: Model) -> Model:
-        """Returns the model unchanged, because Z-Mask only changes pictures."""
+        """Returns the model unchanged, because Z-Mask only changes pictures.
+
+        Args:
+            model: the network to be defended.
+        """
         return model
 
     def _statistics(self, clean: Sequence[Views], model: Model, layers: Layers) -> dict[str, ChannelStatistics]:
