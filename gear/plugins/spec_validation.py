@@ -30,7 +30,13 @@ COMMON_FIELDS = frozenset(field.name for field in dataclasses.fields(Spec))
 
 
 def spec_problem(kind: Kind, spec: Any) -> str | None:
-    """The first reason why a plugin's spec cannot be used, in one line; None for a valid spec. Never raises."""
+    """Returns the first reason why a plugin's spec (its description for gear) cannot be used, in one line; None
+    for a valid spec. Never raises.
+
+    Args:
+        kind: kind of plugin, which determines the class that the spec must have.
+        spec: whatever the plugin's hook returned.
+    """
     try:
         return _spec_problem(kind, spec)
     except Exception as error:

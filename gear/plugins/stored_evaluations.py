@@ -65,13 +65,22 @@ class StoredResults:
     metadata: Json
 
     def is_of(self, dataset: Dataset[Any]) -> bool:
-        """Whether this part was computed on a dataset; the dataset may have moved since."""
+        """Returns whether this part was computed on a dataset, by its keys and its patch; the dataset may have
+        moved since.
+
+        Args:
+            dataset: one split.
+        """
         plan = dataset.plan
         wanted = (plan.content_key, plan.twin_key, plan.info.patch_label)
         return wanted == tuple(self.metadata.get(key) for key in ("content_key", "twin_key", "patch"))
 
     def prediction(self, dataset: Dataset[Any], sample: Sample) -> Any:
-        """Reads the stored prediction of a sample.
+        """Reads the stored prediction of a sample, in the format of the task.
+
+        Args:
+            dataset: the split on which this part was computed.
+            sample: one of its samples.
 
         Raises:
             DatasetError: the prediction is missing or damaged, or the task stores no predictions.
@@ -88,8 +97,12 @@ class StoredResults:
             return task.decode_prediction(folder, sample, stored["facts"], dataset.plan.info)
 
     def defended(self, index: int) -> dict[str, UInt8Image]:
-        """Reads the stored pictures that the defense returned for a sample, by camera; possibly smaller than the
-        originals. Empty if none are stored.
+        """Reads the stored pictures that the defense returned for a sample, (H, W, 3) uint8 by camera.
+
+        They may be smaller than the originals. The result is empty if none are stored.
+
+        Args:
+            index: index of the sample in its dataset.
 
         Raises:
             DatasetError: a picture is missing or damaged.
@@ -124,7 +137,11 @@ def open_evaluation(root: str | Path) -> tuple[StoredResults, ...]:
 
 
 def is_evaluation(path: str | Path) -> bool:
-    """Whether a folder holds the results of an evaluation rather than a dataset."""
+    """Returns whether a folder holds the results of an evaluation rather than a dataset.
+
+    Args:
+        path: the folder.
+    """
     return (Path(path) / RESULTS).is_file() and not (Path(path) / "gear").is_dir()
 
 
@@ -160,6 +177,12 @@ def _parts(root: Path, found: dict[str, Any]) -> tuple[StoredResults, ...]:
 
 def read_result(path: Path) -> dict[str, Any]:
     """Reads the stored result of a sample, a JSON file, and checks its keys and types.
+
+    Args:
+        path: the JSON file.
+
+    Returns:
+        The values by the names in `KEPT`, and `defended`: SHA-256 of each defended picture by its path, {} for none.
 
     Raises:
         DatasetError: the file is not a result that gear wrote.

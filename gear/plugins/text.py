@@ -7,18 +7,25 @@ LONGEST = 200
 
 
 def printable(text: str, longest: int = LONGEST) -> str:
-    """A text as one line of at most `longest` characters; control characters, such as terminal escapes, are escaped.
+    """Returns a text as one line; control characters, such as terminal escapes, are escaped.
 
     Characters that the terminal's encoding lacks are not replaced here, since they depend on where the text is printed.
+
+    Args:
+        text: the text, which may come from a plugin.
+        longest: largest number of characters that are taken of it; a longer text ends with `…`.
     """
     safe = "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in text[:longest])
     return safe if len(text) <= longest else f"{safe[:longest]}…"
 
 
 def one_line(error: BaseException) -> str:
-    """An exception as one printable line: the name of its type and the first line of its text.
+    """Returns an exception as one printable line: the name of its type and the first line of its text.
 
     If the text of the exception cannot be computed, only its type is named.
+
+    Args:
+        error: the exception, which may come from a plugin.
     """
     name = printable(type(error).__name__)
     try:

@@ -75,7 +75,12 @@ class CameraOptions:
         return self.pitch_deg == 0 and self.roll_deg == 0 and not self.follows_road
 
     def mount(self, name: str, right_m: float = 0.0) -> CameraMount:
-        """The mount of a camera on the ego car, moved by `right_m` metres along the camera's own horizontal axis."""
+        """Makes the mount of a camera with these options on the ego car.
+
+        Args:
+            name: name of the camera.
+            right_m: distance by which the camera is moved to the right along the picture's horizontal axis, metres.
+        """
         return CameraMount(
             name=name,
             width_px=self.width_px,
@@ -101,14 +106,23 @@ class CameraOptions:
 
 
 def surfaces_of(frame: Frame, record: SceneRecord) -> tuple[SurfaceTruth, ...]:
-    """The ground truth of every patch surface in every view, ordered by the record's cameras."""
+    """Returns the ground truth of every patch surface in every view, ordered by the record's cameras.
+
+    Args:
+        frame: the rendered views of the scene.
+        record: the scene, for its cameras and surfaces.
+    """
     return tuple(
         truth for camera in record.cameras for truth in observe_surfaces(frame.views[camera.name], frame.geoms, record)
     )
 
 
 def images_of(frame: Frame) -> dict[str, UInt8Image]:
-    """The (H, W, 3) uint8 pictures of all views of a frame, by camera name."""
+    """Returns the (H, W, 3) uint8 pictures of all views, by camera name.
+
+    Args:
+        frame: the rendered views of the scene.
+    """
     return {name: view.rgb for name, view in frame.views.items()}
 
 
@@ -191,7 +205,11 @@ IGNORED_COLOUR = (170, 170, 170)
 
 
 def category_colour(category_id: int) -> Rgb:
-    """Colour of a COCO category in previews, RGB; neighbouring categories differ in hue."""
+    """Returns the colour of a COCO category in previews, RGB bytes; neighbouring categories differ in hue.
+
+    Args:
+        category_id: COCO's category id, or any integer of 0 or more.
+    """
     hue = np.array([[[category_id * 47 % 180, 200, 255]]], dtype=np.uint8)
     red, green, blue = (int(v) for v in cv2.cvtColor(hue, cv2.COLOR_HSV2RGB)[0, 0])
     return (red, green, blue)
@@ -247,9 +265,14 @@ def draw_segments(
 def draw_box(
     picture: UInt8Image, box: Sequence[float], rgb: tuple[int, int, int], text: str = "", *, dashed: bool = False
 ) -> None:
-    """Draws a box (left, top, right, bottom) in index pixels and a text onto a picture, in place.
+    """Draws a box and a text onto a picture, in place.
 
-    The box may exceed the picture; dashed boxes mark ignored objects.
+    Args:
+        picture: (H, W, 3) uint8 picture.
+        box: left, top, right and bottom in index pixels; the box may exceed the picture.
+        rgb: colour, 0..255.
+        text: text on the colour above the box; "" for none.
+        dashed: whether the lines are dashed, which marks ignored objects.
     """
     left, top, right, bottom = (round(min(max(float(v), -FAR_PX), FAR_PX)) for v in box)
     if dashed:
@@ -274,6 +297,7 @@ def expect(facts: Any, *keys: str, place: Path) -> Mapping[str, Any]:
     Args:
         facts: content of the sidecar that the task wrote.
         place: path of the sidecar or dataset, for the message.
+        keys: names of the keys that must exist.
 
     Raises:
         DatasetError: a key is missing, because the sidecar is that of another task or damaged.

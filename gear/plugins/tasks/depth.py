@@ -89,7 +89,11 @@ def _paths(split: str, index: int) -> tuple[str, str, str]:
 
 
 class DepthTask:
-    """The task of monocular depth; it writes the folders `leftImg8bit`, `gtFine` and `filenames`."""
+    """The task of monocular depth; it writes the folders `leftImg8bit`, `gtFine` and `filenames`.
+
+    Args:
+        config: options of the task.
+    """
 
     def __init__(self, config: DepthConfig) -> None:
         self.config = config
@@ -99,7 +103,12 @@ class DepthTask:
         return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> DepthSample:
-        """Makes a sample from a rendered frame; pixels deeper than `max_depth_m` get NaN."""
+        """Makes a sample from a rendered frame; pixels deeper than `max_depth_m` get NaN.
+
+        Args:
+            frame: the rendered views of the scene, with depth.
+            record: the scene.
+        """
         depth_m = frame.views[VIEW].depth_m
         known = (depth_m > 0) & (depth_m <= self.config.max_depth_m)
         return DepthSample(
@@ -135,7 +144,18 @@ class DepthTask:
         return self.extend({}, 0, sidecars, info)
 
     def extend(self, before: Indexes, start: int, sidecars: Sequence[Sidecar], info: SplitInfo) -> Indexes:
-        """Makes the files of a whole split from those of its first samples, as `ExtendsIndexes` describes."""
+        """Makes the files of a whole split from those of its first samples; used when samples are added to a
+        dataset.
+
+        Args:
+            before: contents of the split's files after the first `start` samples, by path; {} for none.
+            start: number of samples that `before` contains.
+            sidecars: metadata of all samples of the split, in order.
+            info: names of the split, town, scene and patch.
+
+        Returns:
+            Contents of the files by path below the dataset's root.
+        """
         place = f"gtFine/{info.split}/camera_billboard_info.json"
         records = (sidecars[index].record for index in range(start, len(sidecars)))
         poses = billboard_info(
@@ -168,7 +188,11 @@ class DepthTask:
         )
 
     def as_prediction(self, sample: DepthSample) -> FloatImage:
-        """The ground truth as a prediction: (H, W) float32 metres; unknown pixels get `max_depth_m`."""
+        """Returns the ground truth as a prediction: (H, W) float32 metres; unknown pixels get `max_depth_m`.
+
+        Args:
+            sample: the sample with its depth map.
+        """
         return np.where(np.isfinite(sample.depth_m), sample.depth_m, np.float32(self.config.max_depth_m))
 
     def evaluator(self) -> Evaluator[DepthSample, FloatImage]:
@@ -180,7 +204,13 @@ class DepthTask:
         return {"reference": NearDepth()}
 
     def without(self, sample: DepthSample, masks: Masks) -> DepthSample:
-        """A copy of the sample without ground truth (NaN) at the pixels of the mask."""
+        """Returns a copy of the sample without ground truth (NaN) at the pixels of the mask, so that no metric
+        counts them.
+
+        Args:
+            sample: the sample with its depth map.
+            masks: (H, W) bool by camera name.
+        """
         return replace(sample, depth_m=np.where(masks[VIEW], np.float32(np.nan), sample.depth_m))
 
     def encode_prediction(self, sample: DepthSample, prediction: FloatImage, info: SplitInfo) -> Encoded:
@@ -221,7 +251,10 @@ class DepthTask:
 
     def preview(self, sample: DepthSample) -> Mapping[str, UInt8Image]:
         """Returns the pictures to look at: `image` with outlined surfaces, and `depth` in colours (near red, far
-        blue).
+        blue, unknown black).
+
+        Args:
+            sample: the sample with its depth map.
         """
         picture = sample.images[VIEW].copy()
         draw_surfaces(picture, sample, VIEW)
@@ -275,7 +308,11 @@ WHITE_FROM_M = 80.0
 
 
 def flip(sample: DepthSample) -> DepthSample:
-    """Mirrors a sample left to right: picture and depth map; surfaces are removed."""
+    """Returns a sample that is mirrored left to right: picture and depth map; surfaces are removed.
+
+    Args:
+        sample: the sample; it is not changed.
+    """
     return replace(
         sample,
         images={name: flip_array(picture) for name, picture in sample.images.items()},
@@ -289,6 +326,10 @@ def cut(sample: DepthSample, window: Window) -> DepthSample:
 
     Depth is divided by the window's scale, because with the same focal length an object that appears `s` times as large
     is at 1/s of the distance. Depth is unknown (NaN) beyond the picture.
+
+    Args:
+        sample: the sample; it is not changed.
+        window: the part to crop, and the size after resizing.
     """
     small = shrink(sample, window)
     return replace(small, depth_m=(small.depth_m / np.float32(window.scale)).astype(np.float32))
@@ -297,7 +338,11 @@ def cut(sample: DepthSample, window: Window) -> DepthSample:
 def shrink(sample: DepthSample, window: Window) -> DepthSample:
     """Crops a sample to a window and resizes it without changing its depth values; surfaces are removed.
 
-    The result is that of a camera with the same field of view and fewer pixels.
+    With the window of the whole picture, the result is that of a camera with the same field of view and fewer pixels.
+
+    Args:
+        sample: the sample; it is not changed.
+        window: the part to crop, and the size after resizing.
     """
     return replace(
         sample,

@@ -139,7 +139,7 @@ class Detect2dTask:
         return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> Detect2dSample:
-        """Makes a sample from a rendered frame, with every visible object for which COCO has a category."""
+        """Makes the sample of the scene `record` from its `frame`: all visible objects with a COCO category."""
         view, limits = frame.views[VIEW], self.config.visibility.limits()
         height, width = view.geom_id.shape
         found = []
@@ -172,16 +172,16 @@ class Detect2dTask:
         )
 
     def encode(self, sample: Detect2dSample, info: SplitInfo) -> Encoded:
-        """Encodes the picture; the annotations go into the sample's JSON file, from which `finalise` reads them."""
+        """Encodes the `sample`'s picture as a file of the split in `info`; its objects become metadata (`facts`)."""
         files = {f"images/{info.split}/{_name(sample.record.index)}": encode_rgb(sample.images[VIEW])}
         return Encoded(files=files, facts={"objects": to_json(sample.objects)})
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """Makes the files of a whole split: annotations under both usual names, and poses for CARLA-GeAR's loader."""
+        """Makes a split's annotation files from the metadata of all samples (`sidecars`), and poses for CARLA-GeAR."""
         return self.extend({}, 0, sidecars, info)
 
     def extend(self, before: Indexes, start: int, sidecars: Sequence[Sidecar], info: SplitInfo) -> Indexes:
-        """Makes the files of a whole split from those of its first samples, as `ExtendsIndexes` describes."""
+        """Does as `finalise`, from the files `before` (bytes by path) of the split's first `start` samples."""
         place = f"annotations/{info.split}/camera_billboard_info.json"
         instances = f"annotations/instances_{info.split}.json"
         description = f"gear {info.town} {info.scene} {info.split}, patch: {info.patch_label}"
@@ -203,7 +203,7 @@ class Detect2dTask:
         }
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Detect2dSample:
-        """Reads a sample: the picture from its file, and the objects from the sample's JSON file (sidecar)."""
+        """Reads a sample from its metadata `sidecar` and from its picture in the dataset's folder `root`."""
         record = sidecar.record
         return Detect2dSample(
             record=record,
@@ -213,7 +213,7 @@ class Detect2dTask:
         )
 
     def as_prediction(self, sample: Detect2dSample) -> tuple[coco.Detection, ...]:
-        """The ground truth as a prediction: a detection with score 1 for every object that is not ignored."""
+        """Returns the `sample`'s objects as a prediction: a detection of score 1 for each that is not ignored."""
         return tuple(
             coco.Detection(category_id=thing.category_id, box_px=thing.box_px, score=1.0)
             for thing in sample.objects
@@ -229,11 +229,11 @@ class Detect2dTask:
         return {"reference": TallObjects(self._as_shown)}
 
     def without(self, sample: Detect2dSample, masks: Masks) -> Detect2dSample:
-        """A copy of the sample in which objects and detections inside the mask are ignored, as COCO ignores crowds.
+        """Returns a copy of the sample in which what is inside the mask is ignored, as COCO ignores crowds.
 
         The box of each connected part of the mask is a crowd of every category: a detection that matches no object is
-        ignored at an overlap threshold t if a share of at least t of its own box lies in the crowd. An object with more
-        than half of its visible pixels in the mask is ignored.
+        ignored at an overlap threshold t if at least the share t of its box lies in it. Objects with more than half of
+        their visible pixels in the mask are ignored. `masks` holds (H, W) bool arrays by camera name.
         """
         mask = masks[VIEW]
         objects = tuple(
@@ -243,7 +243,7 @@ class Detect2dTask:
         return replace(sample, objects=objects, ignored_px=(*sample.ignored_px, *part_boxes(mask)))
 
     def picture_objects(self, sample: Detect2dSample, prediction: Sequence[coco.Detection]) -> PictureObjects:
-        """The labelled objects and the detections of a picture, for comparing samples with and without a patch.
+        """Returns `sample`'s objects and `prediction`'s detections, to compare samples with and without a patch.
 
         Boxes of ignored objects are returned as regions in which no detection is a false alarm.
         """
@@ -272,7 +272,7 @@ class Detect2dTask:
     def encode_prediction(
         self, sample: Detect2dSample, prediction: Sequence[coco.Detection], info: SplitInfo
     ) -> Encoded:
-        """Returns no files but the detections as metadata; `finalise_predictions` writes the results file."""
+        """Returns the detections (`prediction`) as metadata, from which `finalise_predictions` makes a file."""
         plain = [
             coco.Detection(
                 category_id=int(one.category_id),
@@ -286,11 +286,11 @@ class Detect2dTask:
     def decode_prediction(
         self, root: Path, sample: Detect2dSample, facts: Json, info: SplitInfo
     ) -> tuple[coco.Detection, ...]:
-        """Reads the stored detections of a sample from the metadata `facts`."""
+        """Reads a sample's stored detections from the metadata `facts`; the other parameters are not used."""
         return from_json(tuple[coco.Detection, ...], facts["detections"], "detections")
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """Makes COCO's results file of a whole split, from the metadata of all samples."""
+        """Makes COCO's results file of the split in `info`, from each sample's record and metadata (`facts`)."""
         lines = [
             line
             for record, one in facts
@@ -301,7 +301,7 @@ class Detect2dTask:
         return {results.coco_path(info.split): dump(lines)}
 
     def preview(self, sample: Detect2dSample) -> Mapping[str, UInt8Image]:
-        """Returns the picture to look at, as `boxes`: with masks and boxes, ignored objects dashed."""
+        """Returns the `sample`'s picture to look at, as `boxes`: with masks and boxes, ignored objects dashed."""
         picture = sample.images[VIEW].copy()
         height, width = picture.shape[:2]
         for thing in sample.objects:
@@ -403,7 +403,7 @@ LEAST_SIDE_PX = 4.0
 
 
 def flip(sample: Detect2dSample) -> Detect2dSample:
-    """Mirrors a sample left to right: picture, boxes and masks; surfaces are removed."""
+    """Returns the `sample` mirrored left to right: picture, boxes and masks; surfaces are removed."""
     height, width = sample.images[VIEW].shape[:2]
     return replace(
         sample,
@@ -426,7 +426,7 @@ def _flipped(thing: Object2d, height: int, width: int) -> Object2d:
 
 
 def cut(sample: Detect2dSample, window: Window) -> Detect2dSample:
-    """Crops a sample to a window and resizes it; surfaces are removed.
+    """Crops a `sample` to a `window` and resizes it; surfaces are removed.
 
     Objects outside the window are left out; objects with a small part inside are ignored. Masks are cropped, and boxes
     are measured again on the masks. The share of a silhouette outside the window is estimated by its box, because

@@ -93,7 +93,11 @@ class SemsegSample(Sample):
 
 
 class SemsegTask:
-    """The task of semantic segmentation; it writes Cityscapes' folders `leftImg8bit`, `gtFine` and `camera`."""
+    """The task of semantic segmentation; it writes Cityscapes' folders `leftImg8bit`, `gtFine` and `camera`.
+
+    Args:
+        config: options of the task.
+    """
 
     def __init__(self, config: SemsegConfig) -> None:
         self.config = config
@@ -103,7 +107,12 @@ class SemsegTask:
         return Rig(cameras=(self.config.mount(VIEW),), follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> SemsegSample:
-        """Makes a sample from a rendered frame: labels and instances come from the rendered geom ids."""
+        """Makes a sample from a rendered frame: labels and instances come from the rendered geom ids.
+
+        Args:
+            frame: the rendered views of the scene, with geom ids.
+            record: the scene.
+        """
         instances = instance_map(frame.views[VIEW].geom_id, frame.geoms, frame.objects)
         if self.config.labels.granularity == "coarse":
             instances = coarsen(instances, self.config.labels.coarse_window_px)
@@ -149,7 +158,18 @@ class SemsegTask:
         return self.extend({}, 0, sidecars, info)
 
     def extend(self, before: Indexes, start: int, sidecars: Sequence[Sidecar], info: SplitInfo) -> Indexes:
-        """Makes the files of a whole split from those of its first samples, as `ExtendsIndexes` describes."""
+        """Makes the files of a whole split from those of its first samples; used when samples are added to a
+        dataset.
+
+        Args:
+            before: contents of the split's files after the first `start` samples, by path; {} for none.
+            start: number of samples that `before` contains.
+            sidecars: metadata of all samples of the split, in order.
+            info: names of the split, town, scene and patch.
+
+        Returns:
+            Contents of the files by path below the dataset's root.
+        """
         place = f"gtFine/{info.split}/camera_billboard_info.json"
         records = (sidecars[index].record for index in range(start, len(sidecars)))
         poses = billboard_info(
@@ -176,7 +196,11 @@ class SemsegTask:
         )
 
     def as_prediction(self, sample: SemsegSample) -> npt.NDArray[np.uint8]:
-        """The ground truth as a prediction: (H, W) uint8 label ids."""
+        """Returns the ground truth as a prediction: (H, W) uint8 label ids.
+
+        Args:
+            sample: the sample with its label map.
+        """
         return sample.label_ids
 
     def evaluator(self) -> Evaluator[SemsegSample, npt.NDArray[np.uint8]]:
@@ -188,7 +212,13 @@ class SemsegTask:
         return {"reference": PresentClasses()}
 
     def without(self, sample: SemsegSample, masks: Masks) -> SemsegSample:
-        """A copy of the sample whose pixels inside the mask are unlabelled, so no metric counts these pixels."""
+        """Returns a copy of the sample whose pixels inside the mask are unlabelled, so no metric counts these
+        pixels.
+
+        Args:
+            sample: the sample with its label and instance maps.
+            masks: (H, W) bool by camera name.
+        """
         silent = masks[VIEW]
         return replace(
             sample,
@@ -232,6 +262,9 @@ class SemsegTask:
     def preview(self, sample: SemsegSample) -> Mapping[str, UInt8Image]:
         """Returns the picture to look at, as `labels`: the labels' colours are blended over it, and borders
         between instances are white.
+
+        Args:
+            sample: the sample with its label and instance maps.
         """
         colours = cityscapes.colour_map(sample.label_ids)[..., :3]
         picture = cv2.addWeighted(sample.images[VIEW], 0.45, np.ascontiguousarray(colours), 0.55, 0.0)
@@ -244,7 +277,13 @@ class SemsegTask:
         return {"labels": picture}
 
     def prediction_preview(self, sample: SemsegSample, prediction: npt.NDArray[np.uint8]) -> Mapping[str, UInt8Image]:
-        """The colours of the predicted labels over the picture; predictions have no instances."""
+        """Returns the picture to look at, as `labels`: the colours of the predicted labels over the picture,
+        without instances.
+
+        Args:
+            sample: the sample, for its picture.
+            prediction: (H, W) predicted label ids.
+        """
         shown = prediction.astype(np.uint8)
         return self.preview(replace(sample, label_ids=shown, instance_ids=shown.astype(np.uint16)))
 
@@ -260,7 +299,11 @@ UNLABELLED = 0
 
 
 def flip(sample: SemsegSample) -> SemsegSample:
-    """Mirrors a sample left to right: picture, label map and instance map; surfaces are removed."""
+    """Returns a sample that is mirrored left to right: picture, label map and instance map; surfaces are removed.
+
+    Args:
+        sample: the sample; it is not changed.
+    """
     return replace(
         sample,
         images={name: flip_array(picture) for name, picture in sample.images.items()},
@@ -274,6 +317,10 @@ def cut(sample: SemsegSample, window: Window) -> SemsegSample:
     """Crops a sample to a window and resizes it, label maps by nearest neighbour; surfaces are removed.
 
     Pixels beyond the picture are unlabelled.
+
+    Args:
+        sample: the sample; it is not changed.
+        window: the part to crop, and the size after resizing.
     """
     return replace(
         sample,

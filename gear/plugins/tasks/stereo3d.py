@@ -172,7 +172,7 @@ class Stereo3dTask:
         return Rig(cameras=cameras, follows_road=self.config.follows_road)
 
     def ground_truth(self, frame: Frame, record: SceneRecord) -> Stereo3dSample:
-        """Makes a sample from a rendered frame; objects for which KITTI has a type are measured in the left view."""
+        """Makes the sample of the scene `record` from `frame`: its KITTI objects, measured in the left view."""
         view, limits = frame.views[LEFT], self.config.visibility.limits()
         found = []
         for truth in observe_objects(view, frame.geoms, frame.objects, by_label=False):
@@ -191,7 +191,7 @@ class Stereo3dTask:
         return Calibration(intrinsics=record.camera(LEFT).intrinsics, baseline_m=self.config.baseline_m)
 
     def encode(self, sample: Stereo3dSample, info: SplitInfo) -> Encoded:
-        """Encodes both pictures, the calibration and the label file."""
+        """Encodes a `sample` as files of the split in `info`: both pictures, the calibration and the label file."""
         name = _name(sample.record.index)
         files = {
             f"{info.split}/image_2/{name}.png": encode_rgb(sample.images[LEFT]),
@@ -203,11 +203,11 @@ class Stereo3dTask:
         return Encoded(files=files, facts=facts)
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
-        """Makes the files of a whole split: the lists of sample ids, and the poses that CARLA-GeAR's loader reads."""
+        """Makes a split's files from the metadata of all samples (`sidecars`): lists of ids, CARLA-GeAR's poses."""
         return self.extend({}, 0, sidecars, info)
 
     def extend(self, before: Indexes, start: int, sidecars: Sequence[Sidecar], info: SplitInfo) -> Indexes:
-        """Makes the files of a whole split from those of its first samples, as `ExtendsIndexes` describes."""
+        """Does as `finalise`, from the files `before` (bytes by path) of the split's first `start` samples."""
         place = f"{info.split}/label_2/camera_billboard_info.json"
         records = (sidecars[index].record for index in range(start, len(sidecars)))
         poses = billboard_info(
@@ -216,7 +216,7 @@ class Stereo3dTask:
         return {**split_lists(info.split, [_name(index) for index in range(len(sidecars))]), place: dump(poses)}
 
     def decode(self, root: Path, sidecar: Sidecar, info: SplitInfo) -> Stereo3dSample:
-        """Reads a sample: both pictures from their files, and unrounded objects from its JSON file (sidecar)."""
+        """Reads a sample: pictures from the dataset's folder `root`, unrounded objects from its metadata `sidecar`."""
         record, name = sidecar.record, _name(sidecar.record.index)
         facts = expect(sidecar.facts, "baseline_m", "objects", place=root)
         baseline_m = from_json(float, facts["baseline_m"], "baseline_m")
@@ -236,7 +236,7 @@ class Stereo3dTask:
         )
 
     def as_prediction(self, sample: Stereo3dSample) -> tuple[KittiLabel, ...]:
-        """The ground truth as a prediction: the label of every object that is not ignored, with score 1."""
+        """Returns the labels of the `sample`'s objects that are not ignored, as a prediction with score 1."""
         return tuple(replace(thing.label(), score=1.0) for thing in sample.objects if not thing.is_ignored)
 
     def evaluator(self) -> Evaluator[Stereo3dSample, tuple[KittiLabel, ...]]:
@@ -248,13 +248,13 @@ class Stereo3dTask:
         return {"reference": NearCars(_lines, _ignored)}
 
     def without(self, sample: Stereo3dSample, masks: Masks) -> Stereo3dSample:
-        """A copy of the sample in which objects and detections inside the left mask are ignored, like DontCare regions.
+        """Returns a copy of the sample in which what is inside the left mask is ignored, like DontCare regions.
 
-        The box of each connected part of the mask is such a region. A detection that matches no object is ignored if
-        more than a share of its own box lies in the region: 0.7 for cars, 0.5 for people and cyclists, as in the
-        benchmark. KITTI's DontCare regions apply only to 2D boxes; these regions also apply to the bird's-eye view and
-        to 3D. An object is ignored if more than half of its visible pixels must lie in the mask, because its box has
-        too few other pixels.
+        The box of each connected part of the mask is such a region, also for the bird's-eye view and 3D (KITTI's are
+        for 2D boxes only). A detection that matches no object is ignored if more than a share of its box lies in it:
+        0.7 for cars, 0.5 for people and cyclists, as in the benchmark. An object is ignored if more than half of its
+        visible pixels must lie in the mask, because its box has too few others. `masks` holds (H, W) bool arrays by
+        camera name.
         """
         mask = masks[LEFT]
         objects, regions = [], list(part_boxes(mask))
@@ -266,7 +266,7 @@ class Stereo3dTask:
         return replace(sample, objects=tuple(objects), ignored_px=(*sample.ignored_px, *boxes))
 
     def picture_objects(self, sample: Stereo3dSample, prediction: Sequence[KittiLabel]) -> PictureObjects:
-        """The objects and the detections of the left picture, for comparing samples with and without a patch.
+        """Returns `sample`'s objects and `prediction`'s detections, to compare samples with and without a patch.
 
         Only cars, pedestrians and cyclists count; boxes of other types and ignored regions are returned as ignored
         regions.
@@ -292,22 +292,22 @@ class Stereo3dTask:
         )
 
     def encode_prediction(self, sample: Stereo3dSample, prediction: Sequence[KittiLabel], info: SplitInfo) -> Encoded:
-        """Encodes the detections of one sample as KITTI's result file."""
+        """Encodes the detections (`prediction`) of one `sample` as KITTI's result file; `info` is not used."""
         lines = results.kitti_result_lines(prediction)
         return Encoded(files={results.kitti_object_path(sample.record.index): lines}, facts={})
 
     def decode_prediction(
         self, root: Path, sample: Stereo3dSample, facts: Json, info: SplitInfo
     ) -> tuple[KittiLabel, ...]:
-        """Reads the detections of one sample from KITTI's result file."""
+        """Reads a `sample`'s detections from KITTI's result file in `root`; other parameters are not used."""
         return parse_labels(read_bytes(root / results.kitti_object_path(sample.record.index)).decode())
 
     def finalise_predictions(self, facts: Sequence[tuple[SceneRecord, Json]], info: SplitInfo) -> Mapping[str, bytes]:
-        """Returns no files, because the result files of the samples are complete."""
+        """Returns no files, because the samples' result files are complete; `facts` and `info` are not used."""
         return {}
 
     def preview(self, sample: Stereo3dSample) -> Mapping[str, UInt8Image]:
-        """Returns the pictures to look at: `left` with 3D boxes and (dashed) ignored regions, and `right`."""
+        """Returns pictures to look at: `left` with the `sample`'s 3D boxes and (dashed) ignored regions; `right`."""
         left = sample.images[LEFT].copy()
         for thing in sample.objects:
             if thing.is_ignored:
@@ -378,7 +378,7 @@ def _name(index: int) -> str:
 
 
 def flip(sample: Stereo3dSample) -> Stereo3dSample:
-    """Mirrors a stereo pair left to right: the right camera becomes the left one. Surfaces are removed.
+    """Mirrors a stereo `sample` left to right: the right camera becomes the left one. Surfaces are removed.
 
     Occlusion was measured in the left view and is used for the right view too. The silhouette in the right picture is
     not stored, so its box is estimated: each side moves between the pictures as far as the same side of the projected
