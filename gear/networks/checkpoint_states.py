@@ -88,8 +88,11 @@ def entries_of(content: Any, path: Path) -> list[Candidate]:
 
 
 def candidates_of(entries: list[Candidate]) -> Iterator[Candidate]:
-    """The candidates for a network's weights: every entry with unchanged keys, then the entry again without each
-    prefix that many of its keys share.
+    """Yields the candidates for a network's weights: every entry with unchanged keys, then the entry again without
+    each prefix that many of its keys share.
+
+    Args:
+        entries: result of `entries_of`, the most likely network first.
     """
     for one in entries:
         yield one

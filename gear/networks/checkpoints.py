@@ -68,6 +68,9 @@ def read_published(path: str | Path) -> dict[str, Tensor]:
 
     If the file has several entries, the most likely one is read. The prefix `module.` of `DataParallel` is removed.
 
+    Args:
+        path: the file; its ending `.safetensors` or `.json` decides how it is read, all others are read as PyTorch's.
+
     Raises:
         GearError: the file does not exist, cannot be read, would run code, or holds no network.
     """
@@ -81,6 +84,9 @@ def read_entries(path: str | Path) -> list[Candidate]:
     """Reads the mappings of a checkpoint or a safetensors file that hold tensors, the most likely network first.
 
     A graph model of TensorFlow.js (a JSON file) gives one mapping, with the weights of its convolutions.
+
+    Args:
+        path: the file; its ending `.safetensors` or `.json` decides how it is read, all others are read as PyTorch's.
 
     Raises:
         GearError: the file does not exist, cannot be read, would run code, or holds no tensors.

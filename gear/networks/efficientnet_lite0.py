@@ -72,7 +72,11 @@ class OnLite0(nn.Module, ABC):
         self.train(self.training)
 
     def train(self, mode: bool = True) -> OnLite0:
-        """Like `nn.Module.train`, except that normalisation layers of a frozen trunk stay in eval mode."""
+        """Does as `nn.Module.train`, except that normalisation layers of a frozen trunk stay in eval mode.
+
+        Args:
+            mode: whether the other layers are set to training mode.
+        """
         super().train(mode)
         if self.is_frozen:
             for layer in self.lite0().modules():
@@ -82,8 +86,12 @@ class OnLite0(nn.Module, ABC):
 
 
 def freeze_trunks(network: nn.Module) -> None:
-    """Freezes the EfficientNet-Lite0 trunks of a network after its initial weights were loaded. Networks without
-    such trunks are not changed.
+    """Freezes the EfficientNet-Lite0 trunks of a network after its initial weights were loaded (`OnLite0.freeze`).
+
+    Networks without such trunks are not changed.
+
+    Args:
+        network: any torch module.
     """
     for part in network.modules():
         if isinstance(part, OnLite0):
@@ -92,6 +100,9 @@ def freeze_trunks(network: nn.Module) -> None:
 
 def start_from_imagenet(network: OnLite0) -> None:
     """Loads ImageNet weights of EfficientNet-Lite0 from an installed package into the trunk of a network.
+
+    Args:
+        network: the network; its trunk is changed in place.
 
     Raises:
         GearError: the package is not installed, or its weights do not fit.

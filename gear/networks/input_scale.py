@@ -43,10 +43,10 @@ class Scaled(Protocol):
 
 
 def input_scale_of(options: Scaled, name: str, default: float = 1.0) -> float:
-    """The factor by which pictures are resized before a network; above 0 and at most `LARGEST_SCALE`.
+    """Returns the factor by which pictures are resized before a network; above 0 and at most `LARGEST_SCALE`.
 
     Args:
-        options: options of the network.
+        options: options of the network; a factor in them comes first, then that of the weights file that they select.
         name: name of the model plugin, which determines the shipped weights.
         default: result if neither the options nor the weights state a factor.
 

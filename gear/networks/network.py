@@ -38,6 +38,13 @@ class Network(nn.Module, ABC):
     has_quick_copy: ClassVar[bool] = False
 
     def __init__(self, graph: nn.Module, options: NetworkOptions, *, views: Sequence[str] = ("left",)) -> None:
+        """Moves the network to the device of its options and sets it to eval mode.
+
+        Args:
+            graph: the torch module that computes the outputs.
+            options: options that the user gave.
+            views: names of the cameras whose pictures the network reads; pictures of other cameras are ignored.
+        """
         super().__init__()
         prepare()
         self.graph = graph
@@ -77,7 +84,7 @@ class Network(nn.Module, ABC):
         return {}
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """The prediction for one sample, in the form that the task defines.
+        """Returns the prediction for one sample, in the form that the task defines.
 
         Args:
             views: (H, W, 3) uint8 pictures of the sample by camera name.
@@ -85,8 +92,11 @@ class Network(nn.Module, ABC):
         return self.predict_many([views])[0]
 
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[Any]:
-        """The predictions for several samples, in their order. Pictures of equal size go through the graph as one
-        batch.
+        """Returns the predictions for several samples, in their order. Pictures of equal size go through the graph
+        as one batch.
+
+        Args:
+            samples: (H, W, 3) uint8 pictures by camera name, one mapping per sample.
         """
         sizes = [sample[self._views[0]].shape[:2] for sample in samples]
         answers: list[Any] = [None] * len(samples)
@@ -125,22 +135,27 @@ class Network(nn.Module, ABC):
 
     @abstractmethod
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The outputs by name for (B, 3, H, W) pictures in 0..1 on the network's device; subclasses implement this."""
-
-    def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `losses`: the outputs, and further tensors of networks with heads that only training uses.
+        """Returns the outputs by name, float tensors with the batch as first dimension; subclasses implement this.
 
         Args:
-            pictures: (B, 3, H, W) pictures by camera name, float in 0..1.
+            pictures: (B, 3, H, W) pictures by camera name, float in 0..1, on the network's device.
+        """
+
+    def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
+        """Returns the input of `losses`: the outputs, and further tensors of networks with heads that only
+        training uses.
+
+        Args:
+            pictures: (B, 3, H, W) pictures by camera name, float in 0..1, on the network's device.
         """
         return self.run(pictures)
 
     def run_for_predictions(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `predictions`: the outputs, or a smaller intermediate result for networks that predict
-        faster from it.
+        """Returns the input of `predictions`: the outputs, or a smaller intermediate result for networks that
+        predict faster from it.
 
         Args:
-            pictures: (B, 3, H, W) pictures by camera name, float in 0..1.
+            pictures: (B, 3, H, W) pictures by camera name, float in 0..1, on the network's device.
         """
         return self.run(pictures)
 
@@ -149,7 +164,7 @@ class Network(nn.Module, ABC):
         """Scalar losses by name; training minimises their sum. Subclasses implement this.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B samples.
+            outputs: result of `run_for_losses` for a batch of B samples, by name.
             targets: the B samples with their ground truth.
         """
 
@@ -165,7 +180,11 @@ class Network(nn.Module, ABC):
 
 
 class Normalise(nn.Module):
-    """A layer that computes (x - mean) / std for each channel; mean and std are not part of the saved weights."""
+    """A layer that computes (x - mean) / std for each channel; mean and std are not part of the saved weights.
+
+    Args:
+        mean, std: mean and standard deviation of the three channels of pictures in 0..1.
+    """
 
     mean: Tensor
     std: Tensor
@@ -176,7 +195,11 @@ class Normalise(nn.Module):
         self.register_buffer("std", torch.tensor(std).view(1, -1, 1, 1), persistent=False)
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """Normalises (B, 3, H, W) pictures in 0..1."""
+        """Returns normalised pictures.
+
+        Args:
+            pictures: (B, 3, H, W) in 0..1.
+        """
         return (pictures - self.mean) / self.std
 
 

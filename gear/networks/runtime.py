@@ -43,6 +43,9 @@ def prepare(threads: int = 0) -> None:
 def device_of(requested: Literal["auto", "cpu", "cuda"]) -> torch.device:
     """The torch device that the option `device` names: `auto` is a GPU if there is one, otherwise the CPU.
 
+    Args:
+        requested: value of the option.
+
     Raises:
         GearError: the machine has no such device.
     """
@@ -54,14 +57,21 @@ def device_of(requested: Literal["auto", "cpu", "cuda"]) -> torch.device:
 
 
 def has_cuda(requested: str | None) -> bool:
-    """Whether networks run on a GPU of this machine, if the option `device` has the value `requested` (None is
-    `auto`).
+    """Returns whether networks run on a GPU of this machine.
+
+    Args:
+        requested: value of the option `device`; None is `auto`.
     """
     return requested != "cpu" and torch.cuda.is_available()
 
 
 def supports_bfloat16(device: torch.device) -> bool:
-    """Whether a device has instructions for bfloat16. On a device without them, bfloat16 is slower than float32."""
+    """Returns whether a device has instructions for bfloat16. On a device without them, bfloat16 is slower than
+    float32.
+
+    Args:
+        device: torch device.
+    """
     if device.type == "cuda":
         return bool(torch.cuda.is_bf16_supported(including_emulation=False))
     known = ("_is_avx512_bf16_supported", "_is_amx_tile_supported")
@@ -69,14 +79,23 @@ def supports_bfloat16(device: torch.device) -> bool:
 
 
 def autocast(device: torch.device, precision: Literal["auto", "float32", "bfloat16"]) -> torch.autocast:
-    """A context in which a network runs in the precision `precision`; `auto` leaves the choice to torch."""
+    """Returns a context in which suitable operations of a network run in a precision.
+
+    Args:
+        device: torch device of the network.
+        precision: `bfloat16` for half precision; with `float32` and `auto` the context changes nothing.
+    """
     return torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16")
 
 
 @contextlib.contextmanager
 def seeded(seed: int) -> Iterator[None]:
-    """A context in which layers draw their initial weights with `seed`. Afterwards torch's random generators have
-    the state that they had before.
+    """A context in which layers draw their initial weights with a seed.
+
+    Afterwards torch's random generators have the state that they had before.
+
+    Args:
+        seed: the seed, -2^63 to 2^64 - 1.
 
     Raises:
         GearError: torch does not accept the seed.

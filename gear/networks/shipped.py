@@ -62,13 +62,20 @@ class WeightsFile:
         return {key: _read(text) if key in JSON_KEYS else text for key, text in self.metadata.items()}
 
     def option(self, name: str) -> Json:
-        """The value of a model's option, such as `input_scale`, that the metadata state; None if they state none."""
+        """Returns the value of a model's option that the metadata state; None if they state none.
+
+        Args:
+            name: name of the option, such as `input_scale`.
+        """
         options = self.facts().get("options")
         return options.get(name) if isinstance(options, dict) else None
 
 
 def inspect(path: str | Path) -> WeightsFile:
     """Reads the header of a weights file.
+
+    Args:
+        path: the safetensors file; its tensors are not read.
 
     Raises:
         GearError: the file does not exist, or is not safetensors.
@@ -87,6 +94,9 @@ def inspect(path: str | Path) -> WeightsFile:
 def check_file(path: Path) -> None:
     """Checks that a weights file exists.
 
+    Args:
+        path: the file.
+
     Raises:
         GearError: there is no such file.
     """
@@ -97,7 +107,12 @@ def check_file(path: Path) -> None:
 
 
 def not_safetensors(path: str | Path, error: Exception) -> GearError:
-    """Makes the error for a file that cannot be read as safetensors; `error` is the exception that reading raised."""
+    """Makes the error for a file that cannot be read as safetensors.
+
+    Args:
+        path: the file, for the message.
+        error: the exception that reading raised.
+    """
     reason = str(error).splitlines()[0]
     return GearError(f"{path}: not a safetensors file ({reason}); gear weights convert makes one of a published file")
 
@@ -147,7 +162,11 @@ def trained_option(weights: str, name: str, option: str) -> Json:
 
 
 def shipped(name: str) -> Path | None:
-    """Path of the reference weights of a network; None if no installed package has them."""
+    """Returns the path of the reference weights of a network; None if no installed package has them.
+
+    Args:
+        name: name of the network's model plugin.
+    """
     for folder in shipped_folders():
         path = folder / "models" / f"{name}.safetensors"
         if path.is_file():

@@ -63,6 +63,10 @@ def build_graph(make: Callable[[], GraphT], options: NetworkOptions, name: str) 
 def load_into(network: nn.Module, path: str | Path) -> dict[str, str]:
     """Loads a safetensors file into a network; every key and shape must fit.
 
+    Args:
+        network: the torch module; it is changed in place.
+        path: the safetensors file.
+
     Returns:
         The file's metadata.
 
@@ -79,6 +83,10 @@ def load_into(network: nn.Module, path: str | Path) -> dict[str, str]:
 
 def load_trunk(network: nn.Module, path: str | Path) -> tuple[int, int]:
     """Loads those tensors of another network's file whose keys and shapes fit; the other weights are not changed.
+
+    Args:
+        network: the torch module; it is changed in place.
+        path: the safetensors file.
 
     Returns:
         The number of the network's values that were loaded, and the number of all its values.
@@ -136,8 +144,12 @@ def mismatches(expected: Mapping[str, Tensor], state: Mapping[str, Tensor]) -> l
 
 
 def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """Reads the tensors of a safetensors file and its metadata; shorter formats such as float16 are converted to
-    float32.
+    """Reads the tensors of a safetensors file and its metadata, both by key.
+
+    Shorter formats such as float16 are converted to float32.
+
+    Args:
+        path: the safetensors file.
 
     Raises:
         GearError: the file does not exist, or is not safetensors.

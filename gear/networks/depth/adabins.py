@@ -29,6 +29,11 @@ class AdaBins(DepthNetwork):
     picture.
 
     Its outputs are `depth_m` (B, H, W) and `bin_centres_m` (B, bins); all in metres.
+
+    Args:
+        graph: the torch module.
+        options: options that the user gave.
+        input_scale: default factor by which pictures are resized, used if the options state none.
     """
 
     options: AdaBinsOptions
@@ -38,8 +43,12 @@ class AdaBins(DepthNetwork):
         self._normalise = Normalise().to(self.device).eval()
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """The outputs `depth_m` (B, H, W), at the size of the picture, and `bin_centres_m` (B, bins), the centres
-        of the depth bins; all in metres.
+        """Returns the outputs `depth_m` (B, H, W), at the size of the picture, and `bin_centres_m` (B, bins), the
+        centres of the depth bins; all in metres.
+
+        Args:
+            picture: (B, 3, H, W) in 0..1. It is resized if its number of transformer tokens is out of the graph's
+                range.
         """
         height, width = (int(side) for side in picture.shape[2:])
         seen = resized(picture, *fitting(height, width, min_patches=self.options.queries + 1))
@@ -48,11 +57,11 @@ class AdaBins(DepthNetwork):
         return {DEPTH: depth_m[:, 0], BINS: centres_m}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """The two losses of the AdaBins paper: scale-invariant error of the depth, and Chamfer distance between
-        bin centres and true depths.
+        """Returns the two losses of the AdaBins paper: `silog`, the scale-invariant error of the depth, and
+        `bins`, the Chamfer distance between bin centres and true depths.
 
         Args:
-            outputs: outputs of `forward` by name; the depth is (B, H, W) in metres.
+            outputs: result of `run` by name; the depth is (B, H, W) in metres.
             depth_m: (B, H, W) true depth in metres; NaN where unknown.
         """
         max_depth_m = self.options.max_depth_m

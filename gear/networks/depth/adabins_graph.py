@@ -36,7 +36,11 @@ LEAST_WIDTH = 0.1
 
 
 class AdaBinsGraph(nn.Module):
-    """AdaBins: an encoder, a decoder, and a small transformer that chooses the depth bins anew for each picture."""
+    """AdaBins: an encoder, a decoder, and a small transformer that chooses the depth bins anew for each picture.
+
+    Args:
+        options: sizes of the network, and the range of depths.
+    """
 
     def __init__(self, options: AdaBinsOptions) -> None:
         super().__init__()
@@ -65,7 +69,11 @@ class AdaBinsGraph(nn.Module):
 
 
 class Encoder(nn.Module):
-    """The encoder of AdaBins: an EfficientNet of timm without its classifier."""
+    """The encoder of AdaBins: an EfficientNet of timm without its classifier.
+
+    Args:
+        name: timm's name of the EfficientNet.
+    """
 
     original_model: Any
 
@@ -84,9 +92,12 @@ class Encoder(nn.Module):
         return [*(channels[f"blocks.{index}"] for index in TAPPED), self.original_model.conv_head.out_channels]
 
     def forward(self, pictures: Tensor) -> list[Tensor]:
-        """The feature maps of (B, 3, H, W) pictures at 1/2, 1/4, 1/8, 1/16 and 1/32 of their sides.
+        """Returns the feature maps of pictures at 1/2, 1/4, 1/8, 1/16 and 1/32 of their sides.
 
         The coarsest map is taken before its normalisation layer.
+
+        Args:
+            pictures: (B, 3, H, W), normalised.
         """
         network = self.original_model
         found = network.bn1(network.conv_stem(pictures))
@@ -99,7 +110,12 @@ class Encoder(nn.Module):
 
 
 class Decoder(nn.Module):
-    """The decoder of AdaBins: four upsampling steps, each of which also receives a feature map of the encoder."""
+    """The decoder of AdaBins: four upsampling steps, each of which also receives a feature map of the encoder.
+
+    Args:
+        widths: numbers of channels of the encoder's five maps, from the finest to the coarsest.
+        features: number of channels of the widest layer; each step halves it.
+    """
 
     def __init__(self, widths: Sequence[int], features: int) -> None:
         super().__init__()
@@ -113,8 +129,10 @@ class Decoder(nn.Module):
         self.conv3 = nn.Conv2d(features // 16, WIDTH, 3, padding=1)
 
     def forward(self, maps: Sequence[Tensor]) -> Tensor:
-        """The (B, 128, H / 2, W / 2) features of (B, 3, H, W) pictures, computed from the encoder's five feature
-        maps.
+        """Returns the (B, 128, H / 2, W / 2) features of (B, 3, H, W) pictures.
+
+        Args:
+            maps: the encoder's five feature maps, from the finest to the coarsest.
         """
         half, quarter, eighth, sixteenth, deepest = maps
         found = self.up1(self.conv2(deepest), sixteenth)
@@ -127,6 +145,10 @@ class Decoder(nn.Module):
 class Up(nn.Module):
     """One upsampling step: the coarse map is interpolated to the size of the encoder's map, then two convolutions
     process both maps.
+
+    Args:
+        inputs: number of channels of both maps together.
+        outputs: number of channels of the result.
     """
 
     def __init__(self, inputs: int, outputs: int) -> None:
@@ -137,7 +159,12 @@ class Up(nn.Module):
         )  # fmt: skip
 
     def forward(self, coarse: Tensor, beside: Tensor) -> Tensor:
-        """The (B, outputs, h, w) features with the height and width of `beside`, the encoder's map."""
+        """Returns the (B, outputs, h, w) features with the height and width of the encoder's map.
+
+        Args:
+            coarse: (B, C, h', w') result of the step before.
+            beside: (B, C', h, w) map of the encoder; C + C' is `inputs`.
+        """
         enlarged = functional.interpolate(coarse, beside.shape[2:], mode="bilinear", align_corners=True)
         found: Tensor = self._net(torch.cat([enlarged, beside], dim=1))
         return found
@@ -146,6 +173,10 @@ class Up(nn.Module):
 class AdaptiveBins(nn.Module):
     """The mini-ViT of AdaBins (Bhat et al., section 3.2): a transformer that predicts the widths of the depth
     bins, and attention maps.
+
+    Args:
+        queries: number of tokens that are compared with the features; one attention map each.
+        bins: number of depth bins.
     """
 
     def __init__(self, queries: int, bins: int) -> None:
@@ -158,8 +189,11 @@ class AdaptiveBins(nn.Module):
         )
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
-        """The (B, bins) bin widths as shares of the depth range, with sum 1, and the (B, queries, h, w) attention
-        maps.
+        """Returns the (B, bins) bin widths as shares of the depth range, with sum 1, and the (B, queries, h, w)
+        attention maps.
+
+        Args:
+            features: (B, 128, h, w) output of the decoder.
         """
         tokens = self.patch_transformer(features)
         widths = functional.relu(self.regressor(tokens[0])) + LEAST_WIDTH
@@ -179,25 +213,33 @@ class PatchTransformer(nn.Module):
         self.positional_encodings = nn.Parameter(torch.rand(MOST_PATCHES, WIDTH))
 
     def forward(self, features: Tensor) -> Tensor:
-        """The (patches, B, 128) tokens of the feature map's patches; patches are ordered row by row."""
+        """Returns the (patches, B, 128) tokens of the feature map's patches; patches are ordered row by row.
+
+        Args:
+            features: (B, 128, h, w) output of the decoder, with at most 500 patches of 16 x 16 cells.
+        """
         patches = self.embedding_convPxP(features).flatten(2).permute(2, 0, 1)
         tokens: Tensor = self.transformer_encoder(patches + self.positional_encodings[: len(patches), None])
         return tokens
 
 
 def patches(height: int, width: int) -> int:
-    """Number of transformer tokens (patches) for a picture of this height and width in pixels."""
+    """Returns the number of transformer tokens (patches) for a picture.
+
+    Args:
+        height, width: size of the picture in pixels.
+    """
     rows, columns = (-(-side // 2) // PATCH_PX for side in (height, width))
     return rows * columns
 
 
 def fitting(height: int, width: int, min_patches: int, max_patches: int = MOST_PATCHES) -> tuple[int, int]:
-    """The picture size nearest to `height` x `width`, at the same aspect ratio, whose number of transformer tokens
-    lies between `min_patches` and `max_patches`.
+    """Returns the picture size, at the same aspect ratio, whose number of transformer tokens is allowed and which
+    is nearest to the given one.
 
     Args:
-        height, width: size of the picture.
-        min_patches, max_patches: smallest and largest number of patches (transformer tokens).
+        height, width: size of the picture in pixels.
+        min_patches, max_patches: smallest and largest allowed number of patches (transformer tokens).
 
     Returns:
         Height and width.

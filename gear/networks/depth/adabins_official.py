@@ -19,7 +19,11 @@ code.
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Renames the keys of AdaBins' published weights to the parameter names of `AdaBinsGraph`."""
+    """Renames the keys of AdaBins' published weights to the parameter names of `AdaBinsGraph`.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
+    """
     renamed = {}
     for key, tensor in state.items():
         for old, new in OLD_NAMES:

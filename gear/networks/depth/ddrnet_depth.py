@@ -43,6 +43,11 @@ def ddrnet_depth_graph() -> DDRNet23Slim:
 class DdrnetDepth(DepthNetwork):
     """gear's own fast depth network: depth = 10 m * exp(output channel). The channel is interpolated before the
     exponential.
+
+    Args:
+        graph: the torch module, from `ddrnet_depth_graph`.
+        options: options that the user gave.
+        input_scale: default factor by which pictures are resized, used if the options state none.
     """
 
     multiple_px: ClassVar[int] = 8
@@ -53,20 +58,25 @@ class DdrnetDepth(DepthNetwork):
         self._normalise = Normalise().to(self.device).eval()
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """The output `depth_m`: (B, h, w) depth in metres at the size of the input picture."""
+        """Returns the output `depth_m`: (B, h, w) depth in metres at the size of the input picture, within
+        `RANGE_M`.
+
+        Args:
+            picture: (B, 3, h, w) in 0..1; h and w are multiples of 8.
+        """
         height, width = (int(side) for side in picture.shape[2:])
         (channel,) = self.graph(self._normalise(picture))
         least, most = (math.log(limit_m / MIDDLE_M) for limit_m in RANGE_M)
         return {DEPTH: MIDDLE_M * resized(channel.float(), height, width)[:, 0].clamp(least, most).exp()}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """Three losses: scale-invariant error, mean relative error, and root mean square error in units of 20 m
-        (`RMS_UNIT_M`).
+        """Returns three losses: `silog`, the scale-invariant error; `log_l1`, the mean relative error; and `rms`,
+        the root mean square error in units of 20 m (`RMS_UNIT_M`).
 
         The scale-invariant error is dominated by outliers; the mean relative error is robust to them.
 
         Args:
-            outputs: outputs of `forward` by name; the depth is (B, H, W) in metres.
+            outputs: result of `run` by name; the depth is (B, H, W) in metres.
             depth_m: (B, H, W) true depth in metres; NaN where unknown.
         """
         max_depth_m = self.options.max_depth_m

@@ -36,17 +36,21 @@ class Glpn(DepthNetwork):
     least_px: ClassVar[int] = LEAST_PX
 
     def estimate(self, picture: Tensor) -> Mapping[str, Tensor]:
-        """The output `depth_m`: (B, H, W) depth in metres at the picture's size; both sides must be above 16 pixels."""
+        """Returns the output `depth_m`: (B, H, W) depth in metres at the picture's size.
+
+        Args:
+            picture: (B, 3, H, W) in 0..1; both sides are above 16 pixels.
+        """
         height, width = (int(side) for side in picture.shape[2:])
         top, left = -height % MULTIPLE_PX, -width % MULTIPLE_PX // 2
         shares = self.graph(mirrored(picture, MULTIPLE_PX)).predicted_depth
         return {DEPTH: self.options.max_depth_m * shares[:, top : top + height, left : left + width].float()}
 
     def depth_losses(self, outputs: Mapping[str, Tensor], depth_m: Tensor) -> Mapping[str, Tensor]:
-        """The scale-invariant logarithmic loss of the GLPDepth paper (equation 3).
+        """Returns `silog`, the scale-invariant logarithmic loss of the GLPDepth paper (equation 3).
 
         Args:
-            outputs: outputs of `forward` by name; the depth is (B, H, W) in metres.
+            outputs: result of `run` by name; the depth is (B, H, W) in metres.
             depth_m: (B, H, W) true depth in metres; NaN where unknown.
         """
         return {"silog": silog(outputs[DEPTH], depth_m, max_depth_m=self.options.max_depth_m)}
@@ -69,6 +73,9 @@ def glpn_graph(options: GlpnOptions) -> nn.Module:
     The encoder is initialised as in SegFormer (Xie et al., NeurIPS 2021), the decoder by torch's default for
     convolutions. transformers itself draws all weights with a standard deviation of 0.02. With that value the
     depth-wise convolutions, which have only nine inputs, would pass almost no signal.
+
+    Args:
+        options: sizes of the network.
     """
     need_transformers()
     from transformers import GLPNConfig, GLPNForDepthEstimation
@@ -103,8 +110,12 @@ def _draw(layer: nn.Module) -> None:
 
 
 def mirrored(picture: Tensor, multiple_px: int) -> Tensor:
-    """Extends (B, C, H, W) pictures by reflection, at the top and evenly left and right, until sides are
-    multiples of `multiple_px`.
+    """Returns pictures that are extended by reflection, at the top and evenly left and right, until their sides
+    are multiples of a number.
+
+    Args:
+        picture: (B, C, H, W), any values.
+        multiple_px: number of pixels of which the sides become multiples.
     """
     height, width = picture.shape[2:]
     top, across = -height % multiple_px, -width % multiple_px

@@ -42,6 +42,9 @@ def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """Renames the keys of GLPDepth's published weights to the parameter names of the GLPN in transformers.
 
     Keys that already have transformers' names, and unknown keys, are not changed.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
     """
     renamed: dict[str, Tensor] = {}
     for key, tensor in state.items():

@@ -21,8 +21,12 @@ MAX_DEPTH_M = 80.0
 
 
 def valid_mask(depth_m: Tensor, max_depth_m: float | None = MAX_DEPTH_M) -> Tensor:
-    """The (B, H, W) bool mask of the pixels whose true depth is known, above 1 mm and at most `max_depth_m` metres
-    (None for no limit).
+    """Returns the (B, H, W) bool mask of the pixels whose true depth is known and counts: above 1 mm and not too
+    far.
+
+    Args:
+        depth_m: (B, H, W) true depth in metres, NaN where unknown.
+        max_depth_m: greatest true depth that counts; None for no limit.
     """
     is_known = torch.isfinite(depth_m) & (depth_m > LEAST_M)
     return is_known if max_depth_m is None else is_known & (depth_m <= max_depth_m)
@@ -61,9 +65,6 @@ def silog(
 def adabins_silog(predicted_m: Tensor, depth_m: Tensor, *, max_depth_m: float | None = MAX_DEPTH_M) -> Tensor:
     """AdaBins' pixel loss: 10 * sqrt(variance + 0.15 * mean^2) of the differences between logarithms of depth.
 
-    Depths are (B, H, W) metres, NaN where the truth is unknown. `max_depth_m` is the greatest true depth that
-    counts; None for no limit.
-
     Args:
         predicted_m: (B, H, W) predicted depth, above 0.
         depth_m: (B, H, W) ground truth, NaN where unknown.
@@ -74,9 +75,6 @@ def adabins_silog(predicted_m: Tensor, depth_m: Tensor, *, max_depth_m: float | 
 
 def log_l1(predicted_m: Tensor, depth_m: Tensor, *, max_depth_m: float | None = MAX_DEPTH_M) -> Tensor:
     """Mean absolute difference between the logarithms of depth, a relative error that is robust to outliers.
-
-    Depths are (B, H, W) metres, NaN where the truth is unknown. `max_depth_m` is the greatest true depth that
-    counts; None for no limit.
 
     Args:
         predicted_m: (B, H, W) predicted depth, above 0.

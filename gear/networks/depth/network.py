@@ -47,8 +47,11 @@ class DepthNetwork(Network):
         self.input_scale = input_scale if options.input_scale is None else options.input_scale
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The network's outputs by name: `depth_m` (B, H, W), depth in metres at the picture's size, and the
-        further outputs of `estimate`.
+        """Returns the network's outputs by name: `depth_m` (B, H, W), depth in metres at the picture's size, and
+        the further outputs of `estimate`.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
         """
         picture = pictures[VIEW]
         height, width = (int(side) for side in picture.shape[2:])
@@ -57,21 +60,22 @@ class DepthNetwork(Network):
         return outputs
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The scalar losses by name, computed from the network's outputs and the samples' ground truth `depth_m`.
+        """Returns the scalar losses by name, computed from the network's outputs and the samples' ground truth
+        `depth_m`.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B samples.
+            outputs: result of `run_for_losses` for a batch of B samples, by name.
             targets: the B samples with their ground truth.
         """
         depth_m = torch.from_numpy(np.stack([target.depth_m for target in targets])).to(outputs[DEPTH])
         return self.depth_losses(outputs, depth_m)
 
     def predictions(self, outputs: Mapping[str, Tensor], size_px: tuple[int, ...]) -> Sequence[FloatImage]:
-        """The predicted depth of each picture: (H, W) float32 in metres.
+        """Returns the predicted depth of each picture: (H, W) float32 in metres.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B pictures.
-            size_px: height and width of the pictures.
+            outputs: result of `run_for_predictions` for a batch of B pictures, by name.
+            size_px: height and width of the pictures; not used.
         """
         return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
 
@@ -95,14 +99,18 @@ class DepthNetwork(Network):
         """Computes the scalar losses by name; subclasses implement this method.
 
         Args:
-            outputs: result of `run`.
+            outputs: result of `run`, by name.
             depth_m: (B, H, W) true depth in metres, NaN where unknown.
         """
 
 
 def resized(maps: Tensor, height: int, width: int) -> Tensor:
-    """Resizes (B, C, H, W) maps to `height` and `width`: bilinearly, with anti-aliasing when reducing. Maps that
-    have this size already are returned unchanged.
+    """Resizes maps bilinearly, with anti-aliasing when reducing. Maps that have the size already are returned
+    unchanged.
+
+    Args:
+        maps: (B, C, h, w), any values.
+        height, width: size of the result.
     """
     if tuple(maps.shape[2:]) == (height, width):
         return maps

@@ -47,10 +47,13 @@ class FasterRcnnDetector(Detector):
     generator = "rpn.anchor_generator"
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """Outputs of the region proposal network and of the second stage, by name.
+        """Returns the outputs of the region proposal network and of the second stage, by name (see the class).
 
         Pictures are processed one by one, because convolutions over a batch round differently from convolutions over a
         single picture. The smallest difference may change which proposals are kept, and thereby all further outputs.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
         """
         each = [self._run_one(picture[None]) for picture in pictures[VIEW]]
         return {name: torch.cat([outputs[name] for outputs in each]) for name in each[0]}
@@ -74,8 +77,11 @@ class FasterRcnnDetector(Detector):
         }
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `losses`: feature maps, outputs of the region proposal network, anchors in pixels of the
-        graph's input, and the picture's size.
+        """Returns the input of `losses`: feature maps, outputs of the region proposal network, anchors in pixels
+        of the graph's input, and the picture's size.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
         """
         from torchvision.models.detection.rpn import concat_box_prediction_layers
 
@@ -100,7 +106,7 @@ class FasterRcnnDetector(Detector):
         torch's own generator samples them.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B samples.
+            outputs: result of `run_for_losses` for a batch of B samples, by name.
             targets: the B samples with their ground truth.
         """
         wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
@@ -115,7 +121,7 @@ class FasterRcnnDetector(Detector):
         """Detections of each picture, highest score first.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B pictures.
+            outputs: result of `run_for_predictions` for a batch of B pictures, by name.
             size_px: height and width of the pictures.
         """
         heads: Any = self.graph.get_submodule("roi_heads")

@@ -45,8 +45,11 @@ training step on a CPU.
 
 
 def fasterrcnn_r50_fpn(score_threshold: float) -> nn.Module:
-    """Faster R-CNN on ResNet-50 with a feature pyramid, as in the published weights: FrozenBatchNorm2d with eps 0,
-    91 classes.
+    """Builds Faster R-CNN on ResNet-50 with a feature pyramid and random weights, as the published weights need
+    it: FrozenBatchNorm2d with eps 0, 91 classes.
+
+    Args:
+        score_threshold: smallest score of a detection that is reported, 0..1.
     """
     torchvision_import.need()
     from torchvision.models.detection import FasterRCNN
@@ -59,8 +62,11 @@ def fasterrcnn_r50_fpn(score_threshold: float) -> nn.Module:
 
 
 def retinanet_r50_fpn(score_threshold: float) -> nn.Module:
-    """RetinaNet on ResNet-50 with a feature pyramid, as in the published weights: FrozenBatchNorm2d with eps 0, 91
-    classes.
+    """Builds RetinaNet on ResNet-50 with a feature pyramid and random weights, as the published weights need it:
+    FrozenBatchNorm2d with eps 0, 91 classes.
+
+    Args:
+        score_threshold: smallest score of a detection that is reported, 0..1.
     """
     torchvision_import.need()
     from torchvision.models.detection import RetinaNet
@@ -158,10 +164,13 @@ class LitePyramid(OnLite0):
         return self.body
 
     def forward(self, pictures: Tensor) -> Mapping[str, Tensor]:
-        """The pyramid's feature maps by level, under torchvision's names.
+        """Returns the pyramid's feature maps by level, under torchvision's names, finest first.
 
         The maps are in channels-last memory format. In the default format, gradients of depth-wise convolutions take up
         to ten times as long on a CPU, and a whole training step takes a seventh longer.
+
+        Args:
+            pictures: (B, 3, H, W), normalised.
         """
         stages = self.body(pictures.contiguous(memory_format=torch.channels_last))
         maps: Mapping[str, Tensor] = self.fpn(OrderedDict((str(i), each) for i, each in enumerate(stages)))

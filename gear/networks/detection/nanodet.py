@@ -53,9 +53,13 @@ class NanoDetDetector(Detector):
     """NanoDet as a gear network.
 
     Outputs for N cells: `cls_logits` (B, N, 80) in the order of COCO's categories; `box_sides` (B, N, 4, 11), logits of
-    the distances in strides from the cell's centre to the left, top, right and bottom sides; and `centres_px`
-    (B, N, 2), x and y of the cells in pixels of the graph's input. Losses are `quality_focal`, `giou` and
+    the distances in strides from the cell's centre to the left, top, right and bottom sides; and `centres_px` (B, N,
+    2), x and y of the cells in pixels of the graph's input. Losses are `quality_focal`, `giou` and
     `distribution_focal`.
+
+    Args:
+        graph: the torch module.
+        options: options that the user gave, such as the size of the input.
     """
 
     def __init__(self, graph: nn.Module, options: OfficialDetectorOptions) -> None:
@@ -72,24 +76,35 @@ class NanoDetDetector(Detector):
         return {f"layer{number}": stages.get_submodule(str(number + 1)) for number in (1, 2, 3, 4)}
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The outputs by name; the network reads blue, green, red."""
+        """Returns the outputs by name (see the class). The graph reads blue, green, red; the channels are swapped
+        here.
+
+        Args:
+            pictures: (B, 3, H, W) RGB picture `left`, float in 0..1, on the network's device.
+        """
         picture = pictures[VIEW]
         logits, sides = self.graph(self.preprocess(picture).flip(1))
         centres = self._centres(size_of(picture)).expand(len(picture), -1, -1)
         return {LOGITS: logits, SIDES: sides, CENTRES_PX: centres}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `losses`: the outputs and the picture's size."""
+        """Returns the input of `losses`: the outputs of `run`, and `picture_px`, height and width of the pictures.
+
+        Args:
+            pictures: (B, 3, H, W) RGB picture `left`, float in 0..1, on the network's device.
+        """
         picture = pictures[VIEW]
         size = torch.tensor(size_of(picture), device=self.device)
         return {**self.run(pictures), PICTURE: size.expand(len(picture), -1)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The three losses by name, summed over the objects' cells of all pictures and divided as in the training
-        code; background cells that lie mostly inside ignored objects do not count.
+        """Returns the three losses by name, summed over the objects' cells of all pictures and divided as in the
+        training code.
+
+        Background cells that lie mostly inside ignored objects do not count.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B samples.
+            outputs: result of `run_for_losses` for a batch of B samples, by name.
             targets: the B samples with their ground truth.
         """
         size = picture_size(outputs)
@@ -110,7 +125,7 @@ class NanoDetDetector(Detector):
         """Detections of each picture, highest score first.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B pictures.
+            outputs: result of `run_for_predictions` for a batch of B pictures, by name.
             size_px: height and width of the pictures.
         """
         from torchvision.ops import batched_nms

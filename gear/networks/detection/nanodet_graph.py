@@ -27,19 +27,28 @@ SLOPE = 0.1
 
 
 class Convolution(nn.Module):
-    """A 3 × 3 convolution with bias and leaky ReLU; `conv` has the name of the published weights."""
+    """A 3 × 3 convolution with bias and leaky ReLU. The attribute is named `conv`, as in the published weights.
+
+    Args:
+        inputs, outputs: numbers of channels.
+        stride: stride in both directions.
+    """
 
     def __init__(self, inputs: int, outputs: int, stride: int = 1) -> None:
         super().__init__()
         self.conv = nn.Conv2d(inputs, outputs, 3, stride, padding=1)
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, inputs, H, W) to (B, outputs, H / stride, W / stride)."""
+        """Converts `features` (B, inputs, H, W) to (B, outputs, H / stride, W / stride)."""
         return functional.leaky_relu(self.conv(features), SLOPE)
 
 
 class ResidualBlock(nn.Module):
-    """Two convolutions; the result is both outputs side by side."""
+    """Two convolutions; the result is both outputs side by side.
+
+    Args:
+        channels: number of channels of input and output.
+    """
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -47,13 +56,19 @@ class ResidualBlock(nn.Module):
         self.mid_conv = Convolution(channels // 2, channels // 2)
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, channels, H, W) to the same shape."""
+        """Converts `features` (B, channels, H, W) to other features of the same shape."""
         first = self.in_conv(features)
         return torch.cat((self.mid_conv(first), first), dim=1)
 
 
 class CspStage(nn.Module):
-    """A cross stage partial stage (Wang et al., CSPNet, 2020): residual blocks beside a direct connection."""
+    """A cross stage partial stage (Wang et al., CSPNet, 2020): residual blocks beside a direct connection.
+
+    Args:
+        channels: number of channels of the input; the output has twice as many.
+        blocks: number of residual blocks.
+        stride: stride of the first convolution.
+    """
 
     def __init__(self, channels: int, blocks: int, stride: int) -> None:
         super().__init__()
@@ -62,7 +77,7 @@ class CspStage(nn.Module):
         self.res_out_conv = Convolution(channels, channels)
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, channels, H, W) to (B, 2 channels, H / stride, W / stride)."""
+        """Converts `features` (B, channels, H, W) to (B, 2 channels, H / stride, W / stride)."""
         first = self.in_conv(features)
         return torch.cat((self.res_out_conv(self.res_blocks(first)), first), dim=1)
 
@@ -76,7 +91,7 @@ class CspBackbone(nn.Module):
         self.stages = nn.ModuleList([*stem, *(CspStage(*stage) for stage in STAGES)])
 
     def forward(self, pictures: Tensor) -> list[Tensor]:
-        """(B, 3, H, W) normalised pictures to three maps with 128, 256 and 512 channels."""
+        """Converts normalised `pictures` (B, 3, H, W) to three maps with 128, 256 and 512 channels, finest first."""
         features, maps = pictures, []
         for stage in self.stages:
             features = stage(features)
@@ -85,14 +100,18 @@ class CspBackbone(nn.Module):
 
 
 class LateralConvolution(nn.Module):
-    """A 1 × 1 convolution with bias, without activation."""
+    """A 1 × 1 convolution to 128 channels with bias, without activation.
+
+    Args:
+        inputs: number of channels of the input.
+    """
 
     def __init__(self, inputs: int) -> None:
         super().__init__()
         self.conv = nn.Conv2d(inputs, CHANNELS, 1)
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, inputs, H, W) to (B, 128, H, W)."""
+        """Converts `features` (B, inputs, H, W) to (B, 128, H, W)."""
         result: Tensor = self.conv(features)
         return result
 
@@ -105,7 +124,7 @@ class Pan(nn.Module):
         self.lateral_convs = nn.ModuleList(LateralConvolution(2 * stage[0]) for stage in STAGES[1:])
 
     def forward(self, maps: Sequence[Tensor]) -> list[Tensor]:
-        """The backbone's maps to three maps of the same sizes with 128 channels."""
+        """Converts the backbone's three `maps`, finest first, to three maps of the same sizes with 128 channels."""
         levels = [lateral(each) for lateral, each in zip(self.lateral_convs, maps, strict=True)]
         for coarse in range(len(levels) - 1, 0, -1):
             levels[coarse - 1] = levels[coarse - 1] + _resized(levels[coarse], 2.0)
@@ -124,7 +143,12 @@ class Head(nn.Module):
         self.gfl_cls = nn.ModuleList(nn.Conv2d(CHANNELS, CLASSES + 4 * BINS, 1) for _ in STRIDES_PX)
 
     def forward(self, maps: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
-        """Class logits (B, N, 80) and box logits (B, N, 4, 11) of all N cells, the finest scale first, by rows."""
+        """Computes class logits (B, N, 80) and box logits (B, N, 4, 11) of all N cells, the finest scale first, by
+        rows.
+
+        Args:
+            maps: the three maps of the path aggregation network (`Pan`), finest first, 128 channels each.
+        """
         outputs = []
         for features, convolution, last in zip(maps, self.cls_convs, self.gfl_cls, strict=True):
             outputs.append(last(convolution(features)).flatten(2))

@@ -24,6 +24,9 @@ def from_published(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """The tensors of gear's NanoDet, from those of a graph file (`gear.networks.graph_model`) or of a checkpoint.
 
     Batch normalisation of a checkpoint is folded into the convolutions. Other keys are passed on unchanged.
+
+    Args:
+        state: tensors of the file by their published names.
     """
     if state and all(NUMBERED.fullmatch(key) for key in state):
         return _from_graph(state)

@@ -102,8 +102,11 @@ class Detector(Network):
         return {name: body.get_submodule(name) for name in ("layer1", "layer2", "layer3", "layer4")}
 
     def preprocess(self, pictures: Tensor) -> Tensor:
-        """The (B, 3, h, w) input of the graph: the pictures resized, normalised, and padded with zeros at the
-        bottom and the right.
+        """Returns the (B, 3, h, w) input of the graph: the pictures resized, normalised, and padded with zeros at
+        the bottom and the right.
+
+        Args:
+            pictures: (B, 3, H, W) RGB in 0..1.
         """
         size = size_of(pictures)
         inner, (height, width) = self.sizing.inner_px(size), self.input_px(size)
@@ -115,8 +118,10 @@ class Detector(Network):
         return functional.pad(pixels, (0, width - inner[1], 0, height - inner[0]))
 
     def input_px(self, picture_px: Size) -> Size:
-        """Height and width, including the padding, of the graph's input for a picture of height and width
-        `picture_px`.
+        """Returns height and width of the graph's input, including the padding.
+
+        Args:
+            picture_px: height and width of the picture.
         """
         height, width = self.sizing.inner_px(picture_px)
         return height + -height % DIVISOR_PX, width + -width % DIVISOR_PX
@@ -137,16 +142,25 @@ class Detector(Network):
         return found
 
     def shrinkage(self, picture_px: Size) -> Tensor:
-        """The (4,) factors that convert box coordinates in the picture to box coordinates in the graph's input."""
+        """Returns the (4,) factors that convert boxes (left, top, right, bottom) in the picture to boxes in the
+        graph's input.
+
+        Args:
+            picture_px: height and width of the picture.
+        """
         height, width = self.sizing.inner_px(picture_px)
         inner = torch.tensor([width, height] * 2, dtype=torch.float32, device=self.device)
         return inner / torch.tensor([picture_px[1], picture_px[0]] * 2, dtype=torch.float32, device=self.device)
 
     def targets(self, sample: Any, picture_px: Size) -> Targets:
-        """The ground truth of a sample for the losses, in pixels of the graph's input.
+        """Returns the ground truth of a sample for the losses, in pixels of the graph's input.
 
         Objects of classes that the network does not have are ignored. Boxes without area are ignored as well, because
         the logarithms of their sides cannot be learnt.
+
+        Args:
+            sample: sample with `objects`, boxes in edge pixels of its picture.
+            picture_px: height and width of the picture.
         """
         shrinkage = self.shrinkage(picture_px)
         number = {category: index for index, category in enumerate(self.categories) if category is not None}
@@ -190,19 +204,31 @@ class 0, and for the gaps in COCO's ids.
 
 
 def size_of(pictures: Tensor) -> Size:
-    """Height and width of a tensor of pictures (..., H, W)."""
+    """Returns height and width of pictures.
+
+    Args:
+        pictures: (..., H, W).
+    """
     return int(pictures.shape[-2]), int(pictures.shape[-1])
 
 
 def picture_size(outputs: Mapping[str, Tensor]) -> Size:
-    """Height and width of a batch's pictures, read from the inputs of `losses` (entry `picture_px`)."""
+    """Returns height and width of a batch's pictures, in pixels.
+
+    Args:
+        outputs: result of `run_for_losses`, which has an entry `picture_px`.
+    """
     height, width = outputs[PICTURE][0].tolist()
     return int(height), int(width)
 
 
 def fitted(min_size_px: int, max_size_px: int) -> Callable[[Size], Size]:
-    """torchvision's rule for the input size: the shorter side becomes `min_size_px`, unless the longer side would
-    then exceed `max_size_px`.
+    """Makes torchvision's rule for the input size: the shorter side becomes `min_size_px`, unless the longer side
+    would then exceed `max_size_px`.
+
+    Args:
+        min_size_px: length of the shorter side.
+        max_size_px: upper limit of the longer side.
 
     Returns:
         Function from (height, width) of the picture to (height, width) of the network's input.
@@ -216,8 +242,13 @@ def fitted(min_size_px: int, max_size_px: int) -> Callable[[Size], Size]:
 
 
 def scaled(scale: float) -> Callable[[Size], Size]:
-    """A rule for the input size: a function that multiplies the picture's height and width by `scale` and rounds
-    them.
+    """Makes a rule for the input size: height and width of the picture are multiplied by a factor and rounded.
+
+    Args:
+        scale: the factor.
+
+    Returns:
+        Function from (height, width) of the picture to (height, width) of the network's input.
     """
     return lambda size: (max(1, round(size[0] * scale)), max(1, round(size[1] * scale)))
 

@@ -39,16 +39,22 @@ class RetinaNetDetector(Detector):
     """
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The outputs by name: outputs of the classification head and of the box head, and the anchors in pixels
-        of the picture.
+        """Returns the outputs by name: those of the classification head and of the box head, and the anchors in
+        pixels of the picture (see the class).
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
         """
         outputs = self.run_for_losses(pictures)
         anchors_px = outputs[ANCHORS] / self.shrinkage(picture_size(outputs))
         return {LOGITS: outputs[LOGITS], DELTAS: outputs[DELTAS], ANCHORS_PX: anchors_px}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `losses`: outputs of the classification and the box head, anchors in pixels of the graph's
-        input, and the picture's size.
+        """Returns the input of `losses`: outputs of the classification and the box head, anchors in pixels of the
+        graph's input, and the picture's size.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
         """
         picture = pictures[VIEW]
         features = list(self.graph.get_submodule("backbone")(self.preprocess(picture)).values())
@@ -65,7 +71,7 @@ class RetinaNetDetector(Detector):
         count.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B samples.
+            outputs: result of `run_for_losses` for a batch of B samples, by name.
             targets: the B samples with their ground truth.
         """
         wanted = [self.targets(sample, picture_size(outputs)) for sample in targets]
@@ -85,7 +91,7 @@ class RetinaNetDetector(Detector):
         """Detections of each picture, highest score first.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B pictures.
+            outputs: result of `run_for_predictions` for a batch of B pictures, by name.
             size_px: height and width of the pictures.
         """
         graph: Any = self.graph

@@ -21,7 +21,12 @@ around a convolution and count activations as layers.
 
 
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Renames the keys of published torchvision weights to the names of current torchvision versions."""
+    """Renames the keys of published torchvision weights to the names of current torchvision versions.
+
+    Args:
+        state: tensors of the checkpoint by their published names; counters of batches (`num_batches_tracked`) are
+            dropped.
+    """
     return {_renamed(key): value for key, value in state.items() if not key.endswith("num_batches_tracked")}
 
 

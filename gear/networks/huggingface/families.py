@@ -52,8 +52,11 @@ class Family:
     is_square: bool = True
 
     def facts(self, config: Mapping[str, Any]) -> dict[str, Any]:
-        """The values in a preprocessor_config.json (`config`), completed with the defaults of the class; null values
+        """Returns the values of a preprocessor_config.json, completed with the defaults of the class; null values
         are left out.
+
+        Args:
+            config: content of the file, by key.
         """
         return {**EVERYWHERE, **self.defaults, **{key: value for key, value in config.items() if value is not None}}
 

@@ -159,7 +159,11 @@ def _refused(folder: Path, auto: str, error: Exception) -> GearError:
 
 
 def in_one_line(error: Exception) -> str:
-    """The type of an exception and the start of its message, in one line."""
+    """Returns the type of an exception and the start of its message, in one line.
+
+    Args:
+        error: the exception, as transformers raised it.
+    """
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text if len(text) <= SHOWN else text[:SHOWN] + '...'}"
 

@@ -53,6 +53,10 @@ class FolderNetwork(Network):
 
     Attributes:
         unmatched: class names of the network without a counterpart among the task's classes.
+
+    Args:
+        graph: the network of transformers, from `gear.networks.huggingface.folder.open_folder`.
+        options: options that the user gave, which name the folder.
     """
 
     options: FolderOptions
@@ -64,7 +68,11 @@ class FolderNetwork(Network):
         self.processor = read_processor(Path(options.folder), resizes=resizes, config=graph.config)
 
     def preprocess(self, pictures: Mapping[str, Tensor]) -> Tensor:
-        """The (B, 3, h, w) input of the graph: the (B, 3, H, W) pictures in 0..1 after the image processor."""
+        """Returns the (B, 3, h, w) input of the graph: the pictures after the image processor.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1.
+        """
         return self.processor.apply(pictures[VIEW])
 
     def run_graph(self, network_input: Tensor, **labels: Any) -> Any:
@@ -104,13 +112,13 @@ class FolderNetwork(Network):
         return self.processor.restore(maps, size, mode)
 
     def matched(self, known: Mapping[str, int], whose: str) -> dict[int, int]:
-        """The task's class number for each class number of the network, matched by name.
+        """Returns the task's class number for each class number of the network, matched by name.
 
         Names without a match are stored in `unmatched` and logged.
 
         Args:
-            known: gear's class numbers by name.
-            whose: name of the set of classes, for messages.
+            known: the task's class numbers by name.
+            whose: name of the task's set of classes, for messages.
 
         Raises:
             GearError: no name matches, or the network's classes have no names.
@@ -136,6 +144,10 @@ class FolderSegmenter(FolderNetwork):
 
     If several classes of the network belong to one class of Cityscapes, their probabilities are added. Classes that the
     network does not have get a logit of -50 and do not count in the loss.
+
+    Args:
+        graph: the network of transformers.
+        options: options that the user gave, which name the folder.
     """
 
     def __init__(self, graph: nn.Module, options: FolderOptions) -> None:
@@ -145,8 +157,11 @@ class FolderSegmenter(FolderNetwork):
         self._indices = [[i for i, number in found.items() if number == train_id] for train_id in range(CLASSES)]
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The output `logits` (B, 19, H, W) at the picture's size; channels are in the order of Cityscapes train
-        ids.
+        """Returns the output `logits` (B, 19, H, W) at the picture's size; channels are in the order of Cityscapes
+        train ids.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
         """
         native = self.native_logits(self.preprocess(pictures)).float()
         nothing = torch.full_like(native[:, 0], UNKNOWN_LOGIT)
@@ -164,10 +179,10 @@ class FolderSegmenter(FolderNetwork):
         return logits
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The loss by name: the mean cross-entropy over the pixels whose true class the network has.
+        """Returns the loss `cross_entropy`: the mean over the pixels whose true class the network has.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B samples.
+            outputs: result of `run_for_losses` for a batch of B samples, by name.
             targets: the B samples with their ground truth.
         """
         ids = train_ids(targets, self.device)
@@ -180,7 +195,7 @@ class FolderSegmenter(FolderNetwork):
         """The predicted (H, W) uint8 Cityscapes label ids of each picture.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B pictures.
+            outputs: result of `run_for_predictions` for a batch of B pictures, by name.
             size_px: height and width of the pictures.
         """
         labels = np.array(LABEL_ID_OF_TRAIN_ID, dtype=np.uint8)
@@ -188,7 +203,16 @@ class FolderSegmenter(FolderNetwork):
 
 
 class FolderDepth(FolderNetwork):
-    """A monocular depth network from a folder: the output is `depth_m` (B, H, W) in metres."""
+    """A monocular depth network from a folder: the output is `depth_m` (B, H, W) in metres.
+
+    Args:
+        graph: the network of transformers.
+        options: options that the user gave, which name the folder.
+
+    Raises:
+        GearError: `inverse_scale` does not fit the network's kind of depth, or its greatest depth is no number of
+            metres.
+    """
 
     options: DepthFolderOptions
 
@@ -208,7 +232,11 @@ class FolderDepth(FolderNetwork):
             )
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The output `depth_m` (B, H, W) in metres, at the picture's size."""
+        """Returns the output `depth_m` (B, H, W) in metres, at the picture's size.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
+        """
         raw = self.run_graph(self.preprocess(pictures)).predicted_depth.float()
         raw = self.restored(raw[:, None], pictures, "bicubic")[:, 0]  # transformers uses bicubic interpolation too
         if self.options.inverse_scale:
@@ -217,11 +245,11 @@ class FolderDepth(FolderNetwork):
         return {DEPTH: raw.clamp(min=NEAREST_M)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The loss by name: the mean absolute difference between the logarithms of predicted and true depth, over
-        the pixels with ground truth.
+        """Returns the loss `log_l1`: the mean absolute difference between the logarithms of predicted and true
+        depth, over the pixels with ground truth.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B samples.
+            outputs: result of `run_for_losses` for a batch of B samples, by name.
             targets: the B samples with their ground truth.
         """
         truth = torch.from_numpy(np.stack([sample.depth_m for sample in targets])).to(self.device)
@@ -233,7 +261,7 @@ class FolderDepth(FolderNetwork):
         """The predicted depth of each picture: (H, W) float32 in metres.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B pictures.
+            outputs: result of `run_for_predictions` for a batch of B pictures, by name.
             size_px: height and width of the pictures.
         """
         return [depth_m.cpu().numpy() for depth_m in outputs[DEPTH]]
@@ -244,6 +272,10 @@ class FolderDetector(FolderNetwork):
 
     Outputs are `logits` (B, N, classes) and `pred_boxes` (B, N, 4): centre x, centre y, width and height as shares of
     the picture's width and height.
+
+    Args:
+        graph: the network of transformers; its loss function is replaced by one that leaves out ignored objects.
+        options: options that the user gave, which name the folder.
     """
 
     options: DetectorFolderOptions
@@ -255,24 +287,32 @@ class FolderDetector(FolderNetwork):
         self._categories = self.matched({name: number for number, name in CATEGORY_NAMES.items()}, "COCO")
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The outputs `logits` (B, N, classes) and `pred_boxes` (B, N, 4), one entry for each of the N object
-        queries.
+        """Returns the outputs `logits` (B, N, classes) and `pred_boxes` (B, N, 4), one entry for each of the N
+        object queries.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
         """
         raw = self.run_graph(self.preprocess(pictures))
         return {LOGITS: raw.logits, BOXES: raw.pred_boxes}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `losses`: the graph's input and the picture's height and width."""
+        """Returns the input of `losses`: `network_input`, the graph's input, and `picture`, (B, 2) height and
+        width of the pictures.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
+        """
         size = torch.tensor(pictures[VIEW].shape[2:], device=self.device)
         return {"network_input": self.preprocess(pictures), PICTURE: size.expand(len(pictures[VIEW]), -1)}
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[Any]) -> Mapping[str, Tensor]:
-        """The set loss that transformers defines for this network, computed in float32.
+        """Returns `set_loss`, the set loss that transformers defines for this network, computed in float32.
 
-        Only objects of classes that the network has are targets; other objects are ignored.
+        Only objects of classes that the network has are targets; other objects are ignored. The graph runs here.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B samples.
+            outputs: result of `run_for_losses` for a batch of B samples, by name.
             targets: the B samples with their ground truth.
         """
         height, width = outputs[PICTURE][0].tolist()
@@ -284,7 +324,7 @@ class FolderDetector(FolderNetwork):
         """Detections of COCO classes whose score is at least `score_threshold`, highest score first.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B pictures.
+            outputs: result of `run_for_predictions` for a batch of B pictures, by name.
             size_px: height and width of the pictures.
         """
         scale = torch.tensor([size_px[1], size_px[0]] * 2, device=self.device)

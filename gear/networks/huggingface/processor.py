@@ -49,7 +49,11 @@ class Processor:
     is_bgr: bool = False
 
     def target(self, picture_px: Size) -> Size:
-        """Height and width to which a picture, including its reflected margin, is resized."""
+        """Returns height and width to which a picture is resized.
+
+        Args:
+            picture_px: height and width of the picture, including its reflected margin.
+        """
         height, width = picture_px
         size = self.size or {}
         if "shortest_edge" in size:
@@ -61,7 +65,11 @@ class Processor:
         return self._multiple(scales[0] * height), self._multiple(scales[1] * width)
 
     def apply(self, pictures: Tensor) -> Tensor:
-        """Converts (B, 3, H, W) pictures in 0..1 to the network's input (B, 3, h, w)."""
+        """Converts pictures to the network's input (B, 3, h, w).
+
+        Args:
+            pictures: (B, 3, H, W) RGB in 0..1.
+        """
         rows, columns = self._margin(_size(pictures))
         if rows or columns:
             pictures = functional.pad(pictures, (columns, columns, rows, rows), mode="reflect")

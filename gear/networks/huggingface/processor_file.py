@@ -57,6 +57,9 @@ def read_processor(folder: Path, *, resizes: bool = True, config: object = None)
 def read_mapping(path: Path) -> dict[str, Any]:
     """Reads a JSON file whose outermost value must be a mapping (a JSON object).
 
+    Args:
+        path: the JSON file.
+
     Raises:
         GearError: the file contains no mapping.
     """

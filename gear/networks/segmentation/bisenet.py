@@ -12,8 +12,11 @@ PLANES = 128
 
 
 def upsample(features: Tensor, size: torch.Size) -> Tensor:
-    """Resizes (B, C, h, w) features to `size` (height, width) bilinearly, with aligned corners as everywhere in
-    this network.
+    """Resizes features bilinearly, with aligned corners as everywhere in this network.
+
+    Args:
+        features: (B, C, h, w).
+        size: height and width of the result.
     """
     return functional.interpolate(features, size=size, mode="bilinear", align_corners=True)
 
@@ -29,7 +32,7 @@ class SpatialPath(nn.Module):
         self.conv_1x1 = ConvBnRelu(64, PLANES, 1)
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """Converts (B, 3, H, W) pictures to (B, 128, H / 8, W / 8) features."""
+        """Converts `pictures` (B, 3, H, W), normalised, to (B, 128, H / 8, W / 8) features."""
         features: Tensor = self.conv_1x1(self.conv_3x3_2(self.conv_3x3_1(self.conv_7x7(pictures))))
         return features
 
@@ -37,6 +40,9 @@ class SpatialPath(nn.Module):
 class AttentionRefinement(nn.Module):
     """Attention refinement module of BiSeNet: a 3x3 convolution whose output channels are scaled by factors
     computed from their global averages.
+
+    Args:
+        inputs: number of channels of the input.
     """
 
     def __init__(self, inputs: int) -> None:
@@ -47,7 +53,7 @@ class AttentionRefinement(nn.Module):
         )
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, inputs, H, W) features to (B, 128, H, W)."""
+        """Converts `features` (B, inputs, H, W) to (B, 128, H, W)."""
         mixed: Tensor = self.conv_3x3(features)
         weights: Tensor = self.channel_attention(mixed)
         return mixed * weights
@@ -73,8 +79,8 @@ class FeatureFusion(nn.Module):
         """Joins two feature maps (B, 128, H, W) to one (B, 256, H, W).
 
         Args:
-            spatial: feature maps of the spatial path.
-            context: feature maps of the context path.
+            spatial: features of the spatial path.
+            context: features of the context path.
         """
         fused: Tensor = self.conv_1x1(torch.cat([spatial, context], dim=1))
         weights: Tensor = self.channel_attention(fused)
@@ -82,7 +88,13 @@ class FeatureFusion(nn.Module):
 
 
 class Head(nn.Module):
-    """Output head: convolutions that compute one logit map for each class."""
+    """Output head: convolutions that compute one logit map for each class.
+
+    Args:
+        inputs: number of channels of the input.
+        planes: number of channels between the two convolutions.
+        classes: number of classes.
+    """
 
     def __init__(self, inputs: int, planes: int, classes: int) -> None:
         super().__init__()
@@ -90,7 +102,7 @@ class Head(nn.Module):
         self.conv_1x1 = nn.Conv2d(planes, classes, 1)
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, inputs, H, W) features to (B, classes, H, W) logits."""
+        """Converts `features` (B, inputs, H, W) to (B, classes, H, W) logits."""
         maps: Tensor = self.conv_1x1(self.conv_3x3(features))
         return maps
 
@@ -112,7 +124,7 @@ class BiSeNetX39(nn.Module):
 
         Args:
             classes: number of classes.
-            auxiliary: whether the network has the two heads that only training uses.
+            auxiliary: whether the network has the two auxiliary heads, which only training uses.
         """
         super().__init__()
         self.context_path = Xception39()
@@ -134,11 +146,11 @@ class BiSeNetX39(nn.Module):
 
         Args:
             pictures: (B, 3, H, W), normalised.
-            auxiliary: whether the maps of the training heads are returned as well.
+            auxiliary: whether the maps of the auxiliary heads are returned as well.
 
         Returns:
             Maps (B, classes, h, w): the map of the main head at 1/8 of the picture's sides, then the maps of the
-            training heads at 1/16 and 1/8.
+            auxiliary heads at 1/16 and 1/8.
         """
         spatial = self.spatial_path(pictures)
         eighth, sixteenth, thirty_second = self.context_path(pictures)

@@ -27,7 +27,7 @@ class DDRNet23Slim(nn.Module):
 
         Args:
             channels: number of output channels: number of classes, or 1 for a depth map.
-            auxiliary: whether the network has the second head, which only training uses.
+            auxiliary: whether the network has the auxiliary head, which only training uses.
         """
         super().__init__()
         high = PLANES * 2
@@ -62,10 +62,10 @@ class DDRNet23Slim(nn.Module):
 
         Args:
             pictures: (B, 3, H, W), normalised. Both branches stay aligned if H and W are multiples of 8.
-            auxiliary: whether the map of the second head is returned as well.
+            auxiliary: whether the map of the auxiliary head is returned as well.
 
         Returns:
-            Maps (B, channels, H / 8, W / 8): the map of the main head, then the map of the second head.
+            Maps (B, channels, H / 8, W / 8): the map of the main head, then the map of the auxiliary head.
         """
         relu = functional.relu
         eighth = self.layer2(relu(self.layer1(self.conv1(pictures))))

@@ -15,6 +15,9 @@ with weights of its own.
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """The tensors of DDRNet from a published checkpoint, without the wrapper's prefix `model.` and without the
     loss module.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
     """
     kept = {key: value for key, value in state.items() if not key.startswith("loss.")}
     return {key.removeprefix(WRAPPER): value for key, value in kept.items()}

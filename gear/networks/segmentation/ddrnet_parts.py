@@ -31,14 +31,24 @@ def conv1x1(inputs: int, outputs: int, stride: int = 1) -> nn.Conv2d:
 
 
 def upsample(features: Tensor, like: Tensor) -> Tensor:
-    """Resizes (B, C, h, w) features bilinearly to the height and width of the map `like`, with
-    `align_corners=False`.
+    """Resizes features bilinearly with `align_corners=False`.
+
+    Args:
+        features: (B, C, h, w).
+        like: map (..., H, W) whose height and width the result gets.
     """
     return functional.interpolate(features, size=like.shape[2:], mode="bilinear", align_corners=False)
 
 
 class BasicBlock(nn.Module):
-    """Basic residual block: two 3x3 convolutions with a shortcut. No ReLU follows the sum; the caller may add one."""
+    """Basic residual block: two 3x3 convolutions with a shortcut. No ReLU follows the sum; the caller may add one.
+
+    Args:
+        inputs: number of input channels.
+        planes: number of channels of both convolutions and of the output.
+        stride: stride of the first convolution.
+        rectify: whether the block ends with a ReLU after the sum.
+    """
 
     def __init__(self, inputs: int, planes: int, stride: int = 1, *, rectify: bool = True) -> None:
         super().__init__()
@@ -50,7 +60,7 @@ class BasicBlock(nn.Module):
         self.rectify = rectify
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, inputs, H, W) features to (B, planes, H / stride, W / stride)."""
+        """Converts `features` (B, inputs, H, W) to (B, planes, H / stride, W / stride)."""
         hidden = functional.relu(self.bn1(self.conv1(features)), inplace=True)
         total = self.bn2(self.conv2(hidden)) + (features if self.downsample is None else self.downsample(features))
         return functional.relu(total, inplace=True) if self.rectify else total
@@ -59,6 +69,11 @@ class BasicBlock(nn.Module):
 class Bottleneck(nn.Module):
     """Bottleneck residual block: 1x1, 3x3 and 1x1 convolutions with a shortcut. The output has twice the planes;
     no ReLU follows the sum.
+
+    Args:
+        inputs: number of input channels.
+        planes: number of channels of the 3x3 convolution.
+        stride: stride of the 3x3 convolution.
     """
 
     EXPANSION = 2
@@ -75,7 +90,7 @@ class Bottleneck(nn.Module):
         self.downsample = shortcut(inputs, outputs, stride)
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, inputs, H, W) features to (B, 2 planes, H / stride, W / stride)."""
+        """Converts `features` (B, inputs, H, W) to (B, 2 planes, H / stride, W / stride)."""
         hidden = functional.relu(self.bn1(self.conv1(features)), inplace=True)
         hidden = functional.relu(self.bn2(self.conv2(hidden)), inplace=True)
         total: Tensor = self.bn3(self.conv3(hidden)) + (
@@ -85,7 +100,16 @@ class Bottleneck(nn.Module):
 
 
 def shortcut(inputs: int, outputs: int, stride: int) -> nn.Sequential | None:
-    """A 1x1 projection that gives a block's input the shape of its output; None if the shapes are equal."""
+    """Makes the projection of a residual block: a 1x1 convolution that gives the block's input the shape of its
+    output.
+
+    Args:
+        inputs, outputs: numbers of channels of the block's input and output.
+        stride: stride of the block.
+
+    Returns:
+        Convolution and batch normalisation; None if the shapes are equal already.
+    """
     if stride == 1 and inputs == outputs:
         return None
     return nn.Sequential(conv1x1(inputs, outputs, stride), nn.BatchNorm2d(outputs))
@@ -103,7 +127,12 @@ def stage(inputs: int, planes: int, stride: int = 1) -> nn.Sequential:
 
 
 def pre_activated(convolution: nn.Conv2d, *pooling: nn.Module) -> nn.Sequential:
-    """A sequence of layers: pooling (if any), batch normalisation, ReLU, convolution."""
+    """Makes a sequence of layers: pooling (if any), batch normalisation, ReLU, convolution.
+
+    Args:
+        convolution: the last layer.
+        *pooling: the first layers.
+    """
     norm = nn.BatchNorm2d(convolution.in_channels)
     return nn.Sequential(*pooling, norm, nn.ReLU(inplace=True), convolution)
 
@@ -111,6 +140,11 @@ def pre_activated(convolution: nn.Conv2d, *pooling: nn.Module) -> nn.Sequential:
 class Dappm(nn.Module):
     """Deep aggregation pyramid pooling module: five pooling scales; the features of each scale are refined with
     the result of the next finer scale.
+
+    Args:
+        inputs: number of input channels.
+        branch: number of channels of each scale.
+        outputs: number of output channels.
     """
 
     def __init__(self, inputs: int, branch: int, outputs: int) -> None:
@@ -128,7 +162,7 @@ class Dappm(nn.Module):
         self.shortcut = pre_activated(conv1x1(inputs, outputs))
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, inputs, H, W) features to (B, outputs, H, W) features."""
+        """Converts `features` (B, inputs, H, W) to (B, outputs, H, W) features."""
         scales = [self.scale0(features)]
         for pool, process in (
             (self.scale1, self.process1),
@@ -142,7 +176,13 @@ class Dappm(nn.Module):
 
 
 class Head(nn.Module):
-    """Output head: two convolutions that compute the output channels."""
+    """Output head: two convolutions that compute the output channels.
+
+    Args:
+        inputs: number of input channels.
+        planes: number of channels between the convolutions.
+        channels: number of output channels.
+    """
 
     def __init__(self, inputs: int, planes: int, channels: int) -> None:
         super().__init__()
@@ -152,7 +192,7 @@ class Head(nn.Module):
         self.conv2 = nn.Conv2d(planes, channels, 1)
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, inputs, H, W) features to (B, channels, H, W) output maps."""
+        """Converts `features` (B, inputs, H, W) to (B, channels, H, W) output maps."""
         hidden = self.conv1(functional.relu(self.bn1(features), inplace=True))
         maps: Tensor = self.conv2(functional.relu(self.bn2(hidden), inplace=True))
         return maps

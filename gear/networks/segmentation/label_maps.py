@@ -20,11 +20,11 @@ _BAND_PX = 16
 
 
 def best_class_at(logits: Tensor, size_px: tuple[int, ...], *, align_corners: bool) -> UInt8Image:
-    """The (H, W) uint8 map of the class with the largest logit after bilinear interpolation; of equal logits the
-    first class.
+    """Returns the (H, W) uint8 map of the class with the largest logit after bilinear interpolation; of equal
+    logits the first class.
 
     Args:
-        logits: (C, h, w) float32 on the CPU.
+        logits: (C, h, w) float32 on the CPU, usually smaller than the picture.
         size_px: height H and width W of the picture.
         align_corners: as in torch's interpolation.
     """
@@ -44,10 +44,13 @@ def best_class_at(logits: Tensor, size_px: tuple[int, ...], *, align_corners: bo
 
 
 def best_class(logits: Tensor) -> UInt8Image:
-    """The (H, W) uint8 map of the class with the largest of (C, H, W) logits; of equal logits the first class.
+    """Returns the (H, W) uint8 map of the class with the largest logit; of equal logits the first class.
 
     The result equals `argmax(0)`, which takes twenty times as long on a CPU because of the order in which it reads
     memory.
+
+    Args:
+        logits: (C, H, W) on any device.
     """
     return _first_of_largest(logits.float().numpy()) if logits.device.type == "cpu" else _on_device(logits)
 

@@ -29,7 +29,12 @@ class SegmentedSample(Protocol):
 
 
 def train_ids(samples: Sequence[SegmentedSample], device: torch.device) -> Tensor:
-    """The (B, H, W) int64 Cityscapes train ids of samples of one size; 255 for labels that are not evaluated."""
+    """Returns the (B, H, W) int64 Cityscapes train ids of samples; 255 for labels that are not evaluated.
+
+    Args:
+        samples: the B samples, of one size.
+        device: torch device of the result.
+    """
     labels = (np.ascontiguousarray(sample.label_ids) for sample in samples)
     ids = np.stack([cv2.LUT(one, TRAIN_ID_OF_LABEL_ID) for one in labels])
     return torch.from_numpy(ids).to(device).long()
@@ -42,10 +47,12 @@ at 1/8 hold little more detail, and the loss takes a quarter of the time.
 
 
 def offsets_px(index: int) -> tuple[int, int]:
-    """Row and column of the first pixel on which training computes the loss, in picture number `index` of the
-    batch.
+    """Returns row and column of the first pixel on which training computes the loss, 0 or 1 each.
 
     Four consecutive pictures together cover every pixel position.
+
+    Args:
+        index: number of the picture in its batch.
     """
     return index // STEP_PX % STEP_PX, index % STEP_PX
 
@@ -75,7 +82,11 @@ def sampled_logits(maps: Tensor, size_px: Sequence[int], *, align_corners: bool)
 
 
 def sampled_ids(ids: Tensor) -> Tensor:
-    """The class ids at the pixels of `sampled_logits`: (B, H // STEP_PX, W // STEP_PX) entries of the (B, H, W) ids."""
+    """Returns the class ids at the pixels of `sampled_logits`: (B, H // STEP_PX, W // STEP_PX).
+
+    Args:
+        ids: (B, H, W) class ids.
+    """
     height, width = (side // STEP_PX * STEP_PX for side in ids.shape[1:])
     chosen = []
     for index, one in enumerate(ids):
@@ -140,7 +151,7 @@ class SegmentationLosses:
         easy: probability of the correct class, 0..1; pixels below it count as hard.
         least: smallest share of the pixels that count, 0..1.
         auxiliary_weight: weight of each auxiliary head in the sum that training minimises.
-        weights: weight of each class; () for equal weights.
+        weights: weight of each of the 19 classes; () for equal weights.
     """
 
     def __init__(

@@ -71,25 +71,34 @@ class SemsegNetwork(Network):
         return taps
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The output `logits` (B, 19, H, W) at the picture's size; channels are in the order of Cityscapes train
-        ids.
+        """Returns the output `logits` (B, 19, H, W) at the picture's size; channels are in the order of Cityscapes
+        train ids.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
         """
         picture = pictures[VIEW]
         return {LOGITS: self._resized(self._maps(picture, auxiliary=False)[0], picture.shape[2:])}
 
     def run_for_predictions(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `predictions`: on a CPU `maps`, the graph's smaller logit maps, from which predicting is
-        faster; on a GPU `logits` at the picture's size.
+        """Returns the input of `predictions`: on a CPU `maps`, the graph's smaller logit maps, from which
+        predicting is faster; on a GPU `logits` at the picture's size.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
         """
         if self.device.type != "cpu":
             return self.run(pictures)
         return {MAPS: self._maps(pictures[VIEW], auxiliary=False)[0]}
 
     def run_for_losses(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """The input of `losses`: `logits`, and the logits `auxiliary_0` and so on of the training heads, with the
-        same shape.
+        """Returns the input of `losses`: `logits`, and the logits `auxiliary_0` and so on of the auxiliary heads,
+        with the same shape.
 
         In training mode logits are computed only at the pixels of `gear.networks.segmentation.losses.sampled_logits`.
+
+        Args:
+            pictures: (B, 3, H, W) picture `left`, float in 0..1, on the network's device.
         """
         size_px, align = pictures[VIEW].shape[2:], bool(self.graph.align_corners)
         maps = self._maps(pictures[VIEW], auxiliary=True)
@@ -103,7 +112,7 @@ class SemsegNetwork(Network):
         """The scalar losses by name, from the loss function with which the network was built.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B samples.
+            outputs: result of `run_for_losses` for a batch of B samples, by name.
             targets: the B samples with their ground truth.
         """
         return self._losses(outputs, targets)
@@ -112,7 +121,7 @@ class SemsegNetwork(Network):
         """The predicted (H, W) uint8 Cityscapes label ids of each picture.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B pictures.
+            outputs: result of `run_for_predictions` for a batch of B pictures, by name.
             size_px: height and width of the pictures.
         """
         if LOGITS in outputs:
@@ -136,7 +145,11 @@ class SemsegNetwork(Network):
 
 
 def inner_size(size_px: Sequence[int], scale: float) -> tuple[int, ...]:
-    """Height and width of the network's input: the picture's sides times `scale`, rounded to multiples of
+    """Returns height and width of the network's input: the picture's sides times a factor, rounded to multiples of
     `STRIDE_PX`, at least `STRIDE_PX`.
+
+    Args:
+        size_px: height and width of the picture.
+        scale: the factor.
     """
     return tuple(max(1, round(side * scale / STRIDE_PX)) * STRIDE_PX for side in size_px)

@@ -15,7 +15,15 @@ EXPANSION = 4
 
 
 class ConvBnRelu(nn.Module):
-    """A convolution without bias, followed by optional batch normalisation and optional ReLU."""
+    """A convolution without bias, followed by optional batch normalisation and optional ReLU.
+
+    Args:
+        inputs, outputs: numbers of channels.
+        kernel: side of the kernel, odd; the padding is half of it.
+        stride: stride in both directions.
+        norm: whether batch normalisation follows.
+        rectify: whether ReLU follows.
+    """
 
     def __init__(
         self, inputs: int, outputs: int, kernel: int, stride: int = 1, *, norm: bool = True, rectify: bool = True
@@ -26,7 +34,7 @@ class ConvBnRelu(nn.Module):
         self.rectify = rectify
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, inputs, H, W) features to (B, outputs, H / stride, W / stride)."""
+        """Converts `features` (B, inputs, H, W) to (B, outputs, H / stride, W / stride)."""
         hidden: Tensor = self.conv(features)
         if self.bn is not None:
             hidden = self.bn(hidden)
@@ -34,7 +42,13 @@ class ConvBnRelu(nn.Module):
 
 
 class Separable(nn.Module):
-    """A separable convolution: a depth-wise 3x3 convolution, then a 1x1 convolution with batch normalisation."""
+    """A separable convolution: a depth-wise 3x3 convolution, then a 1x1 convolution with batch normalisation.
+
+    Args:
+        inputs, outputs: numbers of channels.
+        stride: stride of the 3x3 convolution.
+        rectify: whether ReLU follows.
+    """
 
     def __init__(self, inputs: int, outputs: int, stride: int = 1, *, rectify: bool = True) -> None:
         super().__init__()
@@ -42,13 +56,19 @@ class Separable(nn.Module):
         self.point_wise_cbr = ConvBnRelu(inputs, outputs, 1, rectify=rectify)
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, inputs, H, W) features to (B, outputs, H / stride, W / stride)."""
+        """Converts `features` (B, inputs, H, W) to (B, outputs, H / stride, W / stride)."""
         mixed: Tensor = self.point_wise_cbr(self.conv1(features))
         return mixed
 
 
 class Block(nn.Module):
-    """Residual block of Xception39: three separable convolutions with a shortcut; ReLU follows the sum."""
+    """Residual block of Xception39: three separable convolutions with a shortcut; ReLU follows the sum.
+
+    Args:
+        inputs: number of input channels.
+        planes: number of channels inside the block; the output has four times as many.
+        stride: stride of the block; above 1 the shortcut has a convolution of its own.
+    """
 
     def __init__(self, inputs: int, planes: int, stride: int) -> None:
         super().__init__()
@@ -59,7 +79,7 @@ class Block(nn.Module):
         )
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, inputs, H, W) features to (B, 4 planes, H / stride, W / stride)."""
+        """Converts `features` (B, inputs, H, W) to (B, 4 planes, H / stride, W / stride)."""
         short = features if self.proj is None else self.proj(features)
         return functional.relu(short + self.residual_branch(features), inplace=True)
 
@@ -77,8 +97,10 @@ class Xception39(nn.Module):
         self.layer3 = _stage(two * EXPANSION, three, last)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Computes three feature maps of (B, 3, H, W) pictures: 64 channels at 1/8 of the sides, 128 at 1/16, 256
-        at 1/32.
+        """Computes three feature maps of pictures: 64 channels at 1/8 of the sides, 128 at 1/16, 256 at 1/32.
+
+        Args:
+            pictures: (B, 3, H, W), normalised.
         """
         eighth = self.layer1(self.maxpool(self.conv1(pictures)))
         sixteenth = self.layer2(eighth)

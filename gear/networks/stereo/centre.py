@@ -111,7 +111,13 @@ def _band(left: Tensor, right: Tensor, disparities: int) -> Tensor:
 
 
 class Head(nn.Module):
-    """Output head: a hidden layer and an output layer, applied to each cell of a feature map."""
+    """Output head: a hidden layer and an output layer, applied to each cell of a feature map.
+
+    Args:
+        inputs: number of input channels.
+        hidden: number of channels of the hidden layer.
+        outputs: number of output channels.
+    """
 
     def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
         super().__init__()
@@ -121,12 +127,16 @@ class Head(nn.Module):
         self.start_at(0.0)
 
     def start_at(self, value: float) -> None:
-        """Sets the bias of the output layer to `value`; before training every output is then about `value`."""
+        """Sets the bias of the output layer, so that every output is about this value before training.
+
+        Args:
+            value: the bias.
+        """
         assert self.out.bias is not None
         nn.init.constant_(self.out.bias, value)
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, C, h, w) features to (B, outputs, h, w) output maps."""
+        """Converts `features` (B, inputs, h, w) to (B, outputs, h, w) output maps."""
         raw: Tensor = self.out(self.hidden(features))
         return raw
 
@@ -194,7 +204,12 @@ class CentreGraph(nn.Module, ABC):
 
     @abstractmethod
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """The feature maps of single pictures (B, 3, H, W): (B, C, H / 2, W / 2) at stride 2, and a map at stride 4."""
+        """Returns the feature maps of single pictures at stride 2, (B, C, H / 2, W / 2), and at stride 4, (B, C',
+        H / 4, W / 4).
+
+        Args:
+            pictures: (B, 3, H, W), normalised; left and right pictures alike.
+        """
 
     @abstractmethod
     def stages(self, coarse: Tensor, volume: Tensor) -> Sequence[Tensor]:
@@ -291,8 +306,14 @@ def fit_to_network(picture: Tensor, scale: float) -> tuple[Tensor, tuple[float, 
 
 
 def in_picture_px(raw: Mapping[str, Tensor], ratio: tuple[float, float]) -> dict[str, Tensor]:
-    """Converts lengths in the graph's outputs from pixels of its input to pixels of the picture; `ratio` is the
-    size of an input pixel in picture pixels (x, y).
+    """Converts lengths in the graph's outputs from pixels of its input to pixels of the picture.
+
+    Args:
+        raw: result of `CentreGraph.forward`.
+        ratio: size of a pixel of the input in pixels of the picture, in x and in y.
+
+    Returns:
+        The outputs by name; those that are no lengths in pixels are unchanged.
     """
     x, y = ratio
     factors = {"sides_px": (x, y, x, y), "centre_px": (x, y), "disparity_px": (x,)}

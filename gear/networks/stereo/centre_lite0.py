@@ -24,6 +24,9 @@ than a hundredth of the trunk's own map.
 class StereoCentreLite0(CentreGraph, OnLite0):
     """The torch module of the centre-based stereo network with EfficientNet-Lite0 as trunk; parameters of the
     trunk have timm's names.
+
+    Args:
+        shape: size of the network.
     """
 
     corrects_surface = True
@@ -51,7 +54,11 @@ class StereoCentreLite0(CentreGraph, OnLite0):
         return self.trunk
 
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """The feature maps of (B, 3, H, W) pictures at the trunk's first two levels, at strides 2 and 4."""
+        """Returns the feature maps of single pictures at the trunk's first two levels, at strides 2 and 4.
+
+        Args:
+            pictures: (B, 3, H, W), normalised.
+        """
         trunk = self.trunk
         fine = trunk.get_submodule("blocks.0")(trunk.get_submodule("bn1")(trunk.get_submodule("conv_stem")(pictures)))
         return fine, trunk.get_submodule("blocks.1")(fine)

@@ -39,8 +39,15 @@ ALMOST_ZERO = 1e-6
 
 
 class LabelledObject(Protocol):
-    """Protocol of the labelled objects that the losses accept: 3D box, 2D box and occlusion;
-    `gear.plugins.tasks.stereo3d.Object3d` implements it.
+    """Protocol of the labelled objects that the losses accept; `gear.plugins.tasks.stereo3d.Object3d` implements
+    it.
+
+    Attributes:
+        kitti_type: KITTI's type of the object.
+        is_ignored: whether it is neither a target nor background.
+        box: 3D box in the frame of the left camera.
+        box_px: 2D box in the left picture, index pixels.
+        occluded_fraction: covered share of its silhouette in the picture, 0..1.
     """
 
     @property
@@ -56,7 +63,12 @@ class LabelledObject(Protocol):
 
 
 class LabelledPair(Protocol):
-    """Protocol of the samples that the losses accept: labelled objects of a pair of pictures, and the calibration."""
+    """Protocol of the samples that the losses accept: a rectified pair of pictures with its objects.
+
+    Attributes:
+        calibration: calibration of the pair.
+        objects: labelled and ignored objects.
+    """
 
     @property
     def calibration(self) -> Calibration: ...  # noqa: D102
@@ -87,7 +99,11 @@ class Grid:
         return (u_px + 0.5) / self.cell_px[0] - 0.5, (v_px + 0.5) / self.cell_px[1] - 0.5
 
     def middles_px(self, rows: Whole, columns: Whole) -> Array:
-        """The (N, 2) centres x, y of the cells with the given rows and columns, in index pixels."""
+        """Returns the (N, 2) centres x, y of cells, in index pixels of the picture.
+
+        Args:
+            rows, columns: (N,) positions of the cells.
+        """
         return np.stack([(columns + 0.5) * self.cell_px[0] - 0.5, (rows + 0.5) * self.cell_px[1] - 0.5], axis=1)
 
 
@@ -188,12 +204,21 @@ def _surface_px(sample: LabelledPair, grid: Grid) -> Array:
 
 
 def middle_of(box: Box3d) -> Array:
-    """The (3,) centre of a 3D box in the camera's frame, metres."""
+    """Returns the (3,) centre of a 3D box in the camera's frame, metres.
+
+    Args:
+        box: 3D box in the camera's frame.
+    """
     return np.array(box.bottom_m) - (0, box.height_m / 2, 0)
 
 
 def disparity_px(box: Box3d, calibration: Calibration) -> float:
-    """The disparity of a 3D box's centre, focal length * baseline / depth, in pixels of the picture."""
+    """Returns the disparity of a 3D box's centre, focal length * baseline / depth, in pixels of the picture.
+
+    Args:
+        box: 3D box in the frame of the left camera.
+        calibration: calibration of the stereo pair.
+    """
     return calibration.intrinsics.focal_px * calibration.baseline_m / float(middle_of(box)[2])
 
 

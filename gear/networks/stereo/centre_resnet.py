@@ -12,7 +12,13 @@ from gear.networks.stereo.centre import CentreGraph, StereoCentreShape, conv, co
 
 
 class Block(nn.Module):
-    """ResNet's basic block, whose shortcut averages features before the projection (ResNet-D, He et al., CVPR 2019)."""
+    """ResNet's basic block, whose shortcut averages features before the projection (ResNet-D, He et al., CVPR
+    2019).
+
+    Args:
+        inputs, outputs: numbers of channels.
+        stride: stride of the first convolution.
+    """
 
     def __init__(self, inputs: int, outputs: int, stride: int) -> None:
         super().__init__()
@@ -25,7 +31,7 @@ class Block(nn.Module):
             self.skip = nn.Sequential(nn.AvgPool2d(stride), conv(inputs, outputs, 1))
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, C, H, W) features to (B, C', H / stride, W / stride)."""
+        """Converts `features` (B, inputs, H, W) to (B, outputs, H / stride, W / stride)."""
         inner = functional.relu(self.bn1(self.conv1(features)))
         return functional.relu(self.bn2(self.conv2(inner)) + self.skip(features))
 
@@ -41,6 +47,9 @@ def _channels(shape: StereoCentreShape) -> list[int]:
 class StereoCentre(CentreGraph):
     """The torch module of the centre-based stereo network with a ResNet-18 as trunk. Left and right picture pass
     the stem and one stage of the ResNet; the left features and the correlation volume pass the later stages.
+
+    Args:
+        shape: size of the network.
     """
 
     stem: nn.Module
@@ -74,7 +83,11 @@ class StereoCentre(CentreGraph):
         }
 
     def shared(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """The feature maps of (B, 3, H, W) pictures after the stem and the first stage, at strides 2 and 4."""
+        """Returns the feature maps of single pictures after the stem and the first stage, at strides 2 and 4.
+
+        Args:
+            pictures: (B, 3, H, W), normalised.
+        """
         fine = self.stem(pictures)
         return fine, self.layer1(fine)
 

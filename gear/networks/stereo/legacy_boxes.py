@@ -14,15 +14,22 @@ MOST_GROWTH = 4.135
 
 
 def sides(boxes: Tensor) -> Tensor:
-    """The (…, 2) widths and heights of (…, 4) boxes in pixels; a width is right - left + 1."""
+    """Returns the (…, 2) widths and heights of boxes in pixels; a width is right - left + 1.
+
+    Args:
+        boxes: (…, 4) left, top, right, bottom.
+    """
     return boxes[..., 2:] - boxes[..., :2] + 1
 
 
 def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
-    """The (…, 4) codes of boxes relative to anchors, which the network learns to predict.
+    """Returns the (…, 4) codes of boxes relative to anchors, which the network learns to predict.
 
     A code holds the shift of the centre (x, y) in units of the anchor's sides, and the logarithms of the size ratios
     (width, height) between box and anchor.
+
+    Args:
+        boxes, anchors: (…, 4) left, top, right, bottom.
     """
     own, wanted = sides(anchors), sides(boxes)
     middle, target = anchors[..., :2] + own / 2, boxes[..., :2] + wanted / 2
@@ -30,10 +37,13 @@ def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
 
 
 def decode(codes: Tensor, anchors: Tensor) -> Tensor:
-    """The (…, 4) boxes for (…, 4) codes (shift of the centre, logarithms of the size ratios) relative to (…, 4)
-    anchors.
+    """Returns the (…, 4) boxes that codes relative to anchors describe.
 
     As in the authors' code, right and bottom are larger by one pixel than the exact inverse of `encode` would give.
+
+    Args:
+        codes: (…, 4) shift of the centre and logarithms of the size ratios, as in `encode`.
+        anchors: (…, 4) left, top, right, bottom.
     """
     own = sides(anchors)
     middle = anchors[..., :2] + own / 2 + codes[..., :2] * own
@@ -42,13 +52,23 @@ def decode(codes: Tensor, anchors: Tensor) -> Tensor:
 
 
 def clip(boxes: Tensor, size_px: tuple[int, int]) -> Tensor:
-    """Clips (…, 4) boxes to a picture of size (height, width); right and bottom are at most the last column and row."""
+    """Clips boxes to a picture; right and bottom are at most the last column and row.
+
+    Args:
+        boxes: (…, 4) left, top, right, bottom.
+        size_px: height and width of the picture.
+    """
     most = boxes.new_tensor([size_px[1] - 1, size_px[0] - 1] * 2)
     return torch.minimum(boxes.clamp(min=0), most)
 
 
 def overlaps(a: Tensor, b: Tensor) -> Tensor:
-    """The (N, M) intersection over union of each of (N, 4) boxes with each of (M, 4) boxes."""
+    """Returns the (N, M) intersection over union of each of N boxes with each of M boxes.
+
+    Args:
+        a: (N, 4) left, top, right, bottom.
+        b: (M, 4) left, top, right, bottom.
+    """
     low = torch.maximum(a[:, None, :2], b[None, :, :2])
     high = torch.minimum(a[:, None, 2:], b[None, :, 2:])
     shared = (high - low + 1).clamp(min=0).prod(dim=-1)
@@ -56,9 +76,11 @@ def overlaps(a: Tensor, b: Tensor) -> Tensor:
 
 
 def left_and_right(six: Tensor) -> tuple[Tensor, Tensor]:
-    """Splits (…, 6) codes of box pairs into (…, 4) codes of the left boxes and (…, 4) codes of the right boxes.
+    """Splits codes of box pairs into (…, 4) codes of the left boxes and (…, 4) codes of the right boxes.
 
-    The six numbers are x, y, width, height of the left box, and x and width of the right box. Both boxes cover the same
-    rows, because the pictures are rectified.
+    Both boxes cover the same rows, because the pictures are rectified.
+
+    Args:
+        six: (…, 6) x, y, width, height of the left box, and x and width of the right box.
     """
     return six[..., :4], six[..., [4, 1, 5, 3]]

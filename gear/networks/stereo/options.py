@@ -40,7 +40,11 @@ class StereoOptions(NetworkOptions):
             raise FieldError("baseline_m", f"must be 0.01 to 10 m, got {self.baseline_m:g}")
 
     def calibration(self, size_px: tuple[int, ...]) -> Calibration:
-        """The calibration of a stereo pair whose pictures have the size (height, width)."""
+        """Returns the calibration of a stereo pair with these options.
+
+        Args:
+            size_px: height and width of the pictures.
+        """
         intrinsics = Intrinsics.from_hfov(size_px[1], size_px[0], math.radians(self.hfov_deg))
         return Calibration(intrinsics=intrinsics, baseline_m=self.baseline_m)
 

@@ -53,7 +53,13 @@ class StereoRcnnShape:
 
 
 class Bottleneck(nn.Module):
-    """Bottleneck residual block of ResNet as in Caffe: the first convolution, not the second one, has the stride."""
+    """Bottleneck residual block of ResNet as in Caffe: the first convolution, not the second one, has the stride.
+
+    Args:
+        inputs: number of input channels.
+        width: number of channels inside the block; the output has four times as many.
+        stride: stride of the block.
+    """
 
     def __init__(self, inputs: int, width: int, stride: int) -> None:
         super().__init__()
@@ -70,7 +76,7 @@ class Bottleneck(nn.Module):
             )
 
     def forward(self, features: Tensor) -> Tensor:
-        """Converts (B, C, H, W) features to (B, 4 width, H / stride, W / stride)."""
+        """Converts `features` (B, inputs, H, W) to (B, 4 width, H / stride, W / stride)."""
         inner = functional.relu(self.bn1(self.conv1(features)))
         inner = functional.relu(self.bn2(self.conv2(inner)))
         past = features if self.downsample is None else self.downsample(features)
@@ -83,7 +89,12 @@ def _stage(inputs: int, width: int, blocks: int, stride: int) -> nn.Sequential:
 
 
 class StereoRpn(nn.Module):
-    """The region proposal network of Stereo R-CNN; it reads the feature pyramids of both pictures."""
+    """The region proposal network of Stereo R-CNN; it reads the feature pyramids of both pictures.
+
+    Args:
+        inputs: number of channels of the pyramids.
+        hidden: number of channels of its convolution.
+    """
 
     def __init__(self, inputs: int, hidden: int) -> None:
         super().__init__()
@@ -115,6 +126,9 @@ class StereoRpn(nn.Module):
 class StereoRcnn(nn.Module):
     """The whole torch module of Stereo R-CNN. As in the authors' training, batch normalisation and the first two
     stages are never trained.
+
+    Args:
+        shape: size of the network.
     """
 
     def __init__(self, shape: StereoRcnnShape) -> None:
@@ -178,7 +192,11 @@ class StereoRcnn(nn.Module):
                 parameter.requires_grad_(False)
 
     def train(self, mode: bool = True) -> StereoRcnn:
-        """Sets training mode for all layers except batch normalisation, which stays in eval mode."""
+        """Sets the mode of all layers except batch normalisation, which stays in eval mode.
+
+        Args:
+            mode: whether the other layers are set to training mode.
+        """
         super().train(mode)
         for module in self.modules():
             if is_norm(module):
@@ -244,7 +262,11 @@ def _complete(module: nn.Module, state: dict[str, Any], prefix: str, *_: Any) ->
 
 
 def is_norm(module: nn.Module) -> bool:
-    """Whether a layer is a batch normalisation layer."""
+    """Returns whether a layer is a batch normalisation layer.
+
+    Args:
+        module: any torch module.
+    """
     return isinstance(module, nn.BatchNorm2d)
 
 

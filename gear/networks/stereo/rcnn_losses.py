@@ -62,7 +62,11 @@ class CarTargets:
     ignored: Tensor
 
     def to(self, device: torch.device) -> CarTargets:
-        """A copy of these training targets on another torch device."""
+        """Returns a copy of these training targets on another torch device.
+
+        Args:
+            device: the device.
+        """
         return CarTargets(**{field.name: getattr(self, field.name).to(device) for field in fields(self)})
 
 
@@ -142,8 +146,11 @@ def _uncovered(left: Array, nearer: Sequence[Array]) -> Array:
 
 
 def ground_corners(box: Box3d) -> Array:
-    """The (4, 3) corners of a 3D box's bottom face in the camera frame, metres: rear left, front left, front
-    right, rear right, as seen by the driver.
+    """Returns the (4, 3) corners of a 3D box's bottom face in the camera frame, metres: rear left, front left,
+    front right, rear right, as seen by the driver.
+
+    Args:
+        box: 3D box in the camera frame.
     """
     c, s = math.cos(box.rotation_y_rad), math.sin(box.rotation_y_rad)
     front, right = np.array([c, 0.0, -s]), np.array([-s, 0.0, -c])
@@ -165,8 +172,7 @@ def _corner_between(box: Box3d, calibration: Calibration, borders: Array) -> Arr
 def rpn_losses(
     logits: Tensor, codes: Tensor, anchors: Tensor, cars: CarTargets, size_px: tuple[int, int], draws: torch.Generator
 ) -> dict[str, Tensor]:
-    """Computes the two losses of the region proposal network for one picture: classification of anchors, and codes
-    of box pairs.
+    """Computes the two losses of the region proposal network for one picture.
 
     Args:
         logits: (A, 2) of the anchors.
@@ -175,6 +181,10 @@ def rpn_losses(
         cars: training targets of the picture.
         size_px: height and width of the network's input.
         draws: random generator that samples anchors.
+
+    Returns:
+        `rpn_class`, the cross-entropy of sampled anchors, and `rpn_boxes`, the smooth L1 loss of the codes; 0 if there
+        is nothing to train on.
     """
     is_inside = (anchors[:, :2] >= 0).all(dim=1) & (anchors[:, 2] < size_px[1]) & (anchors[:, 3] < size_px[0])
     shared = overlaps(anchors, cars.union)
@@ -217,8 +227,11 @@ def _six(left: Tensor, right: Tensor, left_from: Tensor, right_from: Tensor) -> 
 
 
 def smooth_l1(predicted: Tensor, target: Tensor, sigma: float = 1.0) -> Tensor:
-    """Smooth L1 loss of predictions (`predicted`) and targets (`target`), element by element: quadratic for differences
-    below 1 / sigma^2, linear above.
+    """Smooth L1 loss, element by element: quadratic for differences below 1 / sigma^2, linear above.
+
+    Args:
+        predicted, target: tensors of one shape.
+        sigma: determines where the loss becomes linear.
     """
     return functional.smooth_l1_loss(predicted, target, reduction="none", beta=1 / sigma**2)
 

@@ -34,6 +34,10 @@ class StereoRcnnNetwork(Network):
     `rpn_logits` (B, A, 2) and `rpn_codes` (B, A, 6) belong to the anchors. `rois_left` and `rois_right` (B, R, 4) are
     the proposals, padded with zeros, without gradients. The other outputs are those of `StereoRcnn.regions` for each
     pair. `predict` solves for 3D boxes, without gradients.
+
+    Args:
+        options: options that the user gave.
+        shape: size of the network; None for the authors' sizes.
     """
 
     graph: StereoRcnn
@@ -55,6 +59,9 @@ class StereoRcnnNetwork(Network):
         Args:
             views: (B, 3, H, W) pictures `left` and `right`, float in 0..1.
             targets: the B samples with their ground truth; None for outputs instead of losses.
+
+        Returns:
+            The outputs that the class describes, or scalar losses, by name.
         """
         if targets is None:
             return super().forward(views)
@@ -67,8 +74,13 @@ class StereoRcnnNetwork(Network):
         return {name: means[name] * (-variances[i]).exp() + variances[i] for i, name in enumerate(LOSSES)}
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
-        """All outputs by name. Pictures are processed one by one, as in training; therefore no picture depends on
-        other pictures of the batch.
+        """Returns the outputs that the class describes, by name.
+
+        Each pair of pictures is processed by itself, as in training; therefore no output depends on other pairs of the
+        batch.
+
+        Args:
+            pictures: (B, 3, H, W) pictures `left` and `right`, float in 0..1, on the network's device.
         """
         each = [self._outputs_of(*self._pyramids(pictures, i)) for i in range(len(pictures[LEFT]))]
         return {name: torch.stack([outputs[name] for outputs in each]) for name in each[0]}
@@ -77,13 +89,21 @@ class StereoRcnnNetwork(Network):
         """Always raises an error: the second stage is trained on pairs that are sampled with the targets, so
         losses cannot follow from outputs.
 
+        Args:
+            outputs, targets: not used.
+
         Raises:
             TypeError: always; call `forward` with targets instead.
         """
         raise TypeError("Stereo R-CNN has its losses from pictures: call forward(views, targets)")
 
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[tuple[KittiLabel, ...]]:
-        """The detected cars of each sample, with depth refined by photometric alignment."""
+        """Returns the detected cars of each sample as KITTI labels; depth is refined by photometric alignment if
+        `refine_depth` is set.
+
+        Args:
+            samples: (H, W, 3) uint8 pictures `left` and `right`, one mapping per sample.
+        """
         found = []
         for sample in samples:
             views = {name: view.to(self.device) for name, view in as_batch([sample], self._views).items()}
@@ -98,7 +118,7 @@ class StereoRcnnNetwork(Network):
         depth by photometric alignment.
 
         Args:
-            outputs: outputs of `forward` by name, for a batch of B pictures.
+            outputs: result of `run_for_predictions` for a batch of B pictures, by name.
             size_px: height and width of the pictures.
         """
         return self._placed(outputs, size_px, None)

@@ -13,5 +13,8 @@ from gear.networks.stereo.rcnn_graph import FIRST_LOG_VARIANCE, LOSSES, VARIANCE
 def from_official(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """The tensors of a published checkpoint; learned variances of the losses that are missing get their initial
     values.
+
+    Args:
+        state: tensors of the checkpoint by their published names.
     """
     return {VARIANCES: torch.full((len(LOSSES),), FIRST_LOG_VARIANCE), **state}

@@ -28,7 +28,7 @@ def propose(
         max_pairs: largest number of pairs.
 
     Returns:
-        (R, 4) left and (R, 4) right boxes, R <= most, best first.
+        (R, 4) left and (R, 4) right boxes, R <= `max_pairs`, best first.
     """
     with torch.no_grad():
         order = chances.argsort(descending=True, stable=True)[:pre_nms_top_n]
