@@ -78,14 +78,29 @@ class Response:
         return np.asarray(cv2.LUT(row, self._table[None]), np.uint8).reshape(linear_rgb.shape)
 
     def curve(self, light: npt.ArrayLike) -> Floats:
-        """Converts light 0..1 to picture values 0..1 without rounding; elementwise, float64."""
+        """Converts light to picture values 0..1 without rounding, by the formulas of exposure, contrast and
+        encoding.
+
+        Args:
+            light: linear light in 0..1, any shape; 1 is the frame's full scale.
+
+        Returns:
+            Values in the shape of `light`, float64.
+        """
         x = np.asarray(light, dtype=np.float64)
         y = x * self.exposure / (1 + (self.exposure - 1) * x)
         z = y**self.contrast
         return encode_srgb(z) if self.encoding == "srgb" else z
 
     def inverse(self, picture: npt.ArrayLike) -> Floats:
-        """Converts picture values 0..1 back to light 0..1, the inverse of `curve`; elementwise, float64."""
+        """Converts picture values back to light 0..1, the inverse of `curve`.
+
+        Args:
+            picture: picture values in 0..1, any shape.
+
+        Returns:
+            Light in the shape of `picture`, float64.
+        """
         value = np.asarray(picture, dtype=np.float64)
         z = decode_srgb(value) if self.encoding == "srgb" else value
         y = z ** (1 / self.contrast)
@@ -134,12 +149,20 @@ def face_light(renderer_name: str, face: UInt8Image) -> Floats:
 
 
 def encode_srgb(light: npt.ArrayLike) -> Floats:
-    """Converts linear light 0..1 to sRGB values 0..1, elementwise."""
+    """Converts linear light to sRGB values 0..1, elementwise.
+
+    Args:
+        light: linear light in 0..1, any shape.
+    """
     x = np.asarray(light, dtype=np.float64)
     return np.where(x <= 0.0031308, x * 12.92, 1.055 * np.maximum(x, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
 def decode_srgb(values: npt.ArrayLike) -> Floats:
-    """Converts sRGB values 0..1 to linear light 0..1, elementwise."""
+    """Converts sRGB values to linear light 0..1, elementwise.
+
+    Args:
+        values: sRGB values in 0..1, any shape.
+    """
     v = np.asarray(values, dtype=np.float64)
     return np.where(v <= 0.04045, v / 12.92, ((np.maximum(v, 0.04045) + 0.055) / 1.055) ** 2.4)

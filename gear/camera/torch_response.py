@@ -55,7 +55,11 @@ def face_light(renderer_name: str, face: torch.Tensor) -> torch.Tensor:
 
 
 def decode_srgb(values: torch.Tensor) -> torch.Tensor:
-    """Converts sRGB values 0..1 to linear light 0..1, elementwise; differentiable once."""
+    """Converts sRGB values to linear light 0..1, elementwise; differentiable once.
+
+    Args:
+        values: sRGB values in 0..1, any shape.
+    """
     with torch.no_grad():
         base = (values.clamp_min(0.04045) + 0.055) / 1.055
         bent = base**2.4

@@ -65,7 +65,7 @@ class SampleScheme:
 
         Args:
             renderer_name: name of the renderer that made the pictures.
-            quality: `film` (anti-aliased) or `fast`.
+            quality: quality with which it made them: `film` or `fast`.
             effects: the camera's active effects, in the order in which they are applied.
         """
         is_film = quality == "film"

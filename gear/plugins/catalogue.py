@@ -85,7 +85,11 @@ class Catalogue:
         return tuple(sorted((f for f in self.found if f.kind == kind), key=lambda f: (f.spec.name, f.owner.package)))
 
     def names(self, kind: Kind) -> tuple[str, ...]:
-        """The names for finding the plugins of a kind: the short name if it is unique, otherwise `package/name`."""
+        """The names for finding the plugins of a kind: the short name if it is unique, otherwise `package/name`.
+
+        Args:
+            kind: kind of plugin, such as `model` or `attack`.
+        """
         found = self.of_kind(kind)
         short = [f.spec.name for f in found]
         return tuple(f.spec.name if short.count(f.spec.name) == 1 else f.full_name for f in found)
@@ -130,6 +134,9 @@ class Catalogue:
 
 def as_iterable(value: Any) -> Iterable[Any]:
     """Checks that the return value of a plugin's hook is a collection of specs, and returns it.
+
+    Args:
+        value: whatever the hook returned.
 
     Raises:
         TypeError: the value is not a collection, or a text or dictionary.

@@ -41,7 +41,8 @@ class DepthNetwork(Network):
         Args:
             graph: torch module.
             options: options that the user gave.
-            input_scale: default, used if neither the options nor the weights state one.
+            input_scale: factor by which pictures are resized, used if the options state none; plugins pass that of the
+                weights.
         """
         super().__init__(graph, options, views=(VIEW,))
         self.input_scale = input_scale if options.input_scale is None else options.input_scale

@@ -63,7 +63,7 @@ class GlpnOptions(DepthOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GlpnB0Options(GlpnOptions):
-    """Options of GLPDepth with the smallest encoder, MiT-b0."""
+    """Options of GLPDepth with the smallest encoder, MiT-b0; they are those of `GlpnOptions` with other defaults."""
 
     blocks: tuple[int, int, int, int] = (2, 2, 2, 2)
     widths: tuple[int, int, int, int] = (32, 64, 160, 256)

@@ -118,15 +118,16 @@ def retinanet_lite0_fpn(classes: int, score_threshold: float) -> nn.Module:
 
 
 def reference_retinanet(backbone: nn.Module, classes: int, score_threshold: float) -> nn.Module:
-    """torchvision's RetinaNet with narrower heads, group normalisation and smaller anchors.
+    """Builds torchvision's RetinaNet with narrower heads, group normalisation and smaller anchors, and random
+    weights.
 
     Anchors are small because the network receives pictures at about half their size: a person of 32 pixels height is
     then only 16 pixels high and 6 wide.
 
     Args:
-        backbone: trunk with a feature pyramid.
-        classes: number of classes, background included.
-        score_threshold: smallest score of a detection that is reported.
+        backbone: trunk with a feature pyramid of `CHANNELS` channels.
+        classes: number of classes; there is no class for background.
+        score_threshold: smallest score of a detection that is reported, 0..1.
     """
     torchvision_import.need()
     from torchvision.models.detection import RetinaNet

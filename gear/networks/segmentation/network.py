@@ -57,8 +57,10 @@ class SemsegNetwork(Network):
         Args:
             graph: torch module, as described for the class.
             options: options that the user gave.
-            losses: function that computes the training losses.
-            input_scale: default, used if neither the options nor the weights state one.
+            losses: function that computes the training losses by name, from the result of `run_for_losses` and the
+                samples.
+            input_scale: factor by which pictures are resized, used if the options state none; plugins pass that of the
+                weights.
         """
         super().__init__(graph, options, views=(VIEW,))
         self.input_scale = input_scale if options.input_scale is None else options.input_scale

@@ -23,7 +23,8 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EotAppearance(Appearance):
-    """The random appearance changes of Nesti et al. (WACV 2022) as defaults.
+    """The random appearance changes of Nesti et al. (WACV 2022) as defaults; the options are those of
+    `Appearance`.
 
     It is a class of its own so that a user can set one field in a config and keep the other defaults.
     """

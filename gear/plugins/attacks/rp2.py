@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rp2Appearance(Appearance):
-    """Random appearance changes with stronger changes of light and without blur, as defaults.
+    """Random appearance changes with stronger changes of light and without blur, as defaults; the options are
+    those of `Appearance`.
 
     It is a class of its own so that a user can set one field in a config and keep the other defaults.
     """

@@ -31,7 +31,8 @@ SCORES = ("objectness", "cls_logits")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThysAppearance(Appearance):
-    """The uniform ranges of appearance changes that Thys et al. published, as standard deviations.
+    """The uniform ranges of appearance changes that Thys et al. published, as standard deviations; the options are
+    those of `Appearance`.
 
     It is a class of its own so that a user can set one field in a config and keep the other defaults.
     """

@@ -90,8 +90,7 @@ class Object2d:
         label: gear's name of the part's label.
         category_id: COCO's category id.
         is_ignored: whether too little of the object is visible for a label.
-        box_px: tight box of the visible pixels. Stray pixels are left out (`gear.groundtruth.stray_pixels`), here and
-            in the area and the mask.
+        box_px: tight box of the visible pixels. Stray pixels are left out, here and in the area and the mask.
         amodal_box_px: tight box of the whole silhouette; may exceed the picture.
         area_px: number of pixels of the mask.
         rle: run lengths of the mask for the whole picture.
@@ -129,7 +128,7 @@ class Detect2dSample(Sample):
 
 
 class Detect2dTask:
-    """The task of 2D object detection; it writes the folders `images/<split>` and `annotations`."""
+    """The task of 2D object detection, with the options `config`; it writes `images/<split>` and `annotations`."""
 
     def __init__(self, config: Detect2dConfig) -> None:
         self.config = config
@@ -181,7 +180,10 @@ class Detect2dTask:
         return self.extend({}, 0, sidecars, info)
 
     def extend(self, before: Indexes, start: int, sidecars: Sequence[Sidecar], info: SplitInfo) -> Indexes:
-        """Does as `finalise`, from the files `before` (bytes by path) of the split's first `start` samples."""
+        """Makes the files that `finalise` makes, from those of the split's first `start` samples.
+
+        `before` holds these files' bytes by path, `sidecars` the metadata of all samples, and `info` the split's names.
+        """
         place = f"annotations/{info.split}/camera_billboard_info.json"
         instances = f"annotations/instances_{info.split}.json"
         description = f"gear {info.town} {info.scene} {info.split}, patch: {info.patch_label}"
@@ -232,8 +234,8 @@ class Detect2dTask:
         """Returns a copy of the sample in which what is inside the mask is ignored, as COCO ignores crowds.
 
         The box of each connected part of the mask is a crowd of every category: a detection that matches no object is
-        ignored at an overlap threshold t if at least the share t of its box lies in it. Objects with more than half of
-        their visible pixels in the mask are ignored. `masks` holds (H, W) bool arrays by camera name.
+        ignored at a threshold t if at least the share t of its box lies in it. Objects with more than half of their
+        visible pixels in the mask are ignored. `masks` holds (H, W) bool arrays by camera name.
         """
         mask = masks[VIEW]
         objects = tuple(
@@ -272,7 +274,7 @@ class Detect2dTask:
     def encode_prediction(
         self, sample: Detect2dSample, prediction: Sequence[coco.Detection], info: SplitInfo
     ) -> Encoded:
-        """Returns the detections (`prediction`) as metadata, from which `finalise_predictions` makes a file."""
+        """Returns a `sample`'s detections (`prediction`) as metadata, of which `finalise_predictions` makes a file."""
         plain = [
             coco.Detection(
                 category_id=int(one.category_id),
@@ -428,9 +430,8 @@ def _flipped(thing: Object2d, height: int, width: int) -> Object2d:
 def cut(sample: Detect2dSample, window: Window) -> Detect2dSample:
     """Crops a `sample` to a `window` and resizes it; surfaces are removed.
 
-    Objects outside the window are left out; objects with a small part inside are ignored. Masks are cropped, and boxes
-    are measured again on the masks. The share of a silhouette outside the window is estimated by its box, because
-    silhouettes are not stored. Distances do not change.
+    Objects outside the window are left out; objects with a small part inside are ignored. Boxes are measured again on
+    the cropped masks; the share of a silhouette outside the window is estimated by its box.
     """
     height, width = sample.images[VIEW].shape[:2]
     moved = (_cut(thing, window, height, width) for thing in sample.objects)
@@ -475,7 +476,6 @@ def _cut(thing: Object2d, window: Window, height: int, width: int) -> Object2d |
 
 
 def _inside(box_px: BoxPx, height: int, width: int) -> BoxPx:
-    """A box in edge pixels, clipped to a picture."""
     return clipped(box_px, (0.0, 0.0, float(width), float(height)))
 
 

@@ -158,10 +158,7 @@ class Stereo3dSample(Sample):
 
 
 class Stereo3dTask:
-    """The task of stereo 3D object detection, in KITTI's folders.
-
-    It writes `<split>/{image_2,image_3,calib,label_2}`, `splits` and `ImageSets`.
-    """
+    """The task of stereo 3D object detection, with the options `config`; it writes KITTI's folders and lists."""
 
     def __init__(self, config: Stereo3dConfig) -> None:
         self.config = config
@@ -207,7 +204,10 @@ class Stereo3dTask:
         return self.extend({}, 0, sidecars, info)
 
     def extend(self, before: Indexes, start: int, sidecars: Sequence[Sidecar], info: SplitInfo) -> Indexes:
-        """Does as `finalise`, from the files `before` (bytes by path) of the split's first `start` samples."""
+        """Makes the files that `finalise` makes, from those of the split's first `start` samples.
+
+        `before` holds these files' bytes by path, `sidecars` the metadata of all samples, and `info` the split's names.
+        """
         place = f"{info.split}/label_2/camera_billboard_info.json"
         records = (sidecars[index].record for index in range(start, len(sidecars)))
         poses = billboard_info(
@@ -250,11 +250,10 @@ class Stereo3dTask:
     def without(self, sample: Stereo3dSample, masks: Masks) -> Stereo3dSample:
         """Returns a copy of the sample in which what is inside the left mask is ignored, like DontCare regions.
 
-        The box of each connected part of the mask is such a region, also for the bird's-eye view and 3D (KITTI's are
-        for 2D boxes only). A detection that matches no object is ignored if more than a share of its box lies in it:
-        0.7 for cars, 0.5 for people and cyclists, as in the benchmark. An object is ignored if more than half of its
-        visible pixels must lie in the mask, because its box has too few others. `masks` holds (H, W) bool arrays by
-        camera name.
+        The box of each connected part of the mask is such a region, but for 2D, bird's-eye and 3D boxes. A detection
+        that matches no object is ignored if more than a share of its box lies in it: 0.7 for cars, 0.5 for others, as
+        in the benchmark. An object is ignored if more than half of its visible pixels must lie in the mask, as its box
+        has too few others. `masks` holds (H, W) bool arrays by camera name.
         """
         mask = masks[LEFT]
         objects, regions = [], list(part_boxes(mask))
@@ -380,10 +379,9 @@ def _name(index: int) -> str:
 def flip(sample: Stereo3dSample) -> Stereo3dSample:
     """Mirrors a stereo `sample` left to right: the right camera becomes the left one. Surfaces are removed.
 
-    Occlusion was measured in the left view and is used for the right view too. The silhouette in the right picture is
-    not stored, so its box is estimated: each side moves between the pictures as far as the same side of the projected
-    3D box does. If the picture's border cuts an object, the other sides of its box are those of its part in the left
-    picture. Ignored boxes are left out, because their position in the right picture is not known.
+    Occlusion is that of the left view. The silhouette in the right picture is not stored, so its box is estimated: each
+    side moves between the pictures as far as the same side of the projected 3D box does. If the picture's border cuts
+    an object, the other sides of its box are those of its part in the left picture. Ignored boxes are left out.
     """
     baseline_m, intrinsics = sample.calibration.baseline_m, sample.calibration.intrinsics
     moved = (_mirrored(thing, baseline_m, intrinsics) for thing in sample.objects)
@@ -419,10 +417,10 @@ def _mirrored(thing: Object3d, baseline_m: float, intrinsics: Intrinsics) -> Obj
 
 
 def cut(sample: Stereo3dSample, window: Window) -> Stereo3dSample:
-    """Crops both pictures to a window around their centre and resizes them, and adapts the calibration.
+    """Crops both pictures of a `sample` to a `window` around their centre and resizes them; surfaces are removed.
 
-    Sizes and distances in metres do not change, but the focal length does. The share of a silhouette outside the window
-    is estimated by its box. Surfaces are removed.
+    The calibration is adapted: sizes and distances in metres do not change, but the focal length does. The share of a
+    silhouette outside the window is estimated by its box.
 
     Raises:
         ValueError: the window's centre is not the picture's centre, where the principal point must be.

@@ -82,7 +82,12 @@ USUAL_WEIGHTS = DefenseWeights()
 
 
 class Defended(nn.Module):
-    """A model in front of which a defense cleans the pictures, for attacks that know the defense (adaptive attacks).
+    """A model in front of which a defense cleans the pictures, for attacks that know the defense (adaptive
+    attacks).
+
+    Attributes:
+        device: name of the device of the model before `wrap`.
+        weights: weights of the terms that lower the defense's score and mask.
 
     Args:
         model: the model as the defense's `wrap` returned it.
@@ -91,11 +96,7 @@ class Defended(nn.Module):
         clean: function that cleans batches; None for the defense's `forward`.
         detect: function that cleans batches and also returns scores and masks; it replaces `clean`.
         weights: weights of the terms that lower the defense's score and mask.
-        calibrate: function that fits the defense; the method `calibrate` calls it.
-
-    Attributes:
-        device: name of the device of the model before `wrap`.
-        weights: weights of the terms that lower the defense's score and mask.
+        calibrate: function that calibrates the defense; the method `calibrate` calls it.
     """
 
     def __init__(

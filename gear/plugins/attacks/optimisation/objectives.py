@@ -47,7 +47,7 @@ def default_objective(sample: Any) -> Objective:
 
 
 def kind_of(sample: Any) -> Kind:
-    """The kind of objective that fits a sample: `semseg` for labels, `depth` for a depth map, else `losses`.
+    """Returns the kind of objective for a sample: `semseg` for labels, `depth` for a depth map, else `losses`.
 
     Args:
         sample: a sample of any task.

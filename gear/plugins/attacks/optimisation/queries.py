@@ -103,6 +103,10 @@ class BlackBoxObjective:
 
 
 def as_patches(textures: Textures) -> tuple[Patch, ...]:
-    """Converts (S, 3, h, w) textures to patches named `patch_0`, `patch_1`, …, one for each surface."""
+    """Converts textures to patches named `patch_0`, `patch_1`, …, one for each surface.
+
+    Args:
+        textures: (S, 3, h, w) in 0..1.
+    """
     rgb = np.ascontiguousarray(textures.transpose(0, 2, 3, 1), np.float32)
     return tuple(Patch(name=f"patch_{n}", rgb=one) for n, one in enumerate(rgb))

@@ -33,19 +33,25 @@ COVERS = (0.0, 0.5, 1.0)
 
 
 def smoothness(patch: Tensor) -> Tensor:
-    """Sum of squared differences between neighbouring pixels of a (3, h, w) patch; 0 for a single colour.
+    """Returns the sum of squared differences between neighbouring pixels; 0 for a single colour.
 
     It is the smoothness term of the CARLA-GeAR paper.
+
+    Args:
+        patch: (3, h, w), differentiable.
     """
     down, right = patch[:, 1:] - patch[:, :-1], patch[:, :, 1:] - patch[:, :, :-1]
     return down.square().sum() + right.square().sum()
 
 
 def non_printability(patch: Tensor) -> Tensor:
-    """Sum over the pixels of a (3, h, w) patch in 0..1 of the distance to the nearest printable colour.
+    """Returns the sum over a patch's pixels of the distance to the nearest printable colour (`palette_srgb`).
 
     Sharif et al. (CCS 2016) multiply the distances to all printable colours; with many colours the gradient of that
     product nearly vanishes. Like Thys et al. (2019), this function takes the smallest distance.
+
+    Args:
+        patch: (3, h, w) sRGB in 0..1, differentiable.
     """
     palette = palette_srgb().to(patch)
     pixels = patch.flatten(1).T

@@ -1,4 +1,4 @@
-"""Z-Mask's fusion block: computes a mask and a score from two heat maps, with eight learnt parameters."""
+"""Z-Mask's fusion block: computes a mask and a score from two heat maps, with eight calibrated parameters."""
 
 from __future__ import annotations
 
@@ -86,7 +86,8 @@ class MaskBlock:
 
 
 def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> MaskBlock:
-    """Trains a fusion block with Adam on the cross-entropy with the true masks; initial parameters come from U(0, 1).
+    """Calibrates a fusion block with Adam on the cross-entropy with the true masks; initial parameters come from
+    U(0, 1).
 
     Initialisation and loss are the published ones. Each step uses a random subset of each picture's cells, which is
     enough for eight parameters and ten times as fast.
@@ -130,7 +131,9 @@ class Fit:
 
     @property
     def has_learnt(self) -> bool:
-        """Whether the loss is clearly below that of a constant prediction and the mask overlaps some of the patches."""
+        """Returns whether the calibration succeeded: the loss is clearly below that of a constant prediction, and
+        the mask overlaps some of the patches.
+        """
         return self.loss < LEAST_GAIN * self.constant_loss and self.iou >= LEAST_IOU
 
 

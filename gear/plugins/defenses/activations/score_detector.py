@@ -50,9 +50,9 @@ class DetectorState:
     report: FitReport
 
     def fit_report(self) -> FitReport:
-        """Returns numbers on the calibration: of clean pictures (`clean_pictures`), the alarm level (`level`), and
-        the 95 % interval of the share of similar clean pictures above it (`false_alarms_low`,
-        `false_alarms_high`).
+        """Returns numbers on the calibration by name: the number of clean pictures (`clean_pictures`), the alarm
+        level (`level`), and the 95 % interval of the share of similar clean pictures above it
+        (`false_alarms_low`, `false_alarms_high`).
         """
         return self.report
 

@@ -19,7 +19,7 @@ class ZMaskConfig(AlarmConfig):
         rows: number of rows of the grid on which activations are compared.
         shallow_kernels, deep_kernels: rows of the pooling windows, large windows first; windows are twice as wide.
         max_clean_pictures: largest number of clean pictures from which statistics are computed.
-        max_patched_pictures: largest number of pictures with patches to which the fusion block is fitted.
+        max_patched_pictures: largest number of pictures with patches on which the fusion block is calibrated.
         steps: number of training steps; the authors train for 250 passes over 100 pictures, 15 per step.
         only_on_alarm: whether pictures with a score of at most 0.5 are left unchanged.
     """
