@@ -80,11 +80,11 @@ def retinanet_r50_fpn(score_threshold: float) -> nn.Module:
 
 
 def retinanet_r18_fpn(classes: int, score_threshold: float) -> nn.Module:
-    """RetinaNet on ResNet-18, all layers trainable, with narrow heads, group normalisation and small anchors
-    (`reference_retinanet`).
+    """Builds RetinaNet on ResNet-18 with random weights, all layers trainable, with narrow heads, group
+    normalisation and small anchors (`reference_retinanet`).
 
     Args:
-        classes: number of classes.
+        classes: number of classes; there is no class for background.
         score_threshold: smallest score of a detection that is reported, 0..1.
     """
     torchvision_import.need()
@@ -103,11 +103,11 @@ def retinanet_r18_fpn(classes: int, score_threshold: float) -> nn.Module:
 
 
 def retinanet_lite0_fpn(classes: int, score_threshold: float) -> nn.Module:
-    """RetinaNet on EfficientNet-Lite0, all layers trainable, with narrow heads, group normalisation and small
-    anchors (`reference_retinanet`).
+    """Builds RetinaNet on EfficientNet-Lite0 with random weights, all layers trainable, with narrow heads, group
+    normalisation and small anchors (`reference_retinanet`).
 
     Args:
-        classes: number of classes.
+        classes: number of classes; there is no class for background.
         score_threshold: smallest score of a detection that is reported, 0..1.
     """
     graph = reference_retinanet(LitePyramid(), classes, score_threshold)

@@ -60,6 +60,9 @@ def set_loss(loss: Callable[..., Any], device_type: str, *arguments: Any, **more
         device_type: type of the torch device, such as `cpu`.
         *arguments: arguments of the loss.
         **more: keyword arguments of the loss.
+
+    Returns:
+        What `loss` returns.
     """
     call = signature(loss).bind(*arguments, **more)
     given = call.arguments

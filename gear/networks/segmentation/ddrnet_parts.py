@@ -41,13 +41,13 @@ def upsample(features: Tensor, like: Tensor) -> Tensor:
 
 
 class BasicBlock(nn.Module):
-    """Basic residual block: two 3x3 convolutions with a shortcut. No ReLU follows the sum; the caller may add one.
+    """Basic residual block: two 3x3 convolutions with a shortcut.
 
     Args:
         inputs: number of input channels.
         planes: number of channels of both convolutions and of the output.
         stride: stride of the first convolution.
-        rectify: whether the block ends with a ReLU after the sum.
+        rectify: whether a ReLU follows the sum.
     """
 
     def __init__(self, inputs: int, planes: int, stride: int = 1, *, rectify: bool = True) -> None:

@@ -39,41 +39,49 @@ ALMOST_ZERO = 1e-6
 
 
 class LabelledObject(Protocol):
-    """Protocol of the labelled objects that the losses accept; `gear.plugins.tasks.stereo3d.Object3d` implements
-    it.
+    """Protocol of the labelled objects that the losses accept: KITTI type, 3D box, 2D box and occlusion.
 
-    Attributes:
-        kitti_type: KITTI's type of the object.
-        is_ignored: whether it is neither a target nor background.
-        box: 3D box in the frame of the left camera.
-        box_px: 2D box in the left picture, index pixels.
-        occluded_fraction: covered share of its silhouette in the picture, 0..1.
+    `gear.plugins.tasks.stereo3d.Object3d` implements it.
     """
 
     @property
-    def kitti_type(self) -> str: ...  # noqa: D102
+    def kitti_type(self) -> str:
+        """KITTI's type of the object."""
+        ...
+
     @property
-    def is_ignored(self) -> bool: ...  # noqa: D102
+    def is_ignored(self) -> bool:
+        """Whether the object is neither a target nor background."""
+        ...
+
     @property
-    def box(self) -> Box3d: ...  # noqa: D102
+    def box(self) -> Box3d:
+        """3D box in the frame of the left camera."""
+        ...
+
     @property
-    def box_px(self) -> BoxPx: ...  # noqa: D102
+    def box_px(self) -> BoxPx:
+        """2D box in the left picture: left, top, right, bottom in index pixels."""
+        ...
+
     @property
-    def occluded_fraction(self) -> float: ...  # noqa: D102
+    def occluded_fraction(self) -> float:
+        """Covered share of the silhouette's part in the picture, 0..1."""
+        ...
 
 
 class LabelledPair(Protocol):
-    """Protocol of the samples that the losses accept: a rectified pair of pictures with its objects.
-
-    Attributes:
-        calibration: calibration of the pair.
-        objects: labelled and ignored objects.
-    """
+    """Protocol of the samples that the losses accept: a rectified pair of pictures with its objects."""
 
     @property
-    def calibration(self) -> Calibration: ...  # noqa: D102
+    def calibration(self) -> Calibration:
+        """Calibration of the stereo pair."""
+        ...
+
     @property
-    def objects(self) -> Sequence[LabelledObject]: ...  # noqa: D102
+    def objects(self) -> Sequence[LabelledObject]:
+        """Labelled and ignored objects."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

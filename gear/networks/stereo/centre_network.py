@@ -65,8 +65,8 @@ class StereoCentreNetwork(Network):
         return in_picture_px(self.graph(left, right), ratio)
 
     def losses(self, outputs: Mapping[str, Tensor], targets: Sequence[LabelledPair]) -> Mapping[str, Tensor]:
-        """The scalar losses by name: heat, 2D box, centre, size, heading, occlusion and disparity
-        (`gear.networks.stereo.centre_losses.centre_losses`).
+        """Returns the scalar losses by name: `heat`, `sides`, `centre`, `size`, `heading`, `hidden`, `disparity`,
+        `surface` and `disparity_bins` (`gear.networks.stereo.centre_losses.centre_losses` describes them).
 
         Args:
             outputs: result of `run_for_losses` for a batch of B samples, by name.

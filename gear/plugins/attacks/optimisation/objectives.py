@@ -58,10 +58,10 @@ def kind_of(sample: Any) -> Kind:
 
 
 def outside(samples: Sequence[Any], view: str, device: torch.device) -> Tensor:
-    """The (B, H, W) bool mask of the pixels in one view that show no patch surface.
+    """Returns the (B, H, W) bool mask of the pixels in one view that show no patch surface.
 
     Args:
-        samples: the B samples.
+        samples: the B samples, with pictures of one size.
         view: name of the camera.
         device: device of the mask.
     """
@@ -102,15 +102,15 @@ class SemsegObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
-        """The terms `correct` (over correctly classified pixels) and `wrong` (over misclassified pixels).
+        """Returns the terms `correct` (over correctly classified pixels) and `wrong` (over misclassified pixels).
 
-        A targeted attack has the single term `target` instead.
+        A term without pixels or with weight 0 is left out. A targeted attack has the single term `target` instead.
 
         Args:
             model: the attacked network.
             views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
             samples: the B samples with their ground truth.
-            indices: indices of these samples in the dataset.
+            indices: not used.
         """
         logits, labels, counts = self._outputs(model, views, samples)
         if self.target is not None:
@@ -191,14 +191,15 @@ class DepthObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
-        """The terms `small` (errors up to `split_m`) and `large` (larger errors).
+        """Returns the terms `small` (errors up to `split_m`) and `large` (larger errors).
 
-        With a direction there is a single term, named `farther` or `nearer`.
+        A term without pixels or with weight 0 is left out. With a direction there is a single term, `farther` or
+        `nearer`.
 
         Args:
             model: the attacked network.
             views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
-            samples: the B samples with their ground truth.
+            samples: the B samples, whose pictures without patches the network sees once.
             indices: indices of these samples in the dataset.
         """
         depth_m, clean, free = self._outputs(model, views, samples, indices)
@@ -257,13 +258,13 @@ class LossObjective:
     def terms(
         self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]
     ) -> Mapping[str, Term]:
-        """One term for each loss of the model with a weight other than 0.
+        """Returns one term for each loss of the model with a weight other than 0, by the name of the loss.
 
         Args:
             model: the attacked network.
             views: (B, 3, H, W) pictures with the patches by camera name, float in 0..1.
             samples: the B samples with their ground truth.
-            indices: indices of these samples in the dataset.
+            indices: not used.
         """
         losses = model.forward(views, samples)
         signs = {name: self.signs.get(name, 1.0) for name in losses}
