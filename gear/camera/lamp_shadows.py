@@ -205,10 +205,11 @@ class SceneShadows:
     _maps: dict[tuple[str, int], ShadowMap] = field(default_factory=dict, init=False, repr=False)
 
     def map(self, kind: str, index: int, lamps: Lamps, *, stands: bool) -> ShadowMap:
-        """The shadow map of one lamp. In the light of a headlamp, only road users cast shadows.
+        """Returns the shadow map of one lamp; it is computed at the first call. In the light of a headlamp, only
+        road users cast shadows.
 
         Args:
-            kind: kind of the lamp.
+            kind: kind of the lamp: `street`, `globe` or `head`.
             index: its index among the lamps of that kind.
             lamps: all lamps of that kind.
             stands: whether the lamp is a static lamp of the town.
@@ -233,7 +234,7 @@ class LampShadow:
 
     Attributes:
         scene: shadow casters of the scene.
-        kind, index: kind of the lamp, and its index among the lamps of that kind.
+        kind, index: kind of the lamp (`street`, `globe` or `head`), and its index among the lamps of that kind.
         lamps: all lamps of that kind.
         stands: whether the lamp is a static lamp of the town.
     """

@@ -24,8 +24,8 @@ class LampsInView:
 
     Attributes:
         lamps: all N lamps of the kind.
-        boxes: (N, 4) first column, last column, first row and last row that each lamp may light; an empty range if the
-            lamp lights no pixel.
+        boxes: (N, 4) for each lamp the columns and rows that it may light: first column, column after the last, first
+            row, row after the last; an empty range if the lamp lights no pixel.
         sides: (N, 3) horizontal unit vectors to the left of the lamps' axes.
         origin_m: (3,) world position of the camera.
     """

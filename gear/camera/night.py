@@ -51,9 +51,9 @@ class NightLight:
     """The light of lamps in one view of one scene. It does not depend on the patches in the scene.
 
     Attributes:
-        share: (H, W, 3) float16, the factor k + E / A of the module's formula.
-        glow: (H, W, 3) float16, the added light G in units of the frame.
-        streaks: (H, W, 3) float16, reflections of lamps on wet ground in units of the frame; None for dry ground.
+        share: (H, W, 3) float16 factor by which the light of the frame under even light is multiplied.
+        glow: (H, W, 3) float16 light that is then added, in units of the frame: glare, and surfaces that emit light.
+        streaks: (H, W, 3) float16 reflections of lamps on wet ground, in units of the frame; None for dry ground.
     """
 
     share: HalfImage
@@ -124,10 +124,10 @@ class Night:
     shadows: LampShadows | None = None
 
     def light(self, truth: RawView, camera: CameraRecord, record: SceneRecord, geoms: GeomTable) -> NightLight:
-        """The light of lamps in one view.
+        """Computes the light of lamps in one view.
 
         Args:
-            truth: depth and ids of the view.
+            truth: depth and ids of the view; its colour is not used.
             camera: the camera that takes the picture.
             record: the scene, for its vehicles.
             geoms: label, object and surface of each geom.

@@ -28,7 +28,10 @@ _MAKING = threading.Lock()
 
 
 class KeptCopy(Generic[Made]):
-    """Cache of one value that is computed from a graph; the value is computed again when the graph has changed."""
+    """Cache of one value that is computed from a network's torch module (graph), such as a faster copy.
+
+    The value is computed again when weights of the graph have changed.
+    """
 
     def __init__(self) -> None:
         self._marks: object = None

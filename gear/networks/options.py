@@ -38,7 +38,7 @@ LARGEST_SCALE = 4.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SegmentationOptions(NetworkOptions):
-    """Options of networks for semantic segmentation.
+    """Options of networks for semantic segmentation. They include the options of `NetworkOptions`.
 
     Attributes:
         input_scale: factor by which pictures are resized before the network; logits are interpolated to the picture's

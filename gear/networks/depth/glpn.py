@@ -28,8 +28,10 @@ LEAST_PX = MULTIPLE_PX // 2 + 1
 
 
 class Glpn(DepthNetwork):
-    """GLPDepth as a gear network; `graph` is a `GLPNForDepthEstimation` whose output is depth as a share (0..1) of
-    the maximum depth.
+    """GLPDepth as a gear network.
+
+    Its graph is a `GLPNForDepthEstimation` of transformers, whose output is depth as a share (0..1) of the maximum
+    depth. `DepthNetwork` documents the arguments.
     """
 
     options: GlpnOptions

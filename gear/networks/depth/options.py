@@ -19,7 +19,7 @@ numbers.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DepthOptions(NetworkOptions):
-    """Options that every depth network has.
+    """Options that every depth network has. They include the options of `NetworkOptions`.
 
     Attributes:
         max_depth_m: greatest depth used in training, metres; networks with a bounded output predict no greater depth.
@@ -39,7 +39,8 @@ class DepthOptions(NetworkOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GlpnOptions(DepthOptions):
-    """Options of GLPDepth; the defaults are those of the published weights, with the encoder MiT-b4.
+    """Options of GLPDepth; the defaults are those of the published weights, with the encoder MiT-b4. They include
+    the options of `DepthOptions`.
 
     Attributes:
         blocks: number of transformer blocks in each of the four stages.
@@ -72,7 +73,8 @@ class GlpnB0Options(GlpnOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AdaBinsOptions(DepthOptions):
-    """Options of AdaBins; the defaults are those of the published weights.
+    """Options of AdaBins; the defaults are those of the published weights. They include the options of
+    `DepthOptions`.
 
     Attributes:
         encoder: an EfficientNet of timm, `tf_efficientnet_b0` to `tf_efficientnet_b8`.

@@ -40,9 +40,10 @@ class Sizing:
     """How a picture is converted to the input of the graph (the torch module): its size and its normalisation.
 
     Attributes:
-        inner_px: function from height and width of the picture to height and width of the graph's input.
+        inner_px: function from height and width of the picture to height and width of the graph's input, without
+            padding.
         smooth: whether pictures are reduced with anti-aliasing; torchvision's detectors do without.
-        mean, std: normalisation of the three channels.
+        mean, std: mean and standard deviation of the three channels of pictures in 0..1.
     """
 
     inner_px: Callable[[Size], Size]
@@ -71,7 +72,13 @@ class Targets:
 
 
 class Detector(Network):
-    """Base class of gear networks that wrap a detection model of torchvision; predictions have COCO's categories."""
+    """Base class of gear's 2D detectors; predictions have COCO's categories.
+
+    Attributes:
+        sizing: how a picture is converted to the graph's input.
+        categories: COCO's category id of each class of the graph; None for classes that COCO does not have.
+        normalise: the layer that normalises pictures.
+    """
 
     options: DetectorOptions
     has_quick_copy = True
@@ -81,10 +88,10 @@ class Detector(Network):
     def __init__(
         self, graph: nn.Module, options: DetectorOptions, *, sizing: Sizing, categories: Sequence[int | None]
     ) -> None:
-        """Makes a gear network from a detection model of torchvision.
+        """Makes a gear network from the torch module of a detector.
 
         Args:
-            graph: detection model of torchvision.
+            graph: detection model of torchvision, or another one whose subclass replaces the methods that read it.
             options: options that the user gave.
             sizing: how a picture is converted to the graph's input.
             categories: COCO's category id of each class of the graph; None for classes that COCO does not have.

@@ -10,7 +10,7 @@ from gear.values.errors import FieldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectorOptions(NetworkOptions):
-    """Options that every detector has.
+    """Options that every detector has. They include the options of `NetworkOptions`.
 
     Attributes:
         score_threshold: smallest score, 0..1, of a detection that is reported.
@@ -25,7 +25,7 @@ class DetectorOptions(NetworkOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OfficialDetectorOptions(DetectorOptions):
-    """Options of the detectors with published weights.
+    """Options of the detectors with published weights. They include the options of `DetectorOptions`.
 
     Attributes:
         min_size_px: pictures are resized so that their shorter side has this many pixels.
@@ -44,7 +44,8 @@ class OfficialDetectorOptions(DetectorOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReferenceDetectorOptions(DetectorOptions):
-    """Options of the detectors that were trained on gear's own data.
+    """Options of the detectors that were trained on gear's own data. They include the options of
+    `DetectorOptions`.
 
     Attributes:
         input_scale: factor by which pictures are resized before the network. null takes the factor with which the

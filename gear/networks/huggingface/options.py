@@ -13,7 +13,7 @@ FOLDER = "folder"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FolderOptions(NetworkOptions):
-    """Options of a network from a local folder.
+    """Options of a network from a local folder. They include the options of `NetworkOptions`.
 
     Attributes:
         folder: folder written by `save_pretrained`, with config.json, model.safetensors and, optionally,
@@ -31,7 +31,7 @@ class FolderOptions(NetworkOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DepthFolderOptions(FolderOptions):
-    """Options of a depth network from a local folder.
+    """Options of a depth network from a local folder. They include the options of `FolderOptions`.
 
     Attributes:
         inverse_scale: for networks of relative depth, whose output is an inverse depth without unit: depth in metres is
@@ -49,7 +49,7 @@ class DepthFolderOptions(FolderOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectorFolderOptions(FolderOptions):
-    """Options of a detector from a local folder.
+    """Options of a detector from a local folder. They include the options of `FolderOptions`.
 
     Attributes:
         score_threshold: smallest score, 0..1, of a detection that is reported.

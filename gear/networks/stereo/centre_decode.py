@@ -31,9 +31,9 @@ class Peaks:
 
     Attributes:
         most: largest number of detections in a picture.
-        score_threshold: smallest score that is reported.
+        score_threshold: smallest score, 0..1, of a detection that is reported.
         same_overlap: IoU of the 2D boxes above which two detections are the same object, if their depths agree as well.
-        same_depth: largest relative difference of the depths of two detections of the same object.
+        same_depth: difference of the logarithms of two detections' depths below which their depths agree.
     """
 
     most: int = 50

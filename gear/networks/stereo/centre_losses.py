@@ -121,13 +121,13 @@ class CentreTargets:
 
     Attributes:
         heat: (B, K, h, w) 0..1, 1 at the cells of the centres; K kinds of objects.
-        is_counted: (B, 1, h, w) bool; False inside ignored objects.
+        is_counted: (B, 1, h, w) bool; False for empty cells inside objects that are no targets.
         where: (N, 3) batch index, row and column of the N cells that are trained on an object.
         weight: (N,) weight of each of these cells; the weights of one object sum to 1.
         values: (N, 11) sides (4), centre (2), size (3), observation angle and occluded share, as in the network's
             outputs.
-        disparity_px: (N,) disparity of the object's 3D centre.
-        surface_px: (B, h, w) disparity of visible vehicle surfaces; NaN elsewhere.
+        disparity_px: (N,) disparity of the object's 3D centre, pixels of the picture.
+        surface_px: (B, h, w) disparity of visible vehicle surfaces, pixels of the picture; NaN elsewhere.
     """
 
     heat: Tensor

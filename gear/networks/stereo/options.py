@@ -23,7 +23,7 @@ one.
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoOptions(NetworkOptions):
     """Parameters of the stereo cameras that the pictures themselves do not contain. The defaults are those of the
-    task stereo3d.
+    task stereo3d. They include the options of `NetworkOptions`.
 
     Attributes:
         hfov_deg: horizontal field of view of the pictures, degrees.
@@ -51,7 +51,7 @@ class StereoOptions(NetworkOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoCentreOptions(StereoOptions):
-    """Options of the centre-based stereo network.
+    """Options of the centre-based stereo network. They include the options of `StereoOptions`.
 
     Attributes:
         width: number of channels of the features that are matched, and of the ResNet's stem; the cost volume, the
@@ -77,10 +77,10 @@ class StereoCentreOptions(StereoOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoRcnnOptions(StereoOptions):
-    """Options of Stereo R-CNN.
+    """Options of Stereo R-CNN. They include the options of `StereoOptions`.
 
     Attributes:
-        short_side_px: the pictures are enlarged until their shorter side has this many pixels.
+        short_side_px: the pictures are resized so that their shorter side has this many pixels.
         pre_nms_top_n: number of best-scored anchors from which proposals are made; twice as many in training.
         proposals: number of box pairs for the second stage.
         score_threshold: smallest score, 0..1, of a detection that is reported.

@@ -34,7 +34,7 @@ class EotAppearance(Appearance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EotConfig(Settings):
-    """Options of the attack `eot`.
+    """Options of the attack `eot`. They include the options of `Settings`.
 
     Attributes:
         share: width of a pasted patch before scaling, as a share of the picture's width.

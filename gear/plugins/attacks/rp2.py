@@ -43,7 +43,7 @@ class Rp2Appearance(Appearance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rp2Config(TextureSettings):
-    """Options of the attack `rp2`.
+    """Options of the attack `rp2`. They include the options of `TextureSettings`.
 
     Learning rate, height and `norm_weight` are those of the published GTSRB experiment; the others are gear's choice.
 

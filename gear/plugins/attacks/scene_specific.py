@@ -30,7 +30,7 @@ APPEAR_CLASS = "person"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneSpecificConfig(Settings):
-    """Options of the attack `scene_specific`.
+    """Options of the attack `scene_specific`. They include the options of `Settings`.
 
     Attributes:
         learning_rate: peak learning rate of Adam, one number or one for each channel. null takes 0.25 against depth

@@ -44,7 +44,8 @@ class ThysAppearance(Appearance):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThysConfig(TextureSettings):
-    """Options of the attack `thys`; the defaults are the published constants.
+    """Options of the attack `thys`; the defaults are the published constants. They include the options of
+    `TextureSettings`.
 
     Attributes:
         printability_weight: weight of the non-printability score, a sum over pixels divided by the number of values.

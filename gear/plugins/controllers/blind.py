@@ -11,7 +11,7 @@ from gear.plugins.controllers.tracker import Sighting
 
 
 class Blind(Baseline):
-    """The baseline driver without a reader of obstacles."""
+    """The baseline driver without a reader of obstacles: it keeps to the lane and brakes for nothing."""
 
     def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
         """Returns None: the driver sees no obstacle.

@@ -29,7 +29,7 @@ STRIDE_PX = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DepthDriverConfig(BaselineConfig):
-    """Options of the baseline on depth.
+    """Options of the baseline on depth. They include the options of `BaselineConfig`.
 
     Attributes:
         percentile: percentile of the distances in the corridor that counts as the obstacle's distance, 0 to 50.

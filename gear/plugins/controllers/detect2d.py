@@ -26,7 +26,7 @@ NEAR_GAP_M = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detect2dDriverConfig(BaselineConfig):
-    """Options of the baseline on 2D boxes.
+    """Options of the baseline on 2D boxes. They include the options of `BaselineConfig`.
 
     Attributes:
         min_score: smallest confidence of a detection that counts, 0 to 1.

@@ -32,7 +32,7 @@ NEAR_GAP_M = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SemsegDriverConfig(BaselineConfig):
-    """Options of the baseline on semantic segmentation.
+    """Options of the baseline on semantic segmentation. They include the options of `BaselineConfig`.
 
     Attributes:
         least_drivable: share of the corridor's width that must be drivable, 0 to 1.

@@ -23,7 +23,7 @@ SIGNS = ((1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stereo3dDriverConfig(BaselineConfig):
-    """Options of the baseline on 3D boxes.
+    """Options of the baseline on 3D boxes. They include the options of `BaselineConfig`.
 
     Attributes:
         min_score: smallest confidence of a detection that counts, 0 to 1.

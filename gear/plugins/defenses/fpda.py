@@ -19,7 +19,7 @@ PEAK_CELLS = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FpdaConfig(DetectorConfig):
-    """Options of the defense `fpda`.
+    """Options of the defense `fpda`. They include the options of `DetectorConfig`.
 
     The paper says that features are compressed over channels and compared by z-scores, but gives no details.
 

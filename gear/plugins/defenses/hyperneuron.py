@@ -19,7 +19,7 @@ FAR = 3.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HyperNeuronConfig(DetectorConfig):
-    """Options of the defense `hyperneuron`.
+    """Options of the defense `hyperneuron`. They include the options of `DetectorConfig`.
 
     The paper computes the score from the z-scores of all features of one layer, but does not say how they are combined.
 

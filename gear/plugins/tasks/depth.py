@@ -46,7 +46,7 @@ PREVIEW_DEPTHS_M = (2.0, 3.0, 5.0, 10.0, 20.0, 40.0, 80.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DepthConfig(CameraOptions):
-    """Options of monocular depth.
+    """Options of monocular depth. They include the options of `CameraOptions`.
 
     Pictures have the size that loaders of KITTI depth crop them to, 1216 x 352. CARLA-GeAR's loader keeps the lowest
     352 rows and assumes the camera's axis in their middle, so it places patches correctly only in pictures of this

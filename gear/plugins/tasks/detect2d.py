@@ -64,7 +64,7 @@ VIEW = "left"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detect2dConfig(CameraOptions):
-    """Options of 2D object detection.
+    """Options of 2D object detection. They include the options of `CameraOptions`.
 
     Attributes:
         visibility: least visible part of an object that is labelled; an object that shows less is annotated with

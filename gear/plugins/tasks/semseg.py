@@ -66,7 +66,7 @@ class LabelOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SemsegConfig(CameraOptions):
-    """Options of semantic segmentation.
+    """Options of semantic segmentation. They include the options of `CameraOptions`.
 
     Attributes:
         labels: granularity of the labels.

@@ -73,7 +73,7 @@ OTHER_COLOUR = (255, 200, 60)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stereo3dConfig(CameraOptions):
-    """Options of stereo 3D object detection.
+    """Options of stereo 3D object detection. They include the options of `CameraOptions`.
 
     Attributes:
         baseline_m: distance from the left to the right camera.

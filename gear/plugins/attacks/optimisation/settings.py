@@ -72,7 +72,8 @@ class TextureSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings(TextureSettings):
-    """Settings of attacks that scale gradients to length 1 and use regularisers.
+    """Settings of attacks that scale gradients to length 1 and use regularisers. They include the options of
+    `TextureSettings`.
 
     Attributes:
         smoothness: length of the gradient of the smoothness term, where the objective's gradient has length 1.

@@ -24,7 +24,8 @@ class AlarmConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectorConfig(AlarmConfig):
-    """Options of a defense that computes its score from one feature map.
+    """Options of a defense that computes its score from one feature map. They include the options of
+    `AlarmConfig`.
 
     Attributes:
         layer: name of the model's feature map that is read; empty for the deepest one.

@@ -11,6 +11,7 @@ from gear.values.errors import FieldError
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZMaskConfig(AlarmConfig):
     """Options of Z-Mask; the defaults are those of the authors' demonstration (BiSeNet, pictures of 2048 x 1024).
+    They include the options of `AlarmConfig`.
 
     Attributes:
         shallow, deep: names of the model's feature maps. If empty, the calibration selects the maps that separate
