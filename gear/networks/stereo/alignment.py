@@ -59,12 +59,12 @@ class Pair:
 
 
 def align(pair: Pair, box: Box3d, measured: Measured, calibration: Calibration) -> float | None:
-    """Estimates the depth of the centre of a car's 3D box in metres; None if no pixel of the car is visible in
-    both pictures.
+    """Estimates the depth of the centre of a car's 3D box in metres; None if no pixel in the lower half of its 2D
+    box shows the 3D box.
 
     Args:
         pair: the pictures.
-        box: estimated 3D box of the car.
+        box: estimated 3D box of the car, in the frame of the left camera.
         measured: its 2D box and visible columns in the left picture.
         calibration: calibration of the original pictures.
     """

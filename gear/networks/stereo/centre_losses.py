@@ -142,14 +142,15 @@ class CentreTargets:
 def centre_targets(samples: Sequence[LabelledPair], kinds: Sequence[str], grid: Grid) -> CentreTargets:
     """Computes the training targets of a batch from its labelled objects.
 
-    An object belongs to the cell that contains the centre of its visible 2D box. This centre lies in the picture even
-    if the object extends beyond it. If two objects have the same cell, the cell belongs to the nearer object. Objects
-    of other kinds and ignored objects are no targets, and empty cells inside their boxes do not count.
+    An object belongs to the cell that contains the centre of its 2D box in the picture, and to the cells near it. This
+    centre lies in the picture even if the object extends beyond it. If two objects have the same cell, the cell belongs
+    to the nearer object. Objects of other kinds and ignored objects are no targets, and empty cells inside their boxes
+    do not count.
 
     Args:
         samples: the batch.
         kinds: KITTI's object types in the order of the channels of `heat`.
-        grid: grid of the outputs.
+        grid: grid of the network's outputs over the picture.
     """
     heat = np.zeros((len(samples), len(kinds), grid.height, grid.width), dtype=np.float32)
     is_counted = np.ones((len(samples), 1, grid.height, grid.width), dtype=np.bool_)

@@ -133,7 +133,7 @@ def read_rgb(root: Path, relative: str, record: SceneRecord | None = None, view:
         root: root folder of the dataset.
         relative: path of the file in the dataset.
         record: scene record of the sample; None for no check of the size.
-        view: name of the camera.
+        view: name of the camera; used only with a record.
 
     Raises:
         DatasetError: the file is missing, outside of the dataset, damaged, or of another size than the view.
@@ -147,15 +147,15 @@ def read_rgb(root: Path, relative: str, record: SceneRecord | None = None, view:
 def read_map(
     root: Path, relative: str, record: SceneRecord, view: str, dtype: npt.DTypeLike, max_value: int | None = None
 ) -> npt.NDArray[Any]:
-    """Reads the (H, W) label or depth map of one view of a record.
+    """Reads the (H, W) label or depth map of one view of a sample, without conversion.
 
     Args:
         root: root of the dataset.
         relative: path of the file below the root.
-        record: record of the sample.
+        record: scene record of the sample, for the size of the view.
         view: name of the camera.
         dtype: dtype that the map must have.
-        max_value: largest allowed value.
+        max_value: largest allowed value; None for no limit.
 
     Raises:
         DatasetError: the file is missing or damaged, or has another size than the view, another dtype or larger values.

@@ -263,7 +263,7 @@ class DepthTask:
         return {"image": picture, "depth": colours}
 
     def prediction_preview(self, sample: DepthSample, prediction: FloatImage) -> Mapping[str, UInt8Image]:
-        """The predicted depth in the colours of the preview `depth`.
+        """Returns the picture to look at, as `depth`: the predicted depth in the colours of the preview `depth`.
 
         Args:
             sample: the sample; not used.

@@ -81,7 +81,8 @@ class TextureOptimiser:
         self.has_gradient |= (gradient or 0.0) > 0
 
     def step(self, ascent: Tensor, share: float) -> None:
-        """Changes the textures by one Adam step along a direction; values are clipped to 0..1.
+        """Changes the textures by one Adam step along a direction, in place; values are clipped to 0..1, and
+        `done` rises by 1.
 
         Args:
             ascent: (S, 3, h, w) direction in which the textures are changed.
@@ -229,7 +230,7 @@ def optimise_textures(
 
 
 def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
-    """The indices of the samples that one step of an attack uses.
+    """Returns the indices of the samples that one step of an attack uses.
 
     Every epoch has another permutation of the samples. The indices depend only on the arguments, so a resumed run has
     the same batches.
@@ -237,7 +238,7 @@ def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
     Args:
         step: number of the step, from 0.
         count: number of samples in the dataset.
-        size: number of samples per step.
+        size: number of samples per step; at most `count` are returned.
         seed: seed of the permutations.
     """
     size = min(size, count)
@@ -296,10 +297,10 @@ def one_gradient(
     """Makes the ascent direction of attacks with a single loss: the unscaled gradient of the sum of some scalars.
 
     Args:
-        value: function from textures and a batch to the objective's scalars by name; it returns an empty mapping if
-            nothing in the batch can be harmed any more.
-        penalties: function from textures to further scalars. Their gradients exist even if no picture contains the
-            patch, so they do not count as gradients of the objective.
+        value: function from textures (S, 3, h, w) and a batch to the objective's scalars by name; it returns an empty
+            mapping if nothing in the batch can be harmed any more.
+        penalties: function from textures to further scalars by name; None for none. Their gradients exist even if no
+            picture contains the patch, so they do not count as gradients of the objective.
     """
 
     def ascend(textures: Tensor, batch: PatchedBatch) -> tuple[Tensor, dict[str, float]]:
