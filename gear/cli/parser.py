@@ -14,7 +14,11 @@ class Parser(argparse.ArgumentParser):
     """An argparse parser that prints errors as one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Prints a usage error as one line on stderr and exits with code 2."""
+        """Prints a usage error as one line on stderr and exits with code 2.
+
+        Args:
+            message: what is wrong with the command line.
+        """
         self.exit(2, f"{self.prog}: {one_line(message)}; {self.prog} --help says more\n")
 
     def command(self, name: str) -> Parser:
@@ -25,8 +29,11 @@ class Parser(argparse.ArgumentParser):
         return parser
 
     def refuse(self, unknown: Sequence[str]) -> NoReturn:
-        """Prints one line about command-line words that no argument accepts, suggests the closest flag, and exits
-        with code 2.
+        """Prints one line about command-line words that no argument accepts, suggests the closest flag, and exits with
+        code 2.
+
+        Args:
+            unknown: the words.
         """
         flag = next((word.partition("=")[0] for word in unknown if word.startswith("-")), None)
         if flag is None:

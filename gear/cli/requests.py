@@ -41,6 +41,9 @@ def guard_of(args: argparse.Namespace) -> Guard | None:
     """Returns the defense that guards the model, from `--defense`, `--defense-set` and the calibration flags; None
     without `--defense`.
 
+    Args:
+        args: arguments of the command line, as `evaluate` and other commands with a defense have them.
+
     Raises:
         GearError: options or calibration data are given without a defense.
     """

@@ -40,7 +40,11 @@ class Forecast:
         self._first_s = 0.0
 
     def sample_done(self, index: int) -> None:
-        """Records a finished sample; only the first `FIRST` samples are measured.
+        """Records a finished sample; only the first `FIRST` samples are measured. After the last of them the forecast
+        is made: it may raise the error below or call `on_warning`.
+
+        Args:
+            index: index of the sample, whose files are measured.
 
         Raises:
             GearError: the disk has less free space than the missing samples need.

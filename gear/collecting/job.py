@@ -192,7 +192,13 @@ def _check_flow(config: CollectionConfig, split: SplitConfig) -> None:
 
 
 def dataset_root(config: CollectionConfig, info: SplitInfo, weather: Weather) -> Path:
-    """The dataset's folder: the one in the config, or by default `data/<task>/<town>-<scene>-<weather>/<patch>`."""
+    """The dataset's folder: the one in the config, or by default `data/<task>/<town>-<scene>-<weather>/<patch>`.
+
+    Args:
+        config: the collection config.
+        info: metadata of the split: names of town and scene, and label of the patch.
+        weather: all parameters of the weather. If they differ from a preset, the folder's name has a hash of them.
+    """
     if config.root:
         return Path(config.root)
     name = weather.name

@@ -120,6 +120,12 @@ def with_scene_file(config: CollectionConfig) -> CollectionConfig:
 
     The name may be omitted (`my.yml`) if the file holds only one scene. A scene that is only a name is not changed.
 
+    Args:
+        config: the collection config.
+
+    Returns:
+        The config with the path of the file in `scenes` and the name in `scene`.
+
     Raises:
         UnknownNameError: the file does not exist, or holds several scenes and none was named.
         ConfigError: the file cannot be read.

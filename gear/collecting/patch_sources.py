@@ -118,6 +118,9 @@ def random_patch(seed: int, index: int) -> UInt8Image:
 def read_patch(path: Path) -> UInt8Image:
     """Reads a patch picture as (H, W, 3) uint8 sRGB; grey is converted to RGB, and 16 bits are rounded to 8.
 
+    Args:
+        path: the picture.
+
     Raises:
         PatchError: the file is not a picture, is transparent, or has an impossible size.
     """
@@ -159,7 +162,11 @@ def _eight_bits(picture: npt.NDArray[np.uint16]) -> UInt8Image:
 
 
 def digest_of(images: Iterable[UInt8Image]) -> str:
-    """The sha256, as 64 hexadecimal digits, over sizes and pixels of patches in the order of their surfaces."""
+    """The SHA-256, as 64 hexadecimal digits, over sizes and pixels of patches.
+
+    Args:
+        images: (H, W, 3) uint8 patches in the order of their surfaces.
+    """
     digest = hashlib.sha256()
     for image in images:
         digest.update(repr(image.shape).encode() + image.tobytes())

@@ -56,6 +56,13 @@ def executor_of(
 
     A single worker of the default engine is this process itself, unless `in_subprocess` is set.
 
+    Args:
+        job: the collection job.
+        workers: number of workers.
+        engine: name of the engine, such as `processes`, `ray` or `slurm`.
+        address: address of the engine's cluster; None for the default.
+        in_subprocess: whether a single worker is another process, so a crash of the renderer does not end this one.
+
     Raises:
         UnknownNameError: there is no such engine.
     """

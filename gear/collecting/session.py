@@ -88,7 +88,12 @@ class Session:
         return self.pipeline.with_effects(self.planner.plan(index))
 
     def shoot(self, record: SceneRecord) -> Shot:
-        """Places the actors of a scene in the world, with the job's patches, and renders all cameras."""
+        """Places the actors of a scene in the world, with the job's patches, and renders all cameras; also the probes,
+        scans and flow that the job collects.
+
+        Args:
+            record: the scene record.
+        """
         names = tuple(surface.name for surface in record.surfaces)
         placed = self.world.place(record, self.job.patch.by_surface(names))
         raw = self.renderer.render(placed.stage, record.cameras)
@@ -123,6 +128,9 @@ class Session:
         """Turns raw renders into pictures by the camera pipeline.
 
         It uses neither world nor renderer, so it can run while the next scene is rendered.
+
+        Args:
+            shot: renders of one scene.
         """
         return self._frame(shot, self._reflections(shot))
 
@@ -137,8 +145,15 @@ class Session:
         return Frame(views=views, geoms=shot.geoms, objects=shot.objects)
 
     def finish(self, shot: Shot) -> tuple[Sample, Encoded, AuxiliaryFiles]:
-        """Computes pictures, ground truth and files of one sample from its renders; it can run while the next
-        scene is rendered.
+        """Computes pictures, ground truth and files of one sample from its renders; it can run while the next scene is
+        rendered.
+
+        Args:
+            shot: renders of one scene.
+
+        Returns:
+            The sample with its ground truth; its files in the format of the task; and its auxiliary files (probes,
+            scans, flow).
         """
         reflections = self._reflections(shot)
         frame = self._frame(shot, reflections)
@@ -171,6 +186,9 @@ def _flow_view(record: SceneRecord, raw: RawView, geoms: GeomTable) -> FlowView:
 @contextlib.contextmanager
 def open_session(job: Job) -> Iterator[Session]:
     """Opens a worker's world and renderer, and closes the renderer at the end.
+
+    Args:
+        job: the collection job.
 
     Raises:
         BackendError: the renderer cannot start here, or it or a package is not the one that the plan names.

@@ -70,7 +70,14 @@ def write_cards(root: Path, *, is_repair: bool = False) -> None:
 
 
 def cards(root: Path) -> dict[str, bytes]:
-    """The bytes of the dataset card and of `croissant.json` by path; empty if no split is finished."""
+    """Makes the files that describe a dataset to readers and to search engines; writes nothing.
+
+    Args:
+        root: folder of the dataset.
+
+    Returns:
+        The bytes of the dataset card (`README.md`) and of `croissant.json`, by path; empty if no split is finished.
+    """
     finished = list(_finished(root))
     if not finished:
         return {}
@@ -97,8 +104,16 @@ def cards(root: Path) -> dict[str, bytes]:
 
 
 def damaged_cards(root: Path) -> list[str]:
-    """Paths of the files that are damaged. The user's own files are right, and so is a file that is not there, because
-    datasets of earlier versions have none and a user may delete it.
+    """The paths of description files that gear wrote and whose bytes are no longer those that gear wrote.
+
+    Files that the user wrote are not checked. A missing file is not damaged, because datasets of earlier versions have
+    none and a user may delete it.
+
+    Args:
+        root: folder of the dataset.
+
+    Returns:
+        The paths relative to the root, sorted.
     """
     return [
         relative
@@ -108,8 +123,11 @@ def damaged_cards(root: Path) -> list[str]:
 
 
 def own_cards(root: Path) -> set[str]:
-    """The paths of the description files (`README.md`, `croissant.json`) that gear wrote; the user's own files are
-    left out.
+    """The paths of the description files (`README.md`, `croissant.json`) that gear wrote; the user's own files are left
+    out.
+
+    Args:
+        root: folder of the dataset.
     """
     paths = {relative: inside(root, relative) for relative in CARDS}
     return {relative for relative, path in paths.items() if path.is_file() and is_own(relative, read_bytes(path))}

@@ -60,7 +60,12 @@ class Claims:
             self.release(index)
 
     def take(self, index: int) -> bool:
-        """Claims a sample; returns False if another run has claimed it.
+        """Claims a sample for this worker; returns False if another run has claimed it.
+
+        The claim is a locked file. It holds until `release`, or until the process ends.
+
+        Args:
+            index: index of the sample in the split.
 
         Raises:
             DatasetError: the disk refuses, the root is missing, or the claim's path leads through a link.
@@ -117,7 +122,9 @@ class Claims:
         return os.path.samestat(there, os.fstat(descriptor))
 
     def release(self, index: int) -> None:
-        """Releases the claim on a sample; does nothing if this worker does not hold it."""
+        """Releases the claim on the sample `index` and deletes its file; does nothing if this worker does not hold the
+        claim.
+        """
         descriptor = self._held.pop(index, None)
         if descriptor is not None:
             try:
@@ -143,6 +150,12 @@ class Claims:
     def holder(self, index: int) -> str:
         """The run that has claimed a sample, as words for a message.
 
+        Args:
+            index: index of the sample.
+
+        Returns:
+            For example `process 123 on host7`; `another run` if the claim's file cannot be read.
+
         Raises:
             DatasetError: there is a link in the claim's path.
         """
@@ -159,7 +172,9 @@ class Claims:
         return "another run"
 
     def is_taken(self, index: int) -> bool:
-        """Whether a run holds the claim on a sample, which means that it is making the sample."""
+        """Whether a run holds the claim on the sample `index`, which means that it is making the sample. The claim of
+        this worker counts, too.
+        """
         if not self.take(index):
             return True
         self.release(index)

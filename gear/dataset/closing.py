@@ -69,8 +69,13 @@ def closed_part(root: Path, split: str, samples: int, facts: Mapping[str, Json])
 
 
 def can_extend(task: type) -> bool:
-    """Whether the class that defines a task's `extend` also defines its `finalise`; a subclass may have replaced one of
-    them only.
+    """Whether a task's `extend` may be used instead of its `finalise`: one class must define both.
+
+    A subclass that replaces only one of the two methods would write other index files with `extend` than with
+    `finalise`.
+
+    Args:
+        task: class of the task.
     """
     owners = [next((owner for owner in task.__mro__ if name in vars(owner)), None) for name in ("extend", "finalise")]
     return owners[0] is owners[1]

@@ -28,12 +28,19 @@ of writing.
 
 
 def sha256(data: bytes) -> str:
-    """The SHA-256 of bytes, as 64 hexadecimal digits."""
+    """The SHA-256 of `data`, as 64 hexadecimal digits."""
     return hashlib.sha256(data).hexdigest()
 
 
 def write_whole(root: Path, relative: str, data: bytes) -> None:
-    """Writes `root/relative` atomically: a temporary file is written, synced and renamed.
+    """Writes `root/relative` atomically: a temporary file is written, synced and renamed, so no reader sees half of it.
+
+    Missing folders are made; an existing file is replaced.
+
+    Args:
+        root: folder that no written path may leave, such as the folder of a dataset.
+        relative: path of the file relative to the root.
+        data: content of the file.
 
     Raises:
         DatasetError: a file cannot be written, or the path leaves the root or leads through a link.
@@ -103,7 +110,7 @@ def refuse_folder(path: Path) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Syncs a folder to disk, so that renames of its files survive a power failure; does nothing on systems that
+    """Syncs the folder `path` to disk, so renames of its files survive a power failure; does nothing on systems that
     cannot.
     """
     with contextlib.suppress(OSError):
@@ -115,7 +122,10 @@ def sync_folder(path: Path) -> None:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Reads a regular file.
+    """Reads a regular file, not a folder, device or pipe.
+
+    Args:
+        path: the file, or a link to it.
 
     Raises:
         DatasetError: the file is missing, not a regular file, or cannot be read.

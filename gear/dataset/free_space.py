@@ -34,7 +34,7 @@ def check_free_space(folder: Path, needed: float, *, what: str, advice: str) -> 
 
 
 def size_text(size: float) -> str:
-    """Formats a number of bytes as text in powers of 1000, such as `3.2 GB`."""
+    """Formats `size`, a number of bytes, as text in powers of 1000, such as `3.2 GB`."""
     power = 0
     while size >= 999.5 and power < len(UNITS) - 1:
         size, power = size / 1000, power + 1

@@ -28,6 +28,10 @@ REMEDY = "gear writes and deletes nothing through links; put the folder or file 
 def parts_of(root: Path, relative: str) -> tuple[str, ...]:
     """The components of a relative path; the path is checked as text, without reading the disk.
 
+    Args:
+        root: folder of the dataset; used only in the error message.
+        relative: a path with slashes, relative to the root.
+
     Raises:
         DatasetError: the path is empty or absolute, contains `..`, or holds characters that other systems use as
             separators.
@@ -134,6 +138,10 @@ def opened_parent(root: Path, relative: str, *, make: bool = False) -> Iterator[
 def remove_file(root: Path, relative: str) -> None:
     """Deletes a file below the root; a missing file is not an error.
 
+    Args:
+        root: folder that no path may leave.
+        relative: path of the file, relative to the root.
+
     Raises:
         DatasetError: a component of the path is a link, or the file cannot be deleted.
     """
@@ -148,6 +156,10 @@ def remove_file(root: Path, relative: str) -> None:
 def remove_files(root: Path, relatives: Iterable[str]) -> None:
     """Deletes files below the root; all paths are checked before the first file is deleted.
 
+    Args:
+        root: folder that no path may leave.
+        relatives: paths of the files, relative to the root; missing files are not an error.
+
     Raises:
         DatasetError: a component of a path is a link, or a file cannot be deleted.
     """
@@ -160,6 +172,10 @@ def remove_files(root: Path, relatives: Iterable[str]) -> None:
 
 def remove_tree(root: Path, relative: str) -> None:
     """Deletes a folder below the root with its content; links in the folder are deleted and not followed.
+
+    Args:
+        root: folder that no path may leave.
+        relative: path of the folder, relative to the root; a missing folder is not an error.
 
     Raises:
         DatasetError: a component of the path is a link, or a file cannot be deleted.

@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 def file_hash(path: Path) -> str:
-    """The SHA-256 of a file, as 64 hexadecimal digits.
+    """The SHA-256 of the file `path`, as 64 hexadecimal digits; the file is read in pieces, so it may be large.
 
     Raises:
         DatasetError: the file is missing, not a regular file, or cannot be read.
@@ -39,6 +39,6 @@ def file_hash(path: Path) -> str:
 
 
 def in_threads(call: Callable[[S], T], items: Sequence[S]) -> Iterator[T]:
-    """Calls a function for each item in parallel threads, and yields the results in the order of the items."""
+    """Calls the function `call` for each item in parallel threads, and yields the results in the order of `items`."""
     with ThreadPoolExecutor(min(MOST_THREADS, os.cpu_count() or 1)) as pool:
         yield from pool.map(call, items)

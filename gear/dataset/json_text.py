@@ -18,7 +18,7 @@ def dump_json(value: Json) -> bytes:
 
 
 def load_json(path: Path) -> Json:
-    """Reads a JSON file.
+    """Reads the JSON file `path`.
 
     Raises:
         DatasetError: the file is missing, is not JSON, or holds values that gear never writes (see `parse_json`).
@@ -32,6 +32,9 @@ def load_json(path: Path) -> Json:
 
 def parse_json(data: bytes | str) -> Json:
     """Parses JSON text.
+
+    Args:
+        data: the text, or its UTF-8 bytes.
 
     Raises:
         ValueError, RecursionError: the text is not JSON, or holds values that `dump_json` never writes: numbers that

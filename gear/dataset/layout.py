@@ -49,6 +49,10 @@ def auxiliary_path(split: str, kind: str, index: int, name: str) -> str:
 def is_reserved(relative: str, split: str) -> bool:
     """Whether no sample of a split can have a file of that path: a card, or a file below `gear/` that is no auxiliary
     file of the split. Letters that differ only in case are equal, as they are for some file systems.
+
+    Args:
+        relative: path relative to the root of the dataset, with slashes.
+        split: name of the split.
     """
     parts = PurePosixPath(relative.casefold()).parts
     if parts[:1] != (GEAR,):

@@ -91,11 +91,14 @@ def exclusive_lock(root: Path, on_warning: Warn | None = None) -> Iterator[None]
 
 
 def lock_note(folder: Path, meaning: str) -> str | None:
-    """One line that says that locks do not work on a folder's file system; None if they work.
+    """One line that says why locks on a folder do not work, or do not reach other machines.
 
     Args:
         folder: an existing folder.
-        meaning: what the lack of locks means for the run (`ALONE`, `SHARED`).
+        meaning: text that ends the line: what this means for the run. `ALONE` and `SHARED` are such texts.
+
+    Returns:
+        The line; None if locks work and reach other machines, as far as this machine can tell.
     """
     problem = _lock_problem(folder)
     return None if problem is None else f"{folder}: {problem}: {meaning}"

@@ -16,6 +16,10 @@ from gear.values.frames import UInt8Image
 def check_encoded(encoded: Any, method: str) -> Encoded:
     """Checks that a method of a task returned files as bytes and metadata as JSON, and returns its value.
 
+    Args:
+        encoded: value that the method returned.
+        method: name of the method, for the error message.
+
     Raises:
         TypeError: the value is not an `Encoded`, a file in it is not bytes, or its metadata hold values that JSON
             cannot represent.
@@ -51,6 +55,10 @@ def check_previews(previews: Any) -> dict[str, UInt8Image]:
 
 def check_metrics(metrics: Any, method: str) -> dict[str, float]:
     """Checks the return value of an evaluator's `method` and returns it as a dictionary.
+
+    Args:
+        metrics: value that the method returned.
+        method: name of the method, for the error message.
 
     Raises:
         TypeError: the value is not a mapping of names to numbers.

@@ -109,6 +109,11 @@ def refuse_copy(root: Path, split: str) -> None:
 
     The plan and the sidecars of such a split name the files of the original split.
 
+    Args:
+        root: folder of the dataset.
+        split: name of the split, which is also the name of its folder below `gear/`. A missing or damaged plan is not
+            refused.
+
     Raises:
         DatasetError: the plan is that of another split.
     """
@@ -129,6 +134,10 @@ def _refuse_copy(root: Path, split: str, there: Json) -> None:
 
 def read_plan(root: Path, split: str) -> Plan | None:
     """Reads the plan of a split (everything that decides its bytes); None if there is no such split.
+
+    Args:
+        root: folder of the dataset.
+        split: name of the split.
 
     Raises:
         ReplaceableError: the plan was written by another version of gear.
@@ -228,6 +237,10 @@ def begin(root: Path, plan: Plan) -> None:
 
 def write_plan(root: Path, plan: Plan) -> None:
     """Writes the plan of a split (everything that decides its bytes) as JSON with a hash of its own content.
+
+    Args:
+        root: folder of the dataset.
+        plan: the plan; it names its split.
 
     Raises:
         DatasetError: the file cannot be written.

@@ -117,6 +117,9 @@ def probe_files(probes: Sequence[Probe], split: str, index: int) -> AuxiliaryFil
 def demand_probes(dataset: Dataset[Any]) -> None:
     """Checks that a split was collected with probes, the renders with black and white patch surfaces.
 
+    Args:
+        dataset: the opened split.
+
     Raises:
         DatasetError: the split has no probes.
     """

@@ -74,8 +74,10 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         return (self[i] for i in range(len(self)))
 
     def sidecar(self, index: int) -> Sidecar:
-        """The metadata of one sample without its pictures: scene record, surfaces, the task's metadata and file
-        hashes.
+        """The metadata of one sample without its pictures: scene record, surfaces, the task's metadata and file hashes.
+
+        Args:
+            index: index of the sample; a negative index counts from the end.
 
         Raises:
             IndexError: there is no such sample.

@@ -43,6 +43,13 @@ def half_written(folder: int, data: bytes) -> Iterator[str]:
 
     The caller renames the file inside the context. If an error is raised, the file is removed.
 
+    Args:
+        folder: descriptor of the open folder.
+        data: content of the file.
+
+    Yields:
+        The name of the file in the folder.
+
     Raises:
         OSError: a file cannot be written.
     """
@@ -65,6 +72,9 @@ def clear_scratch(root: Path) -> None:
     """Removes the temporary files of killed runs, and the folders `gear/scratch` and `gear` if they are empty.
 
     Files that other runs or threads are writing are kept.
+
+    Args:
+        root: folder of the dataset.
 
     Raises:
         DatasetError: the folder of temporary files, or `gear`, is a link.
@@ -102,7 +112,10 @@ def _is_abandoned(folder: int, name: str) -> bool:
 
 
 def lock_of(descriptor: int) -> bool | None:
-    """Tries to lock an open file, without waiting.
+    """Tries to lock an open file for this process alone, without waiting.
+
+    Args:
+        descriptor: descriptor of the open file; closing it releases the lock.
 
     Returns:
         True if the file is locked now; False if another process or thread holds the lock; None if the file system has

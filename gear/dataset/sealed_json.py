@@ -38,6 +38,9 @@ def sealed_json(content: dict[str, Json]) -> bytes:
 def load_sealed(path: Path) -> Json:
     """Reads a JSON file of gear (sidecar, plan or manifest), and checks the SHA-256 in it if it has one.
 
+    Args:
+        path: the file.
+
     Returns:
         The content without the entry `sha256`.
 
@@ -59,8 +62,10 @@ def load_sealed(path: Path) -> Json:
 
 
 def is_whole(data: bytes) -> bool:
-    """Whether the bytes of a JSON file match the SHA-256 in its last entry; also True for files without such an
-    entry.
+    """Whether the bytes of a JSON file match the SHA-256 in its last entry; also True for files without such an entry.
+
+    Args:
+        data: content of the file.
     """
     if is_sealed(data):
         body = data[:-LENGTH] + END
@@ -69,7 +74,7 @@ def is_whole(data: bytes) -> bool:
 
 
 def is_sealed(data: bytes) -> bool:
-    """Whether the bytes of a JSON file end with an entry `sha256`, possibly a damaged one."""
+    """Whether the bytes `data` of a JSON file end with an entry `sha256`, possibly a damaged one."""
     seal = data[-LENGTH:]
     frame, wanted = seal[: len(HEAD)] + seal[-len(TAIL) :], HEAD + TAIL
     if len(seal) < LENGTH:

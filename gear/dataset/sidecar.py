@@ -31,6 +31,9 @@ def sidecar_bytes(sidecar: Sidecar) -> bytes:
 def read_sidecar(path: Path) -> Sidecar:
     """Reads a sidecar, the JSON file of one sample, and checks its values.
 
+    Args:
+        path: the file `<index>.json`; its name must be the index in its scene record.
+
     Raises:
         DatasetError: the sidecar is missing, damaged, of another version of gear, or holds impossible values.
     """
@@ -56,7 +59,12 @@ def read_sidecar(path: Path) -> Sidecar:
 
 
 def no_sidecar(path: Path, error: Exception) -> DatasetError:
-    """Makes the error for a sidecar (the JSON file of a sample) that cannot be read."""
+    """Makes the error for a sidecar (the JSON file of a sample) that cannot be read.
+
+    Args:
+        path: the file.
+        error: why its content cannot be used: a missing key, or a value of a wrong type.
+    """
     said = f"{error} is missing" if isinstance(error, KeyError) else str(error)
     remedy = "delete it and run the same collection again"
     return DatasetError(path, f"is not a sidecar of this version of gear ({said}); {remedy}")

@@ -457,6 +457,9 @@ def _patch_label(root: Path, split: str) -> str:
 def splits_of(root: Path) -> Sequence[str]:
     """The names of a dataset's splits, finished or not, sorted.
 
+    Args:
+        root: folder of the dataset.
+
     Raises:
         DatasetError: the folder is not a dataset.
     """
@@ -469,6 +472,10 @@ def splits_of(root: Path) -> Sequence[str]:
 
 def plan_of(root: Path, split: str) -> Plan:
     """Reads the plan of a split (everything that decides its bytes); the split must exist.
+
+    Args:
+        root: folder of the dataset.
+        split: name of the split.
 
     Raises:
         DatasetError: there is no such split, or its plan cannot be read.

@@ -91,6 +91,9 @@ def splits_in(root: Path) -> list[str]:
     """The names of a dataset's splits, sorted; a split whose plan is missing is included if it has samples or a
     manifest.
 
+    Args:
+        root: folder of the dataset.
+
     Raises:
         DatasetError: the folder has no split.
     """

@@ -42,14 +42,31 @@ class CrashDetector:
         self._space, self._body, self._type = space, ego_body, ego_type
 
     def ego_pose(self, x_m: float, y_m: float, near_z_m: float, yaw_rad: float) -> RigidTransform:
-        """The ego car's pose on the ground; level at the height `near_z_m` where there is no ground below it."""
+        """The ego car's pose on the ground.
+
+        Args:
+            x_m: position in world coordinates.
+            y_m: position in world coordinates.
+            near_z_m: height near which the ground is searched, such as the last known height.
+            yaw_rad: direction, counter-clockwise from the world's x axis.
+
+        Returns:
+            The transform from `actor` to `world`; level at the height `near_z_m` if there is no ground.
+        """
         grounded = self._space.ground_pose(self._type, x_m, y_m, near_z_m, yaw_rad)
         if grounded is None:
             return RigidTransform.from_yaw("world", "actor", (x_m, y_m, near_z_m), yaw_rad)
         return grounded.world_from_actor
 
     def pose(self, spawn: Spawn) -> RigidTransform:
-        """The pose of another road user on the ground; level where there is no ground below it."""
+        """The pose of another road user on the ground.
+
+        Args:
+            spawn: the road user with its position and direction.
+
+        Returns:
+            The transform from `actor` to `world`; level at the height `spawn.near_z_m` if there is no ground.
+        """
         grounded = self._space.ground_pose(spawn.actor_type, spawn.x_m, spawn.y_m, spawn.near_z_m, spawn.yaw_rad)
         if grounded is None:
             place_m = (spawn.x_m, spawn.y_m, spawn.near_z_m)
@@ -57,11 +74,23 @@ class CrashDetector:
         return grounded.world_from_actor
 
     def footprint(self, x_m: float, y_m: float, z_m: float, yaw_rad: float) -> Footprint:
-        """The ego car's footprint."""
+        """The ego car's footprint, a rectangle on the ground, for a position in world coordinates.
+
+        Args:
+            x_m: position.
+            y_m: position.
+            z_m: height.
+            yaw_rad: direction, counter-clockwise from the world's x axis.
+        """
         return Footprint(x_m, y_m, z_m, yaw_rad, self._type.half_length_m, self._type.half_width_m)
 
     def overlapping(self, own: Footprint, spawns: Mapping[str, Spawn]) -> dict[str, Spawn]:
-        """The road users whose footprint has a common point with the ego car's footprint `own`."""
+        """The road users whose footprint has a common point with the ego car's footprint `own`.
+
+        Args:
+            own: the ego car's footprint.
+            spawns: road users by name of their body.
+        """
         return {body: spawn for body, spawn in spawns.items() if own.overlaps(spawn.footprint)}
 
     def hit(self, ego: RigidTransform, spawns: Mapping[str, Spawn]) -> str | None:
@@ -83,7 +112,13 @@ class CrashDetector:
 
 
 def impact_mps(ego_mps: float, ego_yaw_rad: float, spawn: Spawn | None) -> float:
-    """Speed of the ego car relative to what it hits; None stands for the town."""
+    """Speed in m/s of the ego car relative to what it hits, at the first contact.
+
+    Args:
+        ego_mps: speed of the ego car.
+        ego_yaw_rad: direction of the ego car, counter-clockwise from the world's x axis.
+        spawn: the road user that is hit; None for the town, which does not move.
+    """
     vx, vy = ego_mps * math.cos(ego_yaw_rad), ego_mps * math.sin(ego_yaw_rad)
     if spawn is not None:
         vx -= spawn.speed_mps * math.cos(spawn.yaw_rad)

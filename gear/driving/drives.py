@@ -127,11 +127,15 @@ class Drives:
     root: Path
 
     def scenario(self, run: DriveRun) -> Scenario:
-        """The scenario of a drive."""
+        """The scenario of the drive `run`, from the library."""
         return self.library.scenarios[run.scenario]
 
     def collection(self, run: DriveRun) -> CollectionConfig:
-        """The collection config of the pictures of a drive.
+        """The collection config with which the pictures of a drive are rendered: the settings `collect` of the study,
+        with the task, town and scene of the drive, and the weather and crowd of the study.
+
+        Args:
+            run: the drive.
 
         Raises:
             ConfigError: a key of `collect` cannot be read.
@@ -148,11 +152,15 @@ class Drives:
         return replace(read, weather=self.config.weather, crowd=self.config.crowd, options=options, probes=False)
 
     def has_video(self, run: DriveRun) -> bool:
-        """Whether a drive leaves a video."""
+        """Whether the drive `run` leaves a video: the config asks for videos, and the driver has cameras."""
         return self.config.video and bool(self.casts[run.driver].task)
 
     def patch(self, run: DriveRun, surfaces: int) -> PatchSet:
         """The patch that the scene of a drive shows.
+
+        Args:
+            run: the drive; its twin decides which patch is shown.
+            surfaces: number of the surfaces of the scene that can show patches.
 
         Raises:
             PatchError: the patch cannot be used.
@@ -165,7 +173,16 @@ class Drives:
         return resolve_patch(wanted, surfaces=surfaces, seed=self.config.seed)
 
     def identity(self, run: DriveRun, patch: PatchSet) -> Json:
-        """Everything that decides the bytes of a drive, except the renderer's device."""
+        """Everything that decides the bytes of a drive, except the renderer's device.
+
+        Args:
+            run: the drive.
+            patch: the patch that its scene shows.
+
+        Returns:
+            Drive, driver, scenario, weather, crowd, collection settings, hash of the patch, and versions of packages,
+            as JSON.
+        """
         return {
             "run": to_json(run),
             "driver": self.casts[run.driver].facts(),
@@ -181,6 +198,10 @@ class Drives:
     def folder(self, run: DriveRun, patch: PatchSet) -> str:
         """Path of the folder of a drive, relative to the root. It contains a hash of all that decides the drive, so
         that changed settings give another folder.
+
+        Args:
+            run: the drive.
+            patch: the patch that its scene shows.
         """
         digest = hashlib.sha256(dump_json(self.identity(run, patch))).hexdigest()[:8]
         place = f"{Path(run.town).stem}-{Path(run.scene).stem}"
@@ -315,12 +336,21 @@ def _check(drives: Drives) -> None:
 
 
 def surface_count(named: Named) -> int:
-    """Number of the surfaces of a scene that can show patches."""
+    """Number of the surfaces of a scene that can show patches.
+
+    Args:
+        named: the objects that a collection config names.
+    """
     return len(named.scene.boards) if named.scene.truck is None else 1
 
 
 def patches_of(drives: Drives, runs: Sequence[DriveRun]) -> list[PatchSet]:
-    """The patch of each drive."""
+    """The patches that the scenes of drives show, in the order of the drives; each patch is read only once.
+
+    Args:
+        drives: the study.
+        runs: the drives.
+    """
     known: dict[tuple[str, str, str, str], PatchSet] = {}
     found = []
     for run in runs:

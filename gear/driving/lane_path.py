@@ -48,7 +48,12 @@ class LanePath:
 
     @staticmethod
     def along(graph: LaneGraph, lanes: tuple[str, ...]) -> LanePath:
-        """Makes the path along connected lanes, given by name."""
+        """Makes the path along connected lanes, given by name.
+
+        Args:
+            graph: the lanes of the town.
+            lanes: names of the lanes in driving order; each lane leads into the next.
+        """
         return LanePath(route=Route.along(graph, lanes), widths_m=tuple(graph.lanes[name].width_m for name in lanes))
 
     def locate(self, state: VehicleState, near_s_m: float) -> PathPosition:
@@ -69,13 +74,26 @@ class LanePath:
         return PathPosition(s_m=s_m, lateral_m=aside_m, lane_width_m=self.widths_m[self.route.lane_at(s_m)])
 
     def ahead(self, state: VehicleState, s_m: float) -> Points:
-        """(N, 2) points of the centre line from the arc length `s_m` on, `STEP_M` apart, in the ego frame."""
+        """The centre line in front of the car, as far as `AHEAD_M`.
+
+        Args:
+            state: the ego car.
+            s_m: arc length on the route from which on the line is returned.
+
+        Returns:
+            (N, 2) points in the ego frame (x forward, y left, metres), `STEP_M` apart.
+        """
         points, _ = self.route.line.sample(s_m + np.arange(0.0, AHEAD_M + STEP_M / 2, STEP_M))
         return to_ego(state, points[:, :2])
 
 
 def to_ego(state: VehicleState, points_m: Points) -> Points:
-    """(N, 2) points in the ego frame, from (N, 2) points in world coordinates."""
+    """Converts points from world coordinates to the ego frame (x forward, y left).
+
+    Args:
+        state: the ego car.
+        points_m: (N, 2) points in world coordinates.
+    """
     c, s = math.cos(state.yaw_rad), math.sin(state.yaw_rad)
     offsets_m = points_m - np.array([state.x_m, state.y_m])
     turned: Points = offsets_m @ np.array([[c, -s], [s, c]])

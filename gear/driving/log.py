@@ -143,7 +143,7 @@ def log_bytes(entries: Sequence[Json]) -> bytes:
 
 
 def log_hash(data: bytes) -> str:
-    """The SHA-256 of a log, as 64 hexadecimal digits."""
+    """The SHA-256 of the bytes of a log (`log_bytes`), as 64 hexadecimal digits; equal for equal drives."""
     return hashlib.sha256(data).hexdigest()
 
 

@@ -45,7 +45,17 @@ class Sight:
     evaluator: Evaluator[Any, Any] | None = None
 
     def look(self, simulation: DriveSimulation, frame: int) -> tuple[Mapping[str, UInt8Image], Any]:
-        """Renders the current state and predicts; returns (H, W, 3) uint8 pictures by camera, and the prediction."""
+        """Renders the current state and predicts from the pictures.
+
+        If there are a model and an evaluator, the evaluator is updated with the frame.
+
+        Args:
+            simulation: the drive whose current state is rendered.
+            frame: number of the frame, from 0; the index of the scene record.
+
+        Returns:
+            (H, W, 3) uint8 pictures by camera, and the prediction; the prediction is None without a model.
+        """
         record = self.session.pipeline.with_effects(simulation.record(self.rig, frame))
         shown = self.session.to_frame(self.session.shoot(record))
         views = {name: view.rgb for name, view in shown.views.items()}
@@ -79,6 +89,12 @@ class Wheel:
 
     def decide(self, situation: Situation, sight: Sight | None, views: Mapping[str, UInt8Image], seen: Any) -> Action:
         """The controller's action in one frame.
+
+        Args:
+            situation: the state of the drive at the time of the frame.
+            sight: cameras and network of the driver; None for a controller without cameras.
+            views: (H, W, 3) uint8 pictures by camera; the controller gets them only if its spec has `needs_views`.
+            seen: prediction of the network for the pictures; None without a network.
 
         Raises:
             PluginError: a controller of another package failed, or returned something else than finite numbers.

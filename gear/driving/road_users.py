@@ -90,7 +90,16 @@ class RoadUserMotion:
         return {body: self._now(body) for body in self._spawns if body != self._ego_body}
 
     def within(self, x_m: float, y_m: float, radius_m: float) -> dict[str, Spawn]:
-        """The road users within a distance of a point in world coordinates, as `spawns` gives them."""
+        """The other road users near a point, at their positions of this moment; the ego car is left out.
+
+        Args:
+            x_m: the point in world coordinates.
+            y_m: the point in world coordinates.
+            radius_m: largest distance from the point.
+
+        Returns:
+            The road users by name of their body, as `spawns` returns them.
+        """
         found: dict[str, Spawn] = {}
         for body, spawn in self._spawns.items():
             if body == self._ego_body:
@@ -154,7 +163,12 @@ class RoadUserMotion:
 
 
 def lateral_m(lead: LeadStart, time_s: float) -> float:
-    """Distance of the scripted vehicle to the left of the ego car's lane, metres; a cosine during the cut-in."""
+    """Distance of the scripted vehicle to the left of the ego car's lane, metres; a cosine during the cut-in.
+
+    Args:
+        lead: the start of the scripted vehicle.
+        time_s: time since the start of the drive.
+    """
     if lead.cut_in is None:
         return lead.lateral_m
     begins_s, takes_s = lead.cut_in

@@ -59,7 +59,11 @@ class Lead:
             raise FieldError("speed_share", f"is a share, 0 to 1, got {self.speed_share:g}")
 
     def speed_mps(self, ego_mps: float) -> float:
-        """Its speed in m/s, given the speed of the ego car."""
+        """Speed of the vehicle in front at the start, in m/s; never above the speed of the ego car.
+
+        Args:
+            ego_mps: speed of the ego car, m/s.
+        """
         wanted_mps = self.speed_share * ego_mps if self.speed_kmh is None else self.speed_kmh / 3.6
         return min(wanted_mps, ego_mps)
 

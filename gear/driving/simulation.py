@@ -183,7 +183,10 @@ class DriveSimulation:
         return self._drive, self._situation
 
     def reset(self, draw: Draw) -> Situation:
-        """Begins a drive and returns its first state.
+        """Begins a drive and returns its first state; an earlier drive ends.
+
+        Args:
+            draw: scenario, speed and seed of the drive.
 
         Raises:
             PlacementError: the scene has no place for the scenario.

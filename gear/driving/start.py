@@ -149,7 +149,10 @@ class StartSampler:
         self._crowd = Crowd(scene_name=world.scene_name, scene=crowd, types=world.types, spawner=spawner, space=space)
 
     def draw(self, what: Draw) -> Start:
-        """Draws the start of a drive.
+        """Draws the start of a drive: ego car, scripted road users, and the other traffic.
+
+        Args:
+            what: scenario, speed and seed; equal values give the same start.
 
         Raises:
             PlacementError: the scene has no place for the scenario; the message says why.
@@ -336,7 +339,16 @@ def _kept_free(start: Start) -> list[Footprint]:
 
 
 def straight_on(graph: LaneGraph, lane: str, length_m: float) -> tuple[str, ...]:
-    """The names of the lanes from `lane` on that turn least at every branch, until they are `length_m` long in all."""
+    """Follows the lanes straight on: at every branch it takes the lane that turns least.
+
+    Args:
+        graph: the lanes of the town.
+        lane: name of the first lane.
+        length_m: length at which the search ends, in metres, counted from the start of the first lane.
+
+    Returns:
+        Names of the lanes in driving order. They are shorter than `length_m` in all if the road ends earlier.
+    """
     names, total_m = [lane], graph.lanes[lane].line.length_m
     while total_m < length_m and graph.lanes[names[-1]].next:
         names.append(min(graph.lanes[names[-1]].next, key=lambda name: (_turn_rad(graph, name), name)))

@@ -55,7 +55,11 @@ class VehicleState:
 
 
 def car_facts(actor_type: ActorType) -> CarFacts:
-    """Sizes and limits of a car with the measured shape of an asset."""
+    """Sizes and limits of a car; the limits of acceleration, braking and steering are those of every car.
+
+    Args:
+        actor_type: asset of the car, with its measured size.
+    """
     return CarFacts(
         wheelbase_m=2 * HALF_WHEELBASE_SHARE * actor_type.half_length_m,
         front_m=actor_type.front_m,
@@ -82,7 +86,13 @@ class KinematicBicycle:
     lag_s: float = LAG_S
 
     def step(self, state: VehicleState, action: Action, duration_s: float) -> VehicleState:
-        """The state after a time span during which the action does not change."""
+        """The state after a time span during which the action does not change.
+
+        Args:
+            state: the state at the start.
+            action: acceleration and steering; values beyond the car's limits are reduced to them.
+            duration_s: length of the time span; it is integrated in steps of at most `STEP_S`.
+        """
         steps = max(1, math.ceil(duration_s / STEP_S - 1e-9))
         for _ in range(steps):
             state = self._step(state, action, duration_s / steps)

@@ -82,7 +82,19 @@ class Video:
 
 
 def drawn(situation: Situation, picture: UInt8Image, seen: Any, action: Action) -> UInt8Image:
-    """(H, W, 3) uint8 frame of a video: the picture, what the network saw below it, and a line of text."""
+    """One frame of a drive's video: a line of text, the picture with the predicted boxes, and below it the predicted
+    label or depth map, if there is one.
+
+    Args:
+        situation: the state of the drive.
+        picture: (H, W, 3) uint8 picture of the first camera; it is not changed.
+        seen: prediction of the network; None without a network.
+        action: the controller's decision. The line of text shows its acceleration and notes, and is red during
+            emergency braking.
+
+    Returns:
+        (H', W', 3) uint8 frame.
+    """
     boxes = _boxes(seen)
     shown = picture.copy()
     for left_px, top_px, right_px, bottom_px in boxes:

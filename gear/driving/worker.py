@@ -282,7 +282,14 @@ def read_result(root: Path, folder: str, *, with_video: bool = False) -> DriveRe
 
 
 def read_log(root: Path, folder: str) -> list[Json]:
-    """The log of a drive: head, frames, end.
+    """Reads the log of a finished drive.
+
+    Args:
+        root: folder of all results.
+        folder: folder of the drive, relative to the root.
+
+    Returns:
+        The lines of the log: the head, one entry per frame, and the end.
 
     Raises:
         DatasetError: the file cannot be read.

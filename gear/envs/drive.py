@@ -113,7 +113,9 @@ class DriveEnv(gymnasium.Env[Arrays, npt.NDArray[np.float32]]):
         return observation, reward, is_lost, situation.is_over and not is_lost, _facts(situation)
 
     def render(self) -> UInt8Image | None:
-        """The (H, W, 3) uint8 picture of the camera, where `render_mode` is `rgb_array`."""
+        """The (H, W, 3) uint8 picture of the camera after the last `reset` or `step`. None before the first `reset`, or
+        if `render_mode` is None.
+        """
         return self._picture if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
@@ -134,7 +136,12 @@ class DriveEnv(gymnasium.Env[Arrays, npt.NDArray[np.float32]]):
 
 
 def reward_of(before: Situation, after: Situation) -> float:
-    """The reward of one frame, as `DriveEnv` describes it."""
+    """The reward of one frame, as `DriveEnv` describes it.
+
+    Args:
+        before: the state at the start of the frame.
+        after: the state at the end of the frame.
+    """
     wanted_m = max(after.cruise_mps, 1.0) * FRAME_S
     progress = min((after.position.s_m - before.position.s_m) / wanted_m, 1.0)
     penalty = PENALTY if after.ending in LOST and not before.is_over else 0.0

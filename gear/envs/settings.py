@@ -84,6 +84,9 @@ class DriveSettings:
     def draws(self, rng: np.random.Generator) -> Iterator[Draw]:
         """The starts that an episode may have, in a random order; the first for which the scene has a place is taken.
 
+        Args:
+            rng: random generator of the episode; it decides the seed of the drive and the order.
+
         Raises:
             UnknownNameError: the library has no such scenario.
         """

@@ -75,7 +75,13 @@ def observed(situation: Situation, settings: DriveSettings, picture: UInt8Image 
 
 
 def action_of(pedals_and_steering: npt.NDArray[Any], car: CarFacts) -> Action:
-    """The action of a car from an element of `ACTION_SPACE`; values beyond -1 and 1 are clipped."""
+    """The action of a car from an element of `ACTION_SPACE`.
+
+    Args:
+        pedals_and_steering: (2,) numbers in -1..1, larger ones are clipped: pedals (1 full acceleration, -1 full
+            braking), and steering (1 full lock to the left).
+        car: limits of the car, by which the numbers are scaled.
+    """
     pedals, steering = (float(value) for value in np.clip(pedals_and_steering, -1.0, 1.0))
     most_mps2 = car.most_acceleration_mps2 if pedals > 0 else car.most_braking_mps2
     return Action(acceleration_mps2=pedals * most_mps2, steering_rad=steering * car.most_steering_rad)

@@ -40,6 +40,10 @@ class DriveStage:
     def open(settings: DriveSettings) -> DriveStage:
         """Compiles the world of a scene and, for a camera, opens a renderer.
 
+        Args:
+            settings: settings of the environment, which name the scene and the camera. `DriveStage.close` closes the
+                renderer.
+
         Raises:
             GearError: a name is unknown, a file cannot be read, or the renderer cannot start.
         """

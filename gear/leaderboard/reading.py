@@ -45,6 +45,9 @@ def encoded(record: Record) -> bytes:
 def read_record(path: Path) -> Filed:
     """Reads a record.
 
+    Args:
+        path: the file.
+
     Raises:
         DatasetError: the file cannot be read, is too large, is not canonical JSON, or holds values that a record must
             not hold.
@@ -74,7 +77,11 @@ def read_records(folder: Path) -> Iterator[Filed | DatasetError]:
 
 
 def limited(path: Path, most_bytes: int) -> bytes:
-    """Reads a regular file of limited size.
+    """Reads a regular file (not a folder, device or pipe) of limited size.
+
+    Args:
+        path: the file, or a link to it.
+        most_bytes: largest allowed size in bytes.
 
     Raises:
         DatasetError: the file is missing, no regular file, or too large.

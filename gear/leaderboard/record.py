@@ -40,7 +40,7 @@ Knowledge = Literal["white-box", "black-box"]
 
 
 def canonical(value: Json) -> bytes:
-    """Encodes JSON in its canonical form: sorted keys, one entry per line, UTF-8, and a newline at the end."""
+    """Encodes the JSON `value` canonically: sorted keys, one entry per line, UTF-8, and a newline at the end."""
     return (json.dumps(value, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
@@ -392,40 +392,50 @@ class Record:
 
 
 def check_name(field: str, text: str) -> None:
-    """Raises:
-    FieldError: the text is no plain name, for example because it holds a path.
+    """Checks that the value `text` of the entry `field` of a record is a plain name.
+
+    Raises:
+        FieldError: the text is no plain name, for example because it holds a path.
     """
     if not NAME.fullmatch(text):
         raise FieldError(field, f"{text[:40]!r} is no plain name (letters, digits, `_`, `.`, `+`, `-`, spaces)")
 
 
 def check_plugin_name(field: str, text: str) -> None:
-    """Raises:
-    FieldError: the text is no name of a plugin.
+    """Checks that the value `text` of the entry `field` of a record can be the name of a plugin.
+
+    Raises:
+        FieldError: the text is no name of a plugin.
     """
     if len(text) > LONGEST_TEXT or not PLUGIN_NAME.fullmatch(text):
         raise FieldError(field, f"{text[:40]!r} is no name of a plugin")
 
 
 def check_text(field: str, text: str) -> None:
-    """Raises:
-    FieldError: the text is too long or holds characters that cannot be printed.
+    """Checks that the value `text` of the entry `field` of a record is a short printable text.
+
+    Raises:
+        FieldError: the text is too long or holds characters that cannot be printed.
     """
     if len(text) > LONGEST_TEXT or not (text.isprintable() or not text):
         raise FieldError(field, f"is longer than {LONGEST_TEXT} characters, or not printable")
 
 
 def check_sha256(field: str, text: str) -> None:
-    """Raises:
-    FieldError: the text is not 64 hexadecimal digits.
+    """Checks that the value `text` of the entry `field` of a record has the form of a SHA-256.
+
+    Raises:
+        FieldError: the text is not 64 hexadecimal digits.
     """
     if not SHA256.fullmatch(text):
         raise FieldError(field, "is no SHA-256 (64 hexadecimal digits in lower case)")
 
 
 def check_number(field: str, value: float, *, low: float, high: float) -> None:
-    """Raises:
-    FieldError: the number is not finite or out of range.
+    """Checks that the value of the entry `field` of a record is a finite number from `low` to `high`, both included.
+
+    Raises:
+        FieldError: the number is not finite or out of range.
     """
     if not math.isfinite(value) or not low <= value <= high:
         raise FieldError(field, f"must be {low:g} to {high:g}")
@@ -435,6 +445,11 @@ def check_plain(field: str, value: Json, depth: int = 0) -> None:
     """Checks that a config holds no paths and nothing enormous.
 
     Only the names of plugins (keys `plugin`, and the names of tasks) may contain a slash.
+
+    Args:
+        field: name of the entry of the record, for the error message.
+        value: the config as JSON.
+        depth: number of levels above `value`; at most 12.
 
     Raises:
         FieldError: a text is a path, too long or not printable; a number is enormous; or lists lie too deep.

@@ -24,26 +24,50 @@ LEAST_KEPT = 0.5
 
 
 def robust_figures(record: Record) -> list[Figure]:
-    """The ranked metric under every optimised patch: `patch`, `adaptive patch`, and patches of other networks."""
+    """The ranked metric of a record under every optimised patch: `patch`, `adaptive patch`, and patches of other
+    networks. Numbers that the record does not have are left out.
+
+    Args:
+        record: the record.
+    """
     kinds = [kind for kind in record.kinds() if kind not in (NONE, RANDOM)]
     return [figure for kind in kinds if (figure := record.figure(kind)) is not None]
 
 
 def worst(figures: Sequence[Figure], *, lower_is_better: bool) -> Figure | None:
-    """The figure that is worst for the network; None without figures."""
+    """The number that is worst for the network; None if no figure has a value.
+
+    Args:
+        figures: numbers of one metric, such as those of `robust_figures`.
+        lower_is_better: whether small values of the metric are good for the network.
+    """
     known = [one for one in figures if one.value is not None]
     sign = -1.0 if lower_is_better else 1.0
     return min(known, key=lambda one: sign * (one.value or 0.0), default=None)
 
 
 def harm(record: Record, one: Figure, other: Figure) -> float:
-    """How much worse `one` is than `other` for the network; negative if it is better."""
+    """How much worse `one` is than `other` for the network, in units of the record's ranked metric; negative if it is
+    better.
+
+    Args:
+        record: the record, which says whether lower values are better.
+        one: a number with a value.
+        other: a number with a value.
+    """
     assert one.value is not None and other.value is not None
     return (one.value - other.value) if record.entry.lower_is_better else (other.value - one.value)
 
 
 def is_clearly_worse(record: Record, one: Figure, other: Figure) -> bool:
-    """Whether `one` is worse than `other`, and the value of `other` lies outside the interval of `one`."""
+    """Whether `one` is worse for the network than `other`, and the value of `other` lies outside the interval of `one`.
+    Without an interval, `one` only has to be worse.
+
+    Args:
+        record: the record, which says whether lower values are better.
+        one: a number with a value.
+        other: a number with a value.
+    """
     assert other.value is not None
     near = one.low if record.entry.lower_is_better else one.high
     if near is None:
@@ -52,8 +76,14 @@ def is_clearly_worse(record: Record, one: Figure, other: Figure) -> bool:
 
 
 def clean_loss(record: Record) -> float | None:
-    """How much a defense costs on clean pictures against the network alone, as a share: points of a metric divided by
-    100, or a share of an error; None where it cannot be computed.
+    """How much a defense costs on clean pictures, compared with the network alone.
+
+    Args:
+        record: the record of the network with its defense.
+
+    Returns:
+        The loss of the metric, or for errors (lower is better) the increase as a share of the error of the network
+        alone; negative if the defense helps. None if one of the two values is missing.
     """
     here, there = record.figure(NONE), record.figure(NONE, is_reference=True)
     if here is None or there is None or there.value is None:

@@ -73,13 +73,18 @@ class Verdict:
 
 
 def finding(level: Level, text: str) -> Finding:
-    """A finding whose text is made printable and cut to the allowed length."""
+    """A finding whose text is made printable and cut to the allowed length.
+
+    Args:
+        level: `same`, `note`, or `differs`; only `differs` speaks against the record.
+        text: the finding; line breaks become spaces.
+    """
     line = "".join(mark if mark.isprintable() else "?" for mark in " ".join(text.split()))
     return Finding(level=level, text=line if len(line) <= LONGEST_TEXT else line[: LONGEST_TEXT - 3] + "...")
 
 
 def read_verdict(path: Path) -> Verdict:
-    """Reads the verdict of a check.
+    """Reads the verdict of a check from the JSON file `path`.
 
     Raises:
         DatasetError: the file cannot be read, or is no verdict.

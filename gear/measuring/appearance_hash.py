@@ -66,8 +66,11 @@ class Appearance:
         return _digest(to_json(self))[:HASH_LENGTH]
 
     def differences(self, other: Appearance) -> list[str]:
-        """Names the parts in which two appearances differ, such as `light` or `assets of town10`; empty if they
-        are equal.
+        """Names the parts in which two appearances differ, such as `light` or `assets of town10`; empty if they are
+        equal.
+
+        Args:
+            other: the appearance with which this one is compared.
         """
         towns = sorted(
             town for town in self.assets.keys() | other.assets.keys() if self.assets.get(town) != other.assets.get(town)
@@ -114,7 +117,7 @@ def current_appearance(trained: Appearance, digests: dict[str, str] | None = Non
 
 
 def read_appearance(value: Json) -> Appearance | None:
-    """Reads an appearance from JSON; returns None if the JSON does not describe an appearance."""
+    """Reads an appearance from the JSON `value`; returns None if the JSON does not describe an appearance."""
     try:
         return from_json(Appearance, value, "look")
     except FieldError:

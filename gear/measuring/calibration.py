@@ -97,7 +97,11 @@ class Calibration:
         return lines
 
     def note(self, measured: Dataset[Any]) -> str | None:
-        """A warning if a defense is evaluated on scenes of its own calibration data; otherwise None."""
+        """A warning if a defense is evaluated on scenes of its own calibration data; otherwise None.
+
+        Args:
+            measured: the dataset on which the defense is evaluated.
+        """
         if self.clean is None or scenes_of(self.clean) != scenes_of(measured):
             return None
         return f"{measured.root}: the defense learnt from scenes that it is measured on; other scenes are harder for it"

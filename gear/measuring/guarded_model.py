@@ -205,7 +205,13 @@ class GuardedModel:
 
 
 def plugin_error(plugin: PluginEntry, stage: str, problem: str) -> PluginError:
-    """Makes an error whose message names the plugin, its package and version, and the stage at which it failed."""
+    """Makes an error whose message names the plugin, its package and version, and the stage at which it failed.
+
+    Args:
+        plugin: the plugin.
+        stage: what the plugin did, such as `its evaluator`.
+        problem: what went wrong.
+    """
     return PluginError(f"{plugin.spec.name} ({plugin.owner.package} {plugin.owner.version})", stage, problem)
 
 

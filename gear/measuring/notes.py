@@ -8,6 +8,12 @@ from collections.abc import Iterable
 def grouped(notes: Iterable[str | None]) -> list[str]:
     """Combines warnings of the form `ROOT: text`: one line per text, with the first root and the number of further
     roots.
+
+    Args:
+        notes: the warnings; None entries are skipped.
+
+    Returns:
+        The lines, in the order in which each text comes first.
     """
     roots: dict[str, dict[str, None]] = {}
     for note in notes:

@@ -41,7 +41,12 @@ class ObjectEvaluator:
         self.pictures: list[PictureOutcomes] = []
 
     def update(self, sample: Sample, prediction: Any) -> Mapping[str, float]:
-        """Adds one sample; returns the metrics of this sample alone, with the names of `result`."""
+        """Adds one sample; returns the metrics of this sample alone, with the names of `result`.
+
+        Args:
+            sample: the sample with its ground truth.
+            prediction: the task's prediction for it.
+        """
         given = self._task.picture_objects(sample, prediction)
         middles_m = [
             _middle_m(surface.camera_from_surface)
@@ -53,7 +58,7 @@ class ObjectEvaluator:
         return _values(_counts(self.pictures[-1]))
 
     def merge(self, other: Any) -> None:
-        """Adds the pictures that another evaluator has gathered."""
+        """Adds the pictures that the evaluator `other` has gathered, after those of this one."""
         self.pictures += other.pictures
 
     def result(self) -> Mapping[str, float]:

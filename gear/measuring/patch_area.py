@@ -29,7 +29,11 @@ SURE = 0.5
 
 
 def patch_masks(sample: Sample) -> dict[str, Mask]:
-    """The (H, W) bool masks of the pixels that show a patch surface, by camera name."""
+    """The (H, W) bool masks of the pixels of a sample that show a patch surface, by camera name.
+
+    Args:
+        sample: the sample; each of its cameras has a mask, which is all False if no surface is visible.
+    """
     masks: dict[str, Mask] = {name: np.zeros(image.shape[:2], dtype=np.bool_) for name, image in sample.images.items()}
     for surface in sample.surfaces:
         if surface.visible_px:
@@ -39,7 +43,12 @@ def patch_masks(sample: Sample) -> dict[str, Mask]:
 
 
 def widened(masks: Mapping[str, Mask], margin_px: int = MARGIN_PX) -> dict[str, Mask]:
-    """Dilates bool masks by a distance in pixels."""
+    """Dilates (H, W) bool masks, in all directions, by a distance in pixels.
+
+    Args:
+        masks: masks by camera name; they are not changed.
+        margin_px: the distance.
+    """
     size = 2 * margin_px + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     return {name: cv2.dilate(mask.astype(np.uint8), disc).astype(np.bool_) for name, mask in masks.items()}

@@ -36,5 +36,5 @@ def check_patches(patches: Any, surfaces: int, found: PluginEntry) -> None:
 
 
 def is_picture(rgb: npt.NDArray[Any]) -> bool:
-    """Whether an array has the form of a patch: (H, W, 3) float32 with finite values."""
+    """Whether the array `rgb` has the form of a patch: (H, W, 3) float32 with finite values."""
     return rgb.dtype == np.float32 and rgb.ndim == 3 and rgb.shape[2] == 3 and bool(np.isfinite(rgb).all())

@@ -63,6 +63,10 @@ def chosen_model(name: str, settings: Iterable[str], flag: str = "--set") -> Cho
 def chosen_defense(name: str | None, settings: Iterable[str]) -> Chosen | None:
     """Finds a defense by name and checks its options; returns None without a name.
 
+    Args:
+        name: name of the defense; None or empty for no defense.
+        settings: `KEY=VALUE` options of the defense.
+
     Raises:
         GearError: there is no such defense, an option does not fit, or options are given without a defense.
     """
@@ -145,6 +149,12 @@ def check_defense(defense: Chosen, model: Chosen, task: str, *, is_calibrated: b
     """Checks that a defense supports the task and the model, and that required calibration data are given.
 
     The model must provide all feature maps that the defense reads.
+
+    Args:
+        defense: the defense.
+        model: the network that it guards.
+        task: name of the task of the datasets.
+        is_calibrated: whether calibration data are given.
 
     Raises:
         GearError: the defense fits the task or the model badly, or calibration data are missing.

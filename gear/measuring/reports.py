@@ -62,6 +62,10 @@ class Report:
     def checked(self, given: Any, method: str) -> dict[str, float]:
         """Checks the metrics that a method of the evaluator returned, and returns them by name.
 
+        Args:
+            given: value that the method returned.
+            method: name of the method, for the error message.
+
         Raises:
             PluginError: the value is not a mapping of names to numbers; the error names the plugin.
         """
@@ -74,6 +78,9 @@ class Report:
     @contextlib.contextmanager
     def blamed(self, method: str) -> Iterator[None]:
         """A context for calls of the evaluator's code; an error in a metric of another package names its plugin.
+
+        Args:
+            method: name of the method that is called, for the error message.
 
         Raises:
             PluginError: the evaluator of another package's metric raised something other than a `GearError`.
@@ -100,13 +107,17 @@ class Report:
 
 
 def task_report(dataset: Dataset[Any]) -> Report:
-    """The report with the task's own metrics."""
+    """The report with the metrics that the task of `dataset` itself defines."""
     return Report(name=TASK, make=dataset.task.evaluator, plan=dataset.plan)
 
 
 def reports_of(names: Iterable[str], dataset: Dataset[Any]) -> dict[str, Report]:
     """The reports of an evaluation by name: the task's own metrics, `objects` if the task has objects, and the
     requested ones.
+
+    Args:
+        names: names of further reports: metric plugins, or reports of the task.
+        dataset: a dataset of the evaluation; its task and plan decide the reports.
 
     Raises:
         UnknownNameError: neither the task nor a plugin has a report of this name.

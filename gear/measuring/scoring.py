@@ -155,7 +155,14 @@ class Scorer:
         return UnsavedResult(result=result, files=predicted | defended)
 
     def write(self, unsaved: UnsavedResult) -> SampleResult:
-        """Writes the files of a prediction and, last, the stored result, which marks the sample as finished."""
+        """Writes the files of a prediction and, last, the stored result, which marks the sample as finished.
+
+        Args:
+            unsaved: the result of a sample and the bytes of its files by path.
+
+        Returns:
+            The result, as it is stored.
+        """
         result = unsaved.result
         for relative, data in unsaved.files.items():
             write_whole(self._root, f"{self._folder}/{relative}", data)
@@ -174,6 +181,9 @@ class Scorer:
 
     def rescore_stored(self, index: int) -> SampleResult | DatasetError:
         """Reads the stored prediction of an earlier run and computes its metrics.
+
+        Args:
+            index: index of the sample.
 
         Returns:
             The sample's result, or the error if its stored result or its files cannot be read.
@@ -209,7 +219,12 @@ class Scorer:
         )
 
     def prediction(self, result: SampleResult, sample: Sample) -> Any:
-        """Reads the stored prediction of a finished sample; None for a task that stores no predictions."""
+        """Reads the stored prediction of a finished sample; None for a task that stores no predictions.
+
+        Args:
+            result: stored result of the sample.
+            sample: the sample that the prediction is for.
+        """
         if self._keeper is None:
             return None
         folder = inside(self._root, f"{self._folder}/{PREDICTIONS}")

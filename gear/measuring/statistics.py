@@ -66,10 +66,18 @@ class Metrics:
     support: Mapping[str, int] = field(default_factory=dict)
 
     def interval(self, name: str) -> Interval | None:
-        """The ends of a metric's 95 % confidence interval, by the jackknife or, for `support`'s metrics, exact ones.
+        """The lower and upper end of a metric's 95 % confidence interval.
 
-        None if it is undefined. This includes an error that is 0 on all samples, because these samples do not tell how
-        large it is on others.
+        Metrics that `support` names have exact intervals (`interval_at_limit`); all others have intervals by the
+        jackknife.
+
+        Args:
+            name: name of the metric.
+
+        Returns:
+            The ends; None if they are undefined: there are no replicates, there are fewer than two clusters, the metric
+            is undefined without one of them, or the metric and all replicates lie at one of its limits. For example, an
+            error of 0 on all samples does not tell how large the error is on others.
         """
         if name not in self.replicates:
             return None

@@ -91,7 +91,11 @@ def collate(items: Sequence[Item]) -> Batch:
 
 
 def as_pictures(views: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Converts uint8 pictures in 0..255 to float32 in 0..1, by camera name."""
+    """Converts pictures from uint8 in 0..255 to float32 in 0..1.
+
+    Args:
+        views: pictures of any shape, by camera name.
+    """
     return {name: tensor.float() / 255 for name, tensor in views.items()}
 
 
@@ -99,6 +103,9 @@ def stacked(items: Sequence[Item]) -> Batch:
     """Makes a batch whose pictures stay uint8 in 0..255.
 
     Such pictures need a quarter of the bytes of float32 pictures when they are sent between processes or to a GPU.
+
+    Args:
+        items: samples whose pictures are (3, H, W) uint8 by camera name; all have the same cameras.
 
     Raises:
         ValueError: the pictures differ in size.

@@ -59,5 +59,10 @@ class Samples(Sequence[Any]):
 
 
 def all_of(datasets: tuple[Dataset[Any], ...]) -> Samples:
-    """Joins all samples of several splits into one sequence, in the order of the splits."""
+    """Joins all samples of several splits into one sequence: first all of the first split, then all of the second, and
+    so on.
+
+    Args:
+        datasets: the opened splits.
+    """
     return Samples(datasets, tuple((i, k) for i, dataset in enumerate(datasets) for k in range(len(dataset))))

@@ -71,8 +71,12 @@ class Builder:
     scale: float = 1.0
 
     def entries(self, count: int, on_progress: Progress | None = None) -> Iterator[Entry]:
-        """Yields the entries of the first `count` samples in order; several samples are decoded and encoded at the
-        same time.
+        """Yields the entries of the first `count` samples in order; several samples are decoded and encoded at the same
+        time.
+
+        Args:
+            count: number of samples.
+            on_progress: called after each sample with the numbers of finished and of all samples.
         """
         executor = ThreadPoolExecutor(min(8, cores()))
         try:
@@ -85,6 +89,9 @@ class Builder:
 
     def entry(self, index: int) -> Entry:
         """Returns the entry of one sample; its `problem` says which files cannot be read.
+
+        Args:
+            index: index of the sample in the split.
 
         Raises:
             DatasetError: the sidecar, the JSON file with the sample's metadata, cannot be read.
@@ -117,8 +124,14 @@ class Builder:
         )
 
     def probe(self, index: int) -> list[UInt8Image]:
-        """Returns all pictures of one sample, unscaled, to estimate the size of the page; empty if the sample
-        cannot be read.
+        """Returns all pictures of one sample, unscaled, to estimate the size of the page; empty if the sample cannot be
+        read.
+
+        Args:
+            index: index of the sample in the split.
+
+        Returns:
+            (H, W, 3) uint8 pictures.
         """
         return [what.pixels for one in self._seen(index)[0] for what in one.shown.values()]
 
@@ -207,8 +220,15 @@ def _original(source: Source, sidecar: Sidecar, pixels: UInt8Image) -> str | Non
 
 
 def fitting_scale(builder: Builder, count: int, budget_bytes: float) -> float:
-    """Returns the scale, at most 1, at which the pictures of `count` samples fit the budget in bytes, estimated
-    from a few samples.
+    """The scale at which the pictures of a page fit a budget, estimated from a few samples; nothing is written.
+
+    Args:
+        builder: builder with scale 1.
+        count: number of samples on the page.
+        budget_bytes: bytes for the pictures and the metadata of the samples.
+
+    Returns:
+        The factor for width and height, at most 1.
     """
     chosen = sorted({round(i * (count - 1) / (PROBES - 1)) for i in range(PROBES)})
     facts = [len(deflated(finite(detail(builder.sources[0].dataset.sidecar(i), {})))) for i in chosen]

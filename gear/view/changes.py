@@ -14,9 +14,15 @@ from gear.view.sources import Source
 
 
 def picture_change(one: Sample, other: Sample) -> float | None:
-    """Returns the mean absolute difference of two samples' pictures, 0 (equal) to 1, over all cameras together.
+    """Returns the mean absolute difference of the pictures of two samples, 0 (equal) to 1 (black and white), over all
+    cameras together.
 
-    None if no camera has pictures of the same size in both samples.
+    Args:
+        one: sample of one dataset.
+        other: the same sample of a twin.
+
+    Returns:
+        The difference; None if no camera has pictures of the same size in both samples.
     """
     pairs = [
         (pixels, other.images[camera])
@@ -30,7 +36,12 @@ def picture_change(one: Sample, other: Sample) -> float | None:
 
 
 def metrics_of(sources: Sequence[Source], index: int) -> Json:
-    """Returns the metrics of the predictions for one sample: `{evaluation: {dataset: {metric: value}}}`."""
+    """Returns the metrics of the predictions for one sample: `{evaluation: {dataset: {metric: value}}}`.
+
+    Args:
+        sources: the datasets of the page with their evaluations.
+        index: index of the sample.
+    """
     found: dict[str, dict[str, Json]] = {}
     for source in sources:
         for part in source.evaluated:
@@ -44,6 +55,10 @@ def object_changes(sources: Sequence[Source], index: int) -> list[Json]:
 
     Each entry has the keys `evaluation`, `dataset`, `against` (labels), `change` (`hidden`, `misclassified`, `moved` or
     `invented`), `label`, `detected_as`, `score`, `box` (left, top, right, bottom in edge pixels) and `on_patch`.
+
+    Args:
+        sources: the datasets of the page with their evaluations.
+        index: index of the sample.
     """
     labels = {(part.root, part.name): source.label for source in sources for part in source.evaluated}
     return [

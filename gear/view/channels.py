@@ -102,11 +102,16 @@ def predictions(dataset: Dataset[Any], part: StoredResults, sample: Sample, labe
 
 
 def aligned_with(name: str, pixels: UInt8Image, sample: Sample) -> str | None:
-    """Returns the name of the camera whose pixels coincide with those of a preview; None if no camera has the
-    preview's size.
+    """Returns the name of the camera whose pixels coincide with those of a preview; None if no camera has the preview's
+    size.
 
     Among the cameras of the preview's size it is the one with the same name, then one whose name is part of the
     preview's name, then the first.
+
+    Args:
+        name: name of the preview.
+        pixels: (H, W, 3) uint8 preview.
+        sample: the sample that the preview shows.
     """
     same: Mapping[str, UInt8Image] = {k: v for k, v in sample.images.items() if v.shape == pixels.shape}
     return next((camera for camera in same if camera == name), None) or next(

@@ -21,7 +21,12 @@ MOST_LABELS = 200
 
 
 def count(facts: Json) -> Counts:
-    """Returns the histograms in the metadata that a task stores for one sample."""
+    """Returns the histograms in the metadata that a task stores for one sample: mappings from labels to numbers, and
+    how often each text occurs in a list of objects.
+
+    Args:
+        facts: the metadata, JSON of any form.
+    """
     if not isinstance(facts, dict):
         return {}
     found: Counts = {}
@@ -49,8 +54,14 @@ def is_label(value: Any) -> bool:
 
 
 def without_identifiers(samples: Sequence[Counts]) -> list[Counts]:
-    """Removes the histograms whose labels rarely repeat over the split, because such labels are names or codes,
-    not classes.
+    """Removes the histograms whose labels rarely repeat over the split, because such labels are names or codes, not
+    classes.
+
+    Args:
+        samples: histograms of each sample.
+
+    Returns:
+        The same histograms without those whose labels are names or codes, one mapping per sample.
     """
     totals: dict[str, Counter[str]] = {}
     for counts in samples:

@@ -29,7 +29,7 @@ SCRIPTS = (
 
 
 def asset(name: str) -> str:
-    """Returns the text of a file in `gear/view/page`."""
+    """Returns the text of the file `name` in `gear/view/page`."""
     return (files("gear.view") / "page" / name).read_text(encoding="utf-8")
 
 
@@ -40,8 +40,15 @@ def script() -> str:
 
 
 def index_of(entries: Sequence[Entry], about: dict[str, Json]) -> dict[str, Json]:
-    """Returns the JSON index of the page, which its script reads first: `about` (metadata of the split), the
-    channels, and one entry per sample.
+    """Returns the JSON index of the page, which its script reads first: `about` (metadata of the split), the channels,
+    and one entry per sample.
+
+    Args:
+        entries: the samples of the page.
+        about: metadata of the split.
+
+    Returns:
+        The keys are `about`, `mediaType` (of the pictures), `channels` (kinds of pictures) and `samples`.
     """
     channels = channels_of(entries)
     rows = []
@@ -80,8 +87,13 @@ def _pictures(entry: Entry, channels: Sequence[Channel]) -> list[Json]:
 
 
 def document(title: str, entries: Sequence[Entry], about: dict[str, Json]) -> Iterator[str]:
-    """Yields the pieces of the HTML page; the index comes before the pictures, so a browser can start before all
+    """Yields the HTML page in pieces of text; the index comes before the pictures, so a browser can start before all
     pictures are loaded.
+
+    Args:
+        title: title of the page.
+        entries: the samples of the page.
+        about: metadata of the split.
     """
     style, code = asset("style.css"), script()
     fillings = {
@@ -103,7 +115,12 @@ def document(title: str, entries: Sequence[Entry], about: dict[str, Json]) -> It
 
 
 def policy(style: str, code: str) -> str:
-    """Returns the content security policy of the page, with the hashes of its style and its script."""
+    """Returns the content security policy of the page, which allows only its own style and script, by their hashes.
+
+    Args:
+        style: text of the style sheet.
+        code: text of the script.
+    """
 
     def digest(text: str) -> str:
         return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
@@ -115,7 +132,7 @@ def policy(style: str, code: str) -> str:
 
 
 def embedded(value: Json) -> str:
-    """Returns JSON text with `<`, `>` and `&` escaped, so it cannot end the HTML script block around it."""
+    """Returns `value` as JSON text with `<`, `>` and `&` escaped, so it cannot end the HTML script block around it."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 

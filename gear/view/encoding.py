@@ -39,7 +39,13 @@ class Picture:
 
 
 def encode(pixels: UInt8Image, scale: float) -> Picture:
-    """Resizes a (H, W, 3) uint8 RGB picture by area averaging and compresses it as WebP."""
+    """Resizes a (H, W, 3) uint8 RGB picture by area averaging and compresses it as WebP.
+
+    Args:
+        pixels: the picture.
+        scale: factor for width and height. Pictures are not made narrower than `LEAST_WIDTH_PX`, nor larger than
+            `MOST_PX`.
+    """
     height, width = pixels.shape[:2]
     target = max(round(width * scale), min(width, LEAST_WIDTH_PX))
     target = max(1, min(target, MOST_PX, MOST_PX * width // height))

@@ -16,7 +16,10 @@ MEASURES = ("_fraction", "distance_m")
 
 
 def measures(facts: Json) -> Json:
-    """Returns the measures of all objects in the metadata that a task stores for one sample.
+    """Returns the measures (numbers whose field name ends with a unit) of all objects in the metadata of one sample.
+
+    Args:
+        facts: the metadata that the task stores; lists of mappings in it are lists of objects.
 
     Returns:
         `labels`, a list with one label per object, and `values`, a mapping from the field's name to a list with one

@@ -16,8 +16,15 @@ from gear.view.surface_occlusion import hidden
 
 
 def row(sidecar: Sidecar) -> dict[str, Json]:
-    """Returns the overview data of one sample: positions of actors and cameras from above, surfaces, histograms
-    and measures.
+    """Returns the overview data of one sample: positions of actors and cameras from above, surfaces, histograms and
+    measures.
+
+    Args:
+        sidecar: metadata of the sample.
+
+    Returns:
+        JSON by key; `boards` are the surfaces as seen from above, `surfaces` their visibility in each camera, `counts`
+        the histograms, `things` the measures of objects.
     """
     record = sidecar.record
     return {
@@ -38,7 +45,15 @@ def row(sidecar: Sidecar) -> dict[str, Json]:
 
 
 def detail(sidecar: Sidecar, links: dict[str, str]) -> dict[str, Json]:
-    """Returns all other metadata of a sample, which the page reads only when the user opens the sample."""
+    """Returns all other metadata of a sample, which the page reads only when the user opens the sample.
+
+    Args:
+        sidecar: metadata of the sample.
+        links: links from the page to picture files of the sample, by path in the dataset.
+
+    Returns:
+        The keys are `record`, `surfaces`, `facts` (metadata of the task) and `files` (path, SHA-256, and link or None).
+    """
     return {
         "record": to_json(sidecar.record),
         "surfaces": to_json(sidecar.surfaces),

@@ -25,8 +25,16 @@ class Hidden:
 
 
 def hidden(truth: SurfaceTruth, camera: CameraRecord) -> Hidden:
-    """Computes the truncated and the occluded share of a surface from its projected corners and its number of
-    visible pixels.
+    """Computes the truncated and the occluded share of a surface from its projected corners and its number of visible
+    pixels.
+
+    Args:
+        truth: the surface as one camera sees it.
+        camera: that camera.
+
+    Returns:
+        Both shares are None if the camera sees the surface from behind or corners lie behind the camera; the occluded
+        share is None if less than one pixel lies inside the picture.
     """
     if truth.corners_px is None or truth.incidence_deg >= 90:
         return Hidden(None, None)

@@ -106,7 +106,15 @@ def write_page(
     max_mb: float = 48.0,
     on_progress: Progress | None = None,
 ) -> ViewReport:
-    """Writes the HTML page of a dataset that is already open; `write_view` describes the arguments."""
+    """Writes the HTML page of one dataset that is already open, without twins and evaluations.
+
+    Args:
+        dataset: the opened split.
+        out: HTML file to write; missing folders are made.
+        samples: number of samples, counted from the first; all by default.
+        max_mb: approximate limit for the size of the page in megabytes.
+        on_progress: called after every sample with the numbers of finished and of all samples.
+    """
     sources = sources_of(dataset, (), (), Path(out))
     return write_sources(sources, out, samples=samples, max_mb=max_mb, on_progress=on_progress)
 
@@ -114,7 +122,15 @@ def write_page(
 def write_sources(
     sources: tuple[Source, ...], out: str | Path, *, samples: int | None, max_mb: float, on_progress: Progress | None
 ) -> ViewReport:
-    """Writes the HTML page of open datasets that are twins; `write_view` describes the arguments."""
+    """Writes the HTML page of open datasets that are twins.
+
+    Args:
+        sources: the datasets with their evaluations; the page counts the samples of the first.
+        out: HTML file to write; missing folders are made.
+        samples: number of samples, counted from the first; None for all.
+        max_mb: approximate limit for the size of the page in megabytes.
+        on_progress: called after every sample with the numbers of finished and of all samples.
+    """
     target, dataset = Path(out), sources[0].dataset
     refuse_folder(target)
     with explained(target):
@@ -135,6 +151,10 @@ def write_sources(
 def about(sources: Sequence[Source], scale: float) -> dict[str, Json]:
     """Returns the metadata of the whole split for the page, as JSON: task, town with its streets, scene, split, seed,
     patch and config, legends of the pictures, and labels of the compared datasets and evaluations.
+
+    Args:
+        sources: the datasets of the page with their evaluations; all but their labels is of the first.
+        scale: factor by which the pictures of the page were resized.
     """
     dataset = sources[0].dataset
     plan = dataset.plan

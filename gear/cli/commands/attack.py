@@ -121,7 +121,11 @@ def _add_defense(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the attack, prints the patch folder and the result, and returns exit code 0."""
+    """Runs the attack, prints the patch folder and the result, and returns exit code 0.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
+    """
     import json
 
     from gear.cli.requests import guard_of, request_of
@@ -154,7 +158,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def attack_per_scene(args: argparse.Namespace, request: AttackRequest) -> int:
-    """Runs one attack for each scene (`--per-scene`), prints the results and returns exit code 0."""
+    """Runs one attack for each scene (`--per-scene`), prints the results and returns exit code 0.
+
+    Args:
+        args: arguments of the command line.
+        request: the arguments of `gear.attack`, with the data of all scenes.
+    """
     import json
 
     from gear.dataset.executors.engines import DEFAULT

@@ -63,7 +63,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the benchmark and prints its tables, or with `--list` only prints its steps; returns exit code 0."""
+    """Runs the benchmark and prints its tables, or with `--list` only prints its steps; returns exit code 0.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
+    """
     import json
     from pathlib import Path
 

@@ -27,13 +27,15 @@ def positive(text: str) -> int:
 
 
 def workers(text: str) -> Workers:
-    """Parses the value of `--workers`: a whole number of at least 1, or `auto`; a `type` function for argparse."""
+    """Parses `text`, the value of `--workers`: a whole number of at least 1, or `auto`; a `type` function for
+    argparse.
+    """
     return "auto" if text == "auto" else positive(text)
 
 
 def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags that describe a collection (task, scene, weather, patch, …); `gear collect` and `gear show-
-    config` share them.
+    """Adds to `parser` the flags that describe a collection (task, scene, weather, patch, …); `gear collect` and `gear
+    show-config` share them.
     """
     parser.add_argument("--task", help="task plugin: semseg, detect2d, stereo3d, depth, or an installed one")
     parser.add_argument("--scene", help="name of a scene of the town (billboard01 … 09, truck …), or FILE.yml:NAME")
@@ -89,7 +91,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Collects the split, prints the dataset's folder and returns exit code 0."""
+    """Collects the split, prints the dataset's folder and returns exit code 0.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
+    """
     from gear.cli.requests import request_of
     from gear.reporting.display import Display
     from gear.verbs.collect.request import CollectRequest

@@ -19,7 +19,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints the completion script for the requested shell and returns exit code 0."""
+    """Prints the completion script for the requested shell and returns exit code 0.
+
+    Args:
+        args: arguments of the command line; `shell` is the name of the shell.
+    """
     import shtab
 
     from gear.cli.main import full_parser

@@ -31,7 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Applies the defense to the pictures, prints the output folder and returns exit code 0."""
+    """Applies the defense to the pictures, prints the output folder and returns exit code 0.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
+    """
     from gear.cli.requests import request_of
     from gear.reporting.display import Display
     from gear.verbs.defend.request import DefendRequest

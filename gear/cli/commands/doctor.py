@@ -21,6 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Checks the renderers and prints a report.
 
+    Args:
+        args: arguments of the command line: `renderer` and `json`.
+
     Returns:
         0 if at least one of the checked renderers works, otherwise 2; with `--renderer` only that renderer is checked.
     """

@@ -43,7 +43,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Drives and prints the tables, or with `--list` only prints the drives; returns exit code 0."""
+    """Drives and prints the tables, or with `--list` only prints the drives; returns exit code 0.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
+    """
     import json
 
     from gear.cli.requests import request_of

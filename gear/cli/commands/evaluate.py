@@ -96,15 +96,19 @@ def add_engine(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags `--calibration` and `--calibration-patched`, which name the datasets on which a defense is
-    calibrated.
+    """Adds to `parser` the flags `--calibration` and `--calibration-patched`, which name the datasets on which a
+    defense is calibrated.
     """
     parser.add_argument("--calibration", metavar="DIR", help="clean dataset on which the defense is calibrated")
     parser.add_argument("--calibration-patched", metavar="DIR", help="twin of the calibration dataset, with patches")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Evaluates the model on the datasets, prints the table of results and returns exit code 0."""
+    """Evaluates the model on the datasets, prints the table of results and returns exit code 0.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
+    """
     import json
 
     from gear.cli.requests import guard_of, request_of

@@ -29,7 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Exports the dataset, prints the new folder and returns exit code 0."""
+    """Exports the dataset, prints the new folder and returns exit code 0.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
+    """
     from gear.reporting.display import Display
     from gear.verbs.export import export
 

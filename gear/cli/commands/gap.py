@@ -61,8 +61,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_places(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags `--town` and `--scenes`: the MJCF file and the scene library of a town that is not part of
-    gear.
+    """Adds to `parser` the flags `--town` and `--scenes`: the MJCF file and the scene library of a town that is not
+    part of gear.
     """
     parser.add_argument(
         "--town",
@@ -73,7 +73,11 @@ def add_places(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compares composed patches with rendered patches, prints the table and returns exit code 0."""
+    """Compares composed patches with rendered patches, prints the table and returns exit code 0.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
+    """
     from gear.cli.requests import guard_of, request_of
     from gear.dataset.json_text import dump_json
     from gear.measuring.gap.request import GapRequest

@@ -19,7 +19,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Unpacks the archive, prints the path of the dataset and returns exit code 0."""
+    """Unpacks the archive, prints the path of the dataset and returns exit code 0.
+
+    Args:
+        args: arguments of the command line: `archive` and `out`.
+    """
     from gear.reporting.display import Display
     from gear.verbs.import_archive.run import import_archive
 

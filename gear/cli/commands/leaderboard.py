@@ -65,12 +65,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the chosen action (check, build or commit) and returns its exit code."""
+    """Runs the chosen action (check, build or commit) and returns its exit code.
+
+    Args:
+        args: arguments of the command line; `action` is the chosen action.
+    """
     return {"check": check, "build": build, "commit": commit}[args.action](args)
 
 
 def check(args: argparse.Namespace) -> int:
-    """`gear leaderboard check`: prints one line per finding; returns 0 if the record is reproduced, otherwise 1."""
+    """`gear leaderboard check`: prints one line per finding; returns 0 if the record is reproduced, otherwise 1.
+
+    Args:
+        args: arguments of the command line. Without `seed` a random one is used, without `work` a temporary folder.
+    """
     import secrets
     import tempfile
     from pathlib import Path
@@ -91,7 +99,11 @@ def check(args: argparse.Namespace) -> int:
 
 
 def build(args: argparse.Namespace) -> int:
-    """`gear leaderboard build`: writes the pages, prints counts and refused files, and returns exit code 0."""
+    """`gear leaderboard build`: writes the pages, prints counts and refused files, and returns exit code 0.
+
+    Args:
+        args: arguments of the command line: `records`, `out`, `checks`, `commitment` and `json`.
+    """
     from gear.verbs.leaderboard.build import build_leaderboard
 
     report = build_leaderboard(args.records, out=args.out, checks=args.checks, commitment=args.commitment)
@@ -100,7 +112,11 @@ def build(args: argparse.Namespace) -> int:
 
 
 def commit(args: argparse.Namespace) -> int:
-    """`gear leaderboard commit`: prints the salted hash of a file with withheld scenes and returns exit code 0."""
+    """`gear leaderboard commit`: prints the salted hash of a file with withheld scenes and returns exit code 0.
+
+    Args:
+        args: arguments of the command line; `file` is the file.
+    """
     from pathlib import Path
 
     from gear.verbs.leaderboard.withheld import read_withheld

@@ -23,7 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Joins the folders, prints the path of the new dataset and returns exit code 0."""
+    """Joins the folders, prints the path of the new dataset and returns exit code 0.
+
+    Args:
+        args: arguments of the command line: `datasets` and `out`.
+    """
     from gear.reporting.display import Display
     from gear.verbs.merge import merge
 

@@ -38,7 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints the list of installed networks, or the details of one network; returns exit code 0."""
+    """Prints the list of installed networks, or the details of one network; returns exit code 0.
+
+    Args:
+        args: arguments of the command line: `action`, `name`, `task` and `json`.
+    """
     from gear.networks.shipped import shipped_networks
     from gear.verbs.models import list_models
 
@@ -78,7 +82,7 @@ def the_one(models: Sequence[ModelFacts], name: str | None) -> ModelFacts:
 
 
 def row(model: ModelFacts) -> list[str]:
-    """Returns the table cells of one network, in the order of the column titles in `HEAD`."""
+    """Returns the table cells of the network `model`, in the order of the column titles in `HEAD`."""
     spec = model.spec
     size = f"{spec.parameters / 1e6:.1f} M" if spec.parameters else "-"
     weights = "shipped" if model.shipped else "published" if spec.published else "-"
@@ -89,7 +93,7 @@ def row(model: ModelFacts) -> list[str]:
 
 
 def details(model: ModelFacts) -> list[str]:
-    """Returns a description of one network as lines of text: tasks, size, input, published weights and shipped
+    """Returns a description of the network `model` as lines of text: tasks, size, input, published weights and shipped
     weights.
     """
     spec = model.spec

@@ -21,7 +21,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Writes the package, prints the next steps and returns exit code 0."""
+    """Writes the package, prints the next steps and returns exit code 0.
+
+    Args:
+        args: arguments of the command line: `kind`, `name` and `out`.
+    """
     import shlex
 
     from gear.verbs.scaffold.write import new_package

@@ -34,7 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints the list of plugins, or one plugin with its options; returns exit code 0."""
+    """Prints the list of plugins, or one plugin with its options; returns exit code 0.
+
+    Args:
+        args: arguments of the command line: `action`, `name`, `kind`, `json` and `strict_plugins`.
+    """
     from gear.plugins.manager import catalogue
 
     found = catalogue()
@@ -112,6 +116,11 @@ def show(catalogue: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace
 
 def the_one(catalogue: Catalogue, kinds: tuple[Kind, ...], name: str | None) -> PluginEntry:
     """Returns the plugin with the given name, of any of the given kinds, for `gear plugins show`.
+
+    Args:
+        catalogue: all installed plugins.
+        kinds: kinds of plugins to search, such as `task`.
+        name: name of the plugin, or `<package>/<name>`; None if the user gave none.
 
     Raises:
         GearError: no name was given, or plugins of several kinds have this name.

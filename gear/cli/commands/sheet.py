@@ -22,7 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Writes the contact sheet, prints its path and returns exit code 0."""
+    """Writes the contact sheet, prints its path and returns exit code 0.
+
+    Args:
+        args: arguments of the command line: `dataset`, `out`, `split` and `samples`.
+    """
     from gear.reporting.display import Display
     from gear.verbs.sheet import sheet
 

@@ -21,7 +21,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Checks that every name in the collection config exists, prints the config as YAML and returns exit code 0."""
+    """Checks that every name in the collection config exists, prints the config as YAML and returns exit code 0.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
+    """
     from gear.collecting.lookup import look_up
     from gear.config.dump import to_yaml
     from gear.config.load import load_collection

@@ -36,7 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lists towns with their scenes, or draws one town with `--out`; returns 0, or 2 if a scene is unusable."""
+    """Lists towns with their scenes, or draws one town with `--out`; returns 0, or 2 if a scene is unusable.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
+    """
     from gear.values.errors import GearError
     from gear.verbs.towns.facts import read_town, town_names
     from gear.verbs.towns.write import check_pictures
@@ -59,6 +63,9 @@ def run(args: argparse.Namespace) -> int:
 def draw(args: argparse.Namespace) -> int:
     """Writes the map and the thumbnail sheet of one town and prints their paths; returns 0, or 2 if a scene is
     unusable.
+
+    Args:
+        args: arguments of the command line; `town` and `out` are given.
     """
     from gear.reporting.display import Display
     from gear.verbs.towns.write import write_town

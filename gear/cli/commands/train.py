@@ -26,8 +26,10 @@ SECONDS = {"s": 1, "m": 60, "h": 3600, "": 60}
 
 
 def budget(text: str) -> float:
-    """Parses a duration such as `90s`, `10m` or `1.5h` and returns seconds; a plain number means minutes. A `type`
-    function for argparse.
+    """Parses a duration and returns seconds; a `type` function for argparse.
+
+    Args:
+        text: the duration, such as `90s`, `10m` or `1.5h`; a number without a unit means minutes.
     """
     match = re.fullmatch(r"(\d+(?:\.\d*)?)([smh]?)", text.strip())
     if not match or not float(match[1]):
@@ -87,7 +89,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Trains the network, prints the result and returns exit code 0."""
+    """Trains the network, prints the result and returns exit code 0.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
+    """
     from gear.cli.requests import request_of
     from gear.reporting.display import Display
     from gear.verbs.train.request import TrainRequest

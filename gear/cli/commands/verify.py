@@ -30,7 +30,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints one line for each damaged, missing or unexpected file.
+    """Checks the files of a dataset, and prints one line for each damaged, missing or unexpected file. With `--repair`,
+    samples are made again.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
 
     Returns:
         0 if every file has its recorded content and no file is missing or unexpected; otherwise 1.

@@ -18,7 +18,7 @@ The page is one file; it needs no server and no network. On the page, press ? fo
 
 
 def megabytes(text: str) -> float:
-    """Parses a size in megabytes, 1 to 4000; a `type` function for argparse."""
+    """Parses `text`, a size in megabytes, 1 to 4000; a `type` function for argparse."""
     number = float(text)
     if not 1 <= number <= 4000:
         raise argparse.ArgumentTypeError("must be 1 to 4000")
@@ -59,6 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Writes the page and prints its path.
+
+    Args:
+        args: arguments of the command line, as the parser of this command returns them.
 
     Returns:
         0, or 1 if the pictures or labels of some samples could not be shown.

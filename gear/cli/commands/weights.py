@@ -66,13 +66,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the chosen action (convert, average or show) and returns exit code 0."""
+    """Runs the chosen action (convert, average or show) and returns exit code 0.
+
+    Args:
+        args: arguments of the command line; `action` is the chosen action.
+    """
     return {"convert": convert, "average": average, "show": show}[args.action](args)
 
 
 def convert(args: argparse.Namespace) -> int:
-    """`gear weights convert`: writes a published weights file as safetensors, prints its hash and returns exit
-    code 0.
+    """`gear weights convert`: writes a published weights file as safetensors, prints its hash and returns exit code 0.
+
+    Args:
+        args: arguments of the command line: `model`, `source`, `out`, `settings`, `entry`, `half` and `json`.
     """
     from gear.verbs.weights.convert import convert_weights
 
@@ -83,7 +89,11 @@ def convert(args: argparse.Namespace) -> int:
 
 
 def average(args: argparse.Namespace) -> int:
-    """`gear weights average`: writes the average of two weights files, prints its hash and returns exit code 0."""
+    """`gear weights average`: writes the average of two weights files, prints its hash and returns exit code 0.
+
+    Args:
+        args: arguments of the command line: `first`, `second`, `out`, `share`, `half` and `json`.
+    """
     from gear.verbs.weights.average import average_weights
 
     return _say(average_weights(args.first, args.second, args.out, share=args.share, halves=args.half), args)
@@ -101,7 +111,11 @@ def _say(report: ConvertReport, args: argparse.Namespace) -> int:
 
 
 def show(args: argparse.Namespace) -> int:
-    """`gear weights show`: prints the metadata in a weights file's header and returns exit code 0."""
+    """`gear weights show`: prints the metadata in a weights file's header and returns exit code 0.
+
+    Args:
+        args: arguments of the command line: `file` and `json`.
+    """
     from gear.verbs.weights.show import show_weights
 
     facts = show_weights(args.file).to_json()

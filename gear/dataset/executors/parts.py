@@ -18,8 +18,16 @@ PARTS_PER_WORKER = 4
 
 
 def split_in_parts(indices: Sequence[int], workers: int) -> list[list[int]]:
-    """Splits items (samples of a split) into parts of consecutive indices, so most frames of a sequence are in the
-    same part.
+    """Splits items (samples of a split) into parts of consecutive indices, so most frames of a sequence are in the same
+    part.
+
+    Args:
+        indices: indices of the items, in ascending order.
+        workers: number of workers among which the parts are distributed.
+
+    Returns:
+        The indices of each part; every worker gets about `PARTS_PER_WORKER` parts, and no part has more than `LARGEST`
+        items.
     """
     size = max(1, min(LARGEST, len(indices) // (workers * PARTS_PER_WORKER)))
     return [list(indices[start : start + size]) for start in range(0, len(indices), size)]

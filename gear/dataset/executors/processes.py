@@ -92,14 +92,14 @@ class Processes:
 
 
 def executor(*, workers: int, backend: str, address: str | None, needs: Needs) -> Executor:
-    """Opens the engine `processes`; `address` must be None, because this engine uses no cluster. It reserves no
-    graphics cards.
+    """Opens the engine `processes`, which runs on this machine only and reserves no graphics cards.
 
     Args:
-        workers: number of workers.
-        backend: name of the renderer.
-        address: address of the cluster; None for the default.
-        needs: longest time without a message, and graphics cards, of each worker.
+        workers: number of worker processes.
+        backend: name of the renderer, for messages about workers that died or hang.
+        address: must be None, because this engine uses no cluster.
+        needs: `silence_s` is the time in seconds without a message after which a worker counts as hung; `gpus` is
+            ignored.
 
     Raises:
         GearError: an address is given.

@@ -25,12 +25,18 @@ packages would create a missing bucket instead.
 
 
 def is_address(out: str | Path) -> bool:
-    """Whether a folder is given by an address with a protocol, such as `s3://bucket/folder`, and not by a path."""
+    """Whether the folder `out` is given by an address with a protocol, such as `s3://bucket/folder`, and not by a path
+    or an address `file://`.
+    """
     return isinstance(out, str) and _ADDRESS.match(out) is not None and _LOCAL.match(out) is None
 
 
 def local_path(out: str | Path) -> Path:
-    """The path of a folder of this machine that is given as a path or as an address `file:///folder`."""
+    """The path of a folder of this machine.
+
+    Args:
+        out: a path, or an address `file:///folder`.
+    """
     text = str(out)
     local = isinstance(out, str) and _LOCAL.match(text)
     return Path(unquote(text[local.end() :])) if local else Path(out)
@@ -80,7 +86,7 @@ class RemoteFolder:
         return sorted({path.rstrip("/").rpartition("/")[2] for path in found} - {""})
 
     def read(self, relative: str) -> bytes | None:
-        """Reads a file; None if it does not exist.
+        """Reads the file `relative`, a path relative to this folder; None if the file does not exist.
 
         Raises:
             DatasetError: the file cannot be read.
@@ -109,7 +115,7 @@ class RemoteFolder:
             self._files.pipe_file(path, data)
 
     def remove(self, relative: str) -> None:
-        """Removes a file.
+        """Removes the file `relative`, a path relative to this folder.
 
         Raises:
             DatasetError: the file cannot be removed.

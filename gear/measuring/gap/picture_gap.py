@@ -76,5 +76,9 @@ def picture_gap(digital: UInt8Image, rendered: UInt8Image, mask: Mask) -> Pictur
 
 
 def psnr_db(mean_square: float) -> float:
-    """The peak signal-to-noise ratio in dB for a mean squared difference of pixel values in 0..255."""
+    """The peak signal-to-noise ratio in dB, at most `PERFECT_DB`.
+
+    Args:
+        mean_square: mean squared difference of pixel values in 0..255.
+    """
     return min(PERFECT_DB, 10 * math.log10(255**2 / mean_square)) if mean_square > 0 else PERFECT_DB

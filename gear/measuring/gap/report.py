@@ -72,7 +72,11 @@ class GapReport:
     fit: FitReport | None = None
 
     def median_db(self, compositor: str) -> float:
-        """The median PSNR in dB over all pictures that show a patch; NaN if there are none."""
+        """The median PSNR in dB over all pictures that show a patch; NaN if there are none.
+
+        Args:
+            compositor: name of the compositor whose pictures are compared with the rendered ones.
+        """
         values = [sample.gaps[compositor].psnr_db for sample in self.samples]
         return float(np.median(values)) if values else math.nan
 
@@ -86,6 +90,12 @@ class GapReport:
 
         The share is (rendered - clean) / (composed - clean). Metrics that the composed patch does not change are left
         out.
+
+        Args:
+            compositor: name of the compositor that made the composed pictures.
+
+        Returns:
+            The shares by metric; 1 means that the whole effect remains. Empty if no network was evaluated.
         """
         if not self.effect:
             return {}

@@ -53,8 +53,11 @@ class _Comparison:
 
 
 def measure_gap(request: GapRequest, callbacks: Callbacks) -> GapReport:
-    """Compares composed patches (pasted into clean pictures) with rendered patches, and writes the report if
-    requested.
+    """Compares composed patches (pasted into clean pictures) with rendered patches, and writes the report if requested.
+
+    Args:
+        request: the arguments of `gear gap`.
+        callbacks: functions that receive progress and warnings.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -191,6 +194,13 @@ def composed_picture(engine: BaseCompositor, images: Sequence[UInt8Image], index
 
 def shown_patches(twin: Dataset[Any], surfaces: int) -> list[UInt8Image]:
     """Reads the patches that a dataset was rendered with, from the copies that the dataset holds.
+
+    Args:
+        twin: the dataset with patches.
+        surfaces: number of surfaces of its scene.
+
+    Returns:
+        (H, W, 3) uint8 sRGB patches, one per surface, in the order of the surfaces.
 
     Raises:
         DatasetError: the dataset has fewer patches than surfaces, or the copies differ from the rendered patches.

@@ -20,7 +20,7 @@ from gear.values.errors import ConfigError, DatasetError, UnknownNameError
 
 
 def check_clean(clean: Dataset[Any]) -> None:
-    """Checks that a split was rendered without a patch.
+    """Checks that the split `clean` was rendered without a patch.
 
     Raises:
         DatasetError: the split shows a patch.

@@ -65,7 +65,12 @@ class TrainRequest:
 
     @property
     def command_flags(self) -> dict[str, Any]:
-        """The values of the command-line flags that repeat this training, by flag, without data and settings."""
+        """Values of flags of `gear train`, for the command line that repeats this training, by name such as
+        `time_budget`. Flags that were not given are None or False.
+
+        Data and output folders, `--device` and `--workers` are not included; `--set` and `--adversarial` are in
+        `config_settings`.
+        """
         return {
             "epochs": self.epochs,
             "time_budget": _budget(self.time_budget_s),
