@@ -66,11 +66,15 @@ def contact_sheet(
 
 
 def caption(sample: Sample, name: str) -> str:
-    """Returns the caption of a preview: split, index, preview, scene, and visible share and distance of the first
-    two surfaces.
+    """Returns the caption of a preview: split, index, preview, scene, and visible share and distance of the first two
+    surfaces.
 
     The visible share is measured in the camera with the preview's name, or in the first camera if there is no such
     camera.
+
+    Args:
+        sample: the sample.
+        name: name of the preview.
     """
     record = sample.record
     camera = name if name in sample.images else record.cameras[0].name

@@ -17,7 +17,12 @@ MOST_SAMPLES = 8
 
 
 def random_patches(patches: Sequence[Patch], seed: int) -> tuple[Patch, ...]:
-    """Returns patches of the same sizes as the given ones, with values drawn uniformly from 0..1."""
+    """Makes the random patches with which an attack's result is compared; their values are drawn uniformly from 0..1.
+
+    Args:
+        patches: patches whose names and sizes are used.
+        seed: seed of the draws.
+    """
     rng = derive_rng(seed, "attack", "baseline")
     return tuple(Patch(name=one.name, rgb=rng.random(one.rgb.shape, dtype=np.float32)) for one in patches)
 
@@ -54,5 +59,5 @@ def compared(
 
 
 def plain(value: float) -> float | None:
-    """Rounds a number to six significant digits for JSON; returns None if the number is not finite."""
+    """Rounds the number `value` to six significant digits for JSON; returns None if the number is not finite."""
     return float(f"{value:.6g}") if np.isfinite(value) else None

@@ -89,6 +89,12 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
 def read_patches(root: Path) -> tuple[Patch, ...]:
     """Reads the finished patches of a folder with their exact float32 values (`patch.safetensors`).
 
+    Args:
+        root: folder of a finished attack.
+
+    Returns:
+        The patches in the order of their surfaces.
+
     Raises:
         ReplaceableError: the file is missing or damaged.
     """
@@ -103,7 +109,12 @@ def read_patches(root: Path) -> tuple[Patch, ...]:
 
 
 def tidy(root: Path) -> None:
-    """Deletes the files that only an unfinished attack needs, such as its checkpoint."""
+    """Deletes the files that only an unfinished attack needs: its checkpoint, the note that it has begun, and temporary
+    files.
+
+    Args:
+        root: folder of the attack.
+    """
     remove_files(root, [CHECKPOINT, BEGUN])
     clear_scratch(root)
 

@@ -115,6 +115,11 @@ class Job:
 def resolve(request: AttackRequest, on_fit_progress: Progress) -> Job:
     """Opens and checks everything that a request names: datasets, models, defense and attack.
 
+    Args:
+        request: the arguments of `gear.attack`.
+        on_fit_progress: called with the number of processed and of all calibration pictures while the defense is
+            calibrated.
+
     Raises:
         GearError: something does not exist, or two inputs do not fit together.
     """

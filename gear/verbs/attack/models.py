@@ -30,8 +30,15 @@ FLAG = "--model-set "
 
 
 def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Sequence[Dataset[Any]]) -> list[Chosen]:
-    """Finds the plugins of all models, with the same options for each, and checks that the models fit the
-    datasets.
+    """Finds the plugins of all models, with the same options for each, and checks that the models fit the datasets.
+
+    Args:
+        names: names of model plugins.
+        settings: `KEY=VALUE` options, used for each model.
+        datasets: the datasets that the models must fit.
+
+    Returns:
+        The models in the order of `names`.
 
     Raises:
         GearError: a model does not exist, an option does not fit, a model is named twice, or a model is for another
@@ -68,8 +75,14 @@ def check_gradient(defense: Chosen | None, attack: AttackSpec[Any]) -> None:
 def check_attack(
     plugin: PluginEntry, models: Sequence[Chosen], task: str, surfaces: int, queries: int | None
 ) -> AttackSpec[Any]:
-    """Checks that the attack supports the task, the number of surfaces, the models and the budget; returns its
-    spec.
+    """Checks that the attack supports the task, the number of surfaces, the models and the budget; returns its spec.
+
+    Args:
+        plugin: plugin of the attack.
+        models: the attacked networks.
+        task: name of the task of the datasets.
+        surfaces: number of patch surfaces in the scene.
+        queries: the value of `--queries`, the largest number of forward passes; None if it is not given.
 
     Raises:
         GearError: the attack is for other tasks or for fewer surfaces, needs gradients that a model does not give, or

@@ -154,14 +154,23 @@ class Recorder:
             self.on_progress(0 if queries_left is None else self.queries - int(queries_left), self.queries)
 
     def finish(self, done: int, last: tuple[Patch, ...]) -> None:
-        """Validates the last patches if the attack ended between two validations, for example because its queries
-        were used up.
+        """Validates the last patches if the attack ended between two validations, for example because its queries were
+        used up.
+
+        Args:
+            done: number of finished steps.
+            last: patches after the last step.
         """
         if self.judge is not None and (not self.judged or self.judged[-1][0] != done):
             self._validate(done, last)
 
     def save(self, done: int, state: State) -> None:
-        """Writes the checkpoint atomically; does nothing if the attack has no state to save."""
+        """Writes the checkpoint atomically; does nothing if the attack has no state to save.
+
+        Args:
+            done: number of finished steps.
+            state: arrays by name from which the attack can continue.
+        """
         self._saved = time.monotonic()
         if not state:
             return

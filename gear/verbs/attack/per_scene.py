@@ -49,7 +49,10 @@ class Engine:
             raise GearError(f"engine_workers must be at least 1, got {self.workers}")
 
     def opened(self, gpus: int) -> Executor:
-        """Returns the executor; a single worker of the default engine is this process.
+        """Returns the executor of this engine; a single worker of the default engine is this process.
+
+        Args:
+            gpus: number of graphics cards that the engine reserves for each worker, if it can.
 
         Raises:
             GearError: the engine cannot be used.
@@ -149,6 +152,14 @@ def _by_scene(paths: Sequence[str | Path]) -> dict[str, list[str]]:
 
 def run_attack_scenes(request: AttackRequest, engine: Engine, callbacks: Callbacks) -> dict[str, AttackReport]:
     """Runs one attack for each scene, as `attack_scenes` describes.
+
+    Args:
+        request: the arguments of `gear.attack`, with the data of all scenes.
+        engine: the engine whose workers run the attacks, with their number.
+        callbacks: callbacks that receive the number of finished scenes, and warnings.
+
+    Returns:
+        The results by name of the scene.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.

@@ -162,12 +162,19 @@ def attack(
 
 
 def unit_of(request: AttackRequest) -> str:
-    """Returns the unit that an attack's progress counts: `step` or `query`."""
+    """Returns the unit that the progress of an attack with the arguments `request` counts: `query` if forward passes
+    are limited, otherwise `step`.
+    """
     return "step" if request.queries is None else "query"
 
 
 def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
-    """Runs an attack with the arguments in `request`, which `gear.attack` describes.
+    """Runs an attack with the arguments in `request`, which `gear.attack` describes. The patches are written into the
+    folder `request.out`; a finished attack with the same inputs is not run again.
+
+    Args:
+        request: the arguments.
+        callbacks: callbacks that receive progress and warnings.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.

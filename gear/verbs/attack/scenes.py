@@ -56,8 +56,14 @@ class Scenes:
     def harm(
         self, model: Model, objective: Objective, patches: Sequence[Patch], indices: Sequence[int] | None = None
     ) -> float:
-        """Returns the mean objective over the samples (or over those in `indices`), with patches that are not
-        randomly transformed.
+        """Returns the mean objective over samples, with patches that are not randomly transformed; larger values mean
+        more harm.
+
+        Args:
+            model: the attacked network.
+            objective: the objective of the attack.
+            patches: one patch per surface.
+            indices: positions of the samples; None for all.
         """
         chosen = range(len(self.samples)) if indices is None else indices
         tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
@@ -81,7 +87,12 @@ class Scenes:
 
     def gradient_check(self, model: Model, objective: Objective, patches: Sequence[Patch]) -> tuple[float, float]:
         """Checks for masked gradients: takes a small step along the gradient of the objective with respect to the
-        patches.
+        patches, on the first samples.
+
+        Args:
+            model: the attacked network, with its defense.
+            objective: the objective of the attack.
+            patches: one patch per surface; they are not changed.
 
         Returns:
             The change of the objective that the gradient predicts, and the change that the step really causes.

@@ -23,7 +23,12 @@ ALL = "all"
 
 
 def metric_records(report: BenchReport) -> Iterator[dict[str, Json]]:
-    """Yields one record per figure: for each network, defense, kind of patch and scene, and over all scenes."""
+    """Yields one record per number: for each network, defense, kind of patch and scene, and over all scenes. The keys
+    are the columns of `bench.csv`.
+
+    Args:
+        report: results of the benchmark.
+    """
     scenes = scenes_of(report)
     for task in report.tasks:
         for one in task.results:

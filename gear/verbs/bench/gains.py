@@ -16,13 +16,26 @@ FAILED_P = 0.05
 
 
 def alone(task: TaskResult, one: Result) -> Result:
-    """Returns the results of the same network without a defense."""
+    """Returns the results of the same network without a defense.
+
+    Args:
+        task: results of the task.
+        one: results of a network with a defense, or alone.
+    """
     return next(other for other in task.results if other.model == one.model and other.defense is None)
 
 
 def against_clean(task: TaskResult, one: Result, pool: Pool) -> Estimate | None:
-    """Returns the metric of a pool minus that of the network without a defense and without a patch; None for that
-    pool itself, and where a value is missing.
+    """Returns the metric of a pool (the datasets of all scenes with one kind of patch) minus that of the network
+    without a defense and without a patch.
+
+    Args:
+        task: results of the task, with its main metric.
+        one: results of the network, alone or with a defense.
+        pool: a pool of these results.
+
+    Returns:
+        The difference with its interval; None for the subtracted pool itself, and where a value is missing.
     """
     if one.defense is None and pool.name == NO_PATCH:
         return None
@@ -34,6 +47,11 @@ def gain(task: TaskResult, one: Result, pool: Pool) -> Estimate | None:
     patch; adaptive patches are compared with the patches against the network alone.
 
     None without a defense. Without a patch the gain is the cost of the defense, usually negative.
+
+    Args:
+        task: results of the task, with its main metric.
+        one: results of the network with its defense.
+        pool: a pool (the datasets of all scenes with one kind of patch) of these results.
     """
     if one.defense is None:
         return None
@@ -43,7 +61,16 @@ def gain(task: TaskResult, one: Result, pool: Pool) -> Estimate | None:
 
 
 def minus(task: TaskResult, pool: Pool, other: Pool) -> Estimate | None:
-    """Returns the difference of the task's main metric between two pools of the same scenes, with its interval."""
+    """Returns the difference of the task's main metric between two pools of the same scenes, with its interval.
+
+    Args:
+        task: results of the task, with its main metric.
+        pool: results over all scenes with one kind of patch.
+        other: the results that are subtracted.
+
+    Returns:
+        None if the task has no main metric or a value is missing.
+    """
     here, there = task.value(pool), task.value(other)
     if task.metric is None or here is None or there is None:
         return None
@@ -53,7 +80,13 @@ def minus(task: TaskResult, pool: Pool, other: Pool) -> Estimate | None:
 
 
 def is_failed(task: TaskResult, one: Result, pool: Pool) -> bool:
-    """Whether an optimised patch is no worse for the network than a random patch, or only by chance."""
+    """Whether an optimised patch is no worse for the network than a random patch, or only by chance.
+
+    Args:
+        task: results of the task, with its main metric.
+        one: results of the network.
+        pool: results with the optimised patch. They are compared with the results with the random patch.
+    """
     against = one.against(pool)
     change, test = task.effect(against), task.outside_patch(against)
     if against is None or against.against == NO_PATCH or task.metric is None or change is None:

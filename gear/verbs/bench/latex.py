@@ -50,7 +50,12 @@ def tabular(table: PaperTable) -> str:
 
 
 def document(tables: Sequence[PaperTable], title: str) -> str:
-    """Returns a LaTeX document that inputs the files of all tables, each scaled to the width of the text."""
+    """Returns a LaTeX document that inputs the files of all tables, each scaled to the width of the text.
+
+    Args:
+        tables: the tables; the file of each is in the folder of the document.
+        title: title of the document.
+    """
     lines = [
         r"\documentclass[10pt]{article}",
         r"\usepackage[a4paper,margin=1.5cm]{geometry}",

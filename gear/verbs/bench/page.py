@@ -36,7 +36,12 @@ PICTURE_PX, PATCH_PX, QUALITY = 560, 220, 82
 
 
 def page(report: BenchReport, plan: Plan) -> str:
-    """Returns the whole page as HTML text. Names from configs are escaped, and the page has no scripts."""
+    """Returns the page of a benchmark as HTML text. Names from configs are escaped, and the page has no scripts.
+
+    Args:
+        report: results of the benchmark.
+        plan: plan of the benchmark, which has the config and the folders of pictures.
+    """
     facts = report.facts
     counts = plan.config.samples
     where = f"{len(facts['scenes'])} scene{'s' * (len(facts['scenes']) > 1)}, {', '.join(facts['weathers'])}"

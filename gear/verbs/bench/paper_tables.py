@@ -72,13 +72,23 @@ class PaperTable:
 
 
 def paper_tables(report: BenchReport) -> list[PaperTable]:
-    """Returns Table 1, Table 2, and Table 2 for adaptive patches; tables without any number are left out."""
+    """Returns the tables of the CARLA-GeAR paper for a benchmark: Table 1, Table 2, and Table 2 for adaptive patches;
+    tables without any number are left out.
+
+    Args:
+        report: results of the benchmark.
+    """
     found = [_detection(report), _defense(report, PATCH, "table2"), _defense(report, ADAPTIVE, "table2-adaptive")]
     return [table for table in found if any(cell.text for line in table.lines for cell in line.cells)]
 
 
 def scenes_of(report: BenchReport) -> list[str]:
-    """Returns the names of scenes in the order of the datasets of a pool; with several weathers, scene and weather."""
+    """Returns the names of the scenes of a benchmark in the order of the datasets of a pool; with several weathers,
+    scene and weather.
+
+    Args:
+        report: results of the benchmark.
+    """
     weathers = report.facts["weathers"]
     several = len(weathers) > 1
     return [f"{scene} {weather}" if several else scene for scene in report.facts["scenes"] for weather in weathers]
@@ -99,8 +109,15 @@ def row_of(one: Result, patch: str, place: int) -> RowReport | None:
 
 
 def auroc_of(one: Result, patch: str, place: int) -> float | None:
-    """Returns the AUROC of a defense's score in one scene, of pictures with a patch against those without one; None
-    without scores.
+    """Returns the AUROC of a defense's score in one scene, of pictures with a patch against those without one.
+
+    Args:
+        one: results of a network with a defense.
+        patch: kind of patch, such as `patch` or `random`.
+        place: position of the scene (with its weather) in the benchmark.
+
+    Returns:
+        The area in 0..1; None without scores or without one of the two datasets.
     """
     here, there = row_of(one, patch, place), row_of(one, NO_PATCH, place)
     if here is None or there is None:

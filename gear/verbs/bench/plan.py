@@ -125,7 +125,12 @@ class Plan:
                 yield self.evaluation(planned)
 
     def planned_evaluations(self, task_plugins: TaskPlugins) -> Iterator[PlannedEvaluation]:
-        """Yields one evaluation per network of a task without a defense, and one per network and defense."""
+        """Yields the evaluations of a task: one per network without a defense, and one per network and defense. Nothing
+        is run.
+
+        Args:
+            task_plugins: networks and defenses of the task.
+        """
         for model in task_plugins.models:
             for defense in task_plugins.guards:
                 shown = {NO_PATCH: NO_PATCH, RANDOM: RANDOM, PATCH: model.label}
@@ -162,26 +167,42 @@ class Plan:
         return self._place(task_plugins, scene) / weather.label / kind
 
     def patch(self, task_plugins: TaskPlugins, scene: Scene, name: str) -> Path:
-        """Returns the folder of the patches that were optimised in a scene; `name` is a network, or a network with
-        a defense.
+        """Returns the folder of the patches that were optimised in a scene.
+
+        Args:
+            task_plugins: networks and defenses of the task.
+            scene: the scene.
+            name: name of the attacked network, or of a network with a defense, as `Plan.name` returns it.
         """
         return self._root / "patches" / task_plugins.folder / name / scene.label
 
     def adaptive_defenses(self, task_plugins: TaskPlugins) -> tuple[Candidate | None, ...]:
-        """Returns the defenses that attacks on a network take into account; None stands for the attack on the
-        network alone.
+        """Returns the defenses that attacks on a network take into account; None stands for the attack on the network
+        alone.
 
         Defenses are included only if the config asks for adaptive patches, and only those that support the attack.
+
+        Args:
+            task_plugins: networks and defenses of the task.
         """
         return (None, *(defense for defense in task_plugins.defenses if self._is_adaptive(defense)))
 
     @staticmethod
     def name(model: Candidate, defense: Candidate | None) -> str:
-        """Returns the name of a network with its defense, `<network>+<defense>`, for tables, folders and patches."""
+        """Returns the name of a network with its defense, `<network>+<defense>`, for tables, folders and patches.
+
+        Args:
+            model: the network.
+            defense: the defense; None for the network alone, whose name is `<network>`.
+        """
         return model.label if defense is None else f"{model.label}+{defense.label}"
 
     def picture_settings(self, task_plugins: TaskPlugins) -> tuple[str, ...]:
-        """Returns the `KEY=VALUE` settings that all collections of a task share."""
+        """Returns the `KEY=VALUE` settings that all collections of a task share.
+
+        Args:
+            task_plugins: networks and defenses of the task.
+        """
         return (*settings_of(self.config.collect), *settings_of(self.config.tasks[task_plugins.name].collect))
 
     def seed(self, purpose: str) -> int:
@@ -313,7 +334,11 @@ class Plan:
         )
 
     def evaluation(self, planned: PlannedEvaluation) -> Step:
-        """Returns the step that measures a network, alone or behind a defense, on all of its datasets."""
+        """Returns the step that measures a network, alone or behind a defense, on all of its datasets.
+
+        Args:
+            planned: network, defense and datasets of the evaluation.
+        """
         return Step(
             verb="evaluate",
             title=f"evaluate {self.name(planned.model, planned.defense)} in {planned.task_plugins.name}",
@@ -346,6 +371,9 @@ class Plan:
 def reports_of(task_plugins: TaskPlugins) -> tuple[str, ...]:
     """Returns the names of the metric reports that the tables need: the report with the task's main metric, and
     `outside_patch`.
+
+    Args:
+        task_plugins: networks and defenses of the task.
     """
     product = build(find("task", task_plugins.name))
     metric_report, dot, _ = task_plugins.task.metric.partition(".")

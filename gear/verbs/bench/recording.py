@@ -115,7 +115,12 @@ def _record(
 
 
 def guard_of(plan: Plan, planned: PlannedEvaluation) -> Guard | None:
-    """The defense of an evaluation with its calibration data; None for a network alone."""
+    """The defense of an evaluation with its calibration data; None for a network alone.
+
+    Args:
+        plan: plan of the benchmark.
+        planned: the evaluation.
+    """
     arguments = plan.evaluation(planned).arguments
     return Guard.of(
         arguments.get("defense"),
@@ -130,6 +135,10 @@ def reduced(plan: Plan, planned: PlannedEvaluation) -> Json:
 
     Paths keep only their last part: a town's file becomes its name, a scene of a file the bare name of the scene. Who
     checks the record says where such files are on his machine.
+
+    Args:
+        plan: plan of the benchmark.
+        planned: the evaluation whose network and defense are kept.
     """
     config = _nameless(to_plain(plan.config))
     config["tasks"] = {
@@ -163,7 +172,11 @@ def _nameless(value: Json, key: str = "") -> Json:
 
 
 def plugin_facts(chosen: Chosen, weights_sha256: str | None = None) -> Plugin:
-    """The facts about a plugin for a record.
+    """Name, package, version, options and hashes of a plugin, for a record.
+
+    Args:
+        chosen: the plugin with its options.
+        weights_sha256: SHA-256 of the network's weights; None for plugins without weights.
 
     Raises:
         FieldError: an option cannot be part of a record.
@@ -204,6 +217,12 @@ def _entry(task: TaskResult, one: Result, planned: PlannedEvaluation, kind: Kind
 def is_random(planned: PlannedEvaluation, guard: Guard | None, dataset: Dataset[Any], seed: int) -> bool:
     """Whether a defense gives another result for the first sample of a dataset if its random generator has another
     state.
+
+    Args:
+        planned: the evaluation.
+        guard: the defense with its calibration data; None for the network alone, which is not random.
+        dataset: dataset whose first sample is used.
+        seed: seed of the defense.
     """
     if guard is None:
         return False

@@ -52,7 +52,12 @@ class Metric:
 
     @classmethod
     def of(cls, metric: str, *, lower_is_better: bool) -> Metric:
-        """Parses the name of a metric, such as `miou`, or with its report, such as `reference.car_bev_moderate_r40`."""
+        """Parses the name of a metric, such as `miou`, or with its report, such as `reference.car_bev_moderate_r40`.
+
+        Args:
+            metric: the name.
+            lower_is_better: whether smaller values are better, as for errors.
+        """
         report, dot, name = metric.rpartition(".")
         return cls(report=report if dot else TASK, name=name, lower_is_better=lower_is_better)
 
@@ -147,10 +152,15 @@ class TaskResult:
         return None if self.metric is None or one is None else self.metric.among(one.metrics)
 
     def outside_patch(self, one: Difference | None) -> tuple[str, PairedTest] | None:
-        """Returns the paired test over single samples, with the name of the tested metric.
+        """Returns the paired test over single samples of a comparison of two datasets.
 
-        If the task supports the report `outside_patch`, the metric excludes the pixels of the patch. None if nothing
-        was tested.
+        If the task supports the report `outside_patch`, the tested metric excludes the pixels of the patch.
+
+        Args:
+            one: the comparison; None if there is none.
+
+        Returns:
+            The title of the tested metric, and the test; None if nothing was tested.
         """
         if one is None:
             return None

@@ -213,6 +213,9 @@ def _csv(columns: Sequence[str], records: Iterable[Mapping[str, Any]]) -> bytes:
 def prepared(request: BenchRequest) -> Plan:
     """Reads and checks a bench config and returns its plan; nothing is written.
 
+    Args:
+        request: the arguments of `gear.bench`.
+
     Raises:
         GearError: something in the config does not exist, does not fit, or cannot be read.
     """

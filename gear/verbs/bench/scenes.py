@@ -38,6 +38,10 @@ class Scene:
 def measured_scenes(config: BenchConfig, node: Node) -> tuple[Scene, ...]:
     """Returns all scenes in which networks are measured, in the order of the config.
 
+    Args:
+        config: the bench config.
+        node: the YAML nodes of the config, for positions in error messages.
+
     Raises:
         ConfigError: a town or a scene is unknown, a scene has no surface for patches, or a scene is named twice.
     """
@@ -58,6 +62,11 @@ def measured_scenes(config: BenchConfig, node: Node) -> tuple[Scene, ...]:
 
 def calibration_scene(config: BenchConfig, node: Node, measured: tuple[Scene, ...]) -> Scene | None:
     """Returns the scene in which defenses are calibrated; None if the config names none.
+
+    Args:
+        config: the bench config.
+        node: the YAML nodes of the config, for positions in error messages.
+        measured: scenes in which networks are measured.
 
     Raises:
         ConfigError: the scene is unknown, has no surface for patches, or is one of the measured scenes.
@@ -99,6 +108,10 @@ def _surfaces(scene: SceneSpec) -> int:
 def place_of(node: Node, *path: str) -> Place:
     """Returns the position (file and line) of a key in the config file; if the key is missing, that of the nearest
     existing key above.
+
+    Args:
+        node: the YAML nodes of the config.
+        *path: keys from the outermost to the innermost, such as `"places", "town10"`.
     """
     place = node.place
     for key in path:
@@ -109,5 +122,11 @@ def place_of(node: Node, *path: str) -> Place:
 
 
 def located(node: Node, error: GearError, *path: str) -> GearError:
-    """Returns the error with the position in the config file (file and line) of the key that `path` names."""
+    """Returns the error with the position in the config file (file and line) of the key that `path` names.
+
+    Args:
+        node: the YAML nodes of the config.
+        error: the error without a position.
+        *path: keys from the outermost to the innermost, such as `"places", "town10"`.
+    """
     return place_of(node, *path).error(".".join(path), str(error))

@@ -142,7 +142,13 @@ def sweep(
 
 
 def sweep_of(request: BenchRequest) -> tuple[Sweep | None, int]:
-    """Returns the swept key of a config, None if it sweeps none, and the config's seed.
+    """Reads which key of a bench config takes several values (a sweep).
+
+    Args:
+        request: the arguments of `gear.bench`.
+
+    Returns:
+        The swept key with its values, None if the config sweeps none; and the config's seed.
 
     Raises:
         ConfigError: the config cannot be read.

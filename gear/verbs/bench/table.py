@@ -29,7 +29,11 @@ ALONE = "-"
 
 
 def text(report: BenchReport) -> str:
-    """Returns the tables of all tasks as text, followed by a legend and notes."""
+    """Returns the tables of all tasks as text, followed by a legend and notes.
+
+    Args:
+        report: results of the benchmark.
+    """
     parts = ["\n".join([title(task), *number_table(columns(task))]) for task in report.tasks]
     return "\n\n".join([*parts, "\n".join([legend(), *report.facts["notes"]])]) + "\n"
 

@@ -111,6 +111,9 @@ KEYS = ("mean_s", "std_s", "median_s")
 def measures_times(request: BenchRequest) -> bool:
     """Whether a config has the key `times`, and therefore measures times of collections instead of networks.
 
+    Args:
+        request: the arguments of `gear.bench`.
+
     Raises:
         ConfigError: there is no such config.
     """
@@ -121,6 +124,9 @@ def measures_times(request: BenchRequest) -> bool:
 def times_of(request: BenchRequest) -> Times:
     """Reads a config with the key `times`.
 
+    Args:
+        request: the arguments of `gear.bench`.
+
     Raises:
         ConfigError: the config cannot be read.
     """
@@ -129,7 +135,12 @@ def times_of(request: BenchRequest) -> Times:
 
 
 def steps_of(config: Times, root: Path) -> Iterator[tuple[str, Step]]:
-    """Yields the name and the step of every collection."""
+    """Yields the name of every collection whose time is measured, and the step that makes it; nothing is run.
+
+    Args:
+        config: tasks, number of seeds, scene and number of samples.
+        root: folder of the benchmark; the data go into `data/<name>`.
+    """
     for task in config.tasks:
         for seed in range(config.seeds):
             name = f"{task.replace('/', '-')}-seed{seed}"
@@ -211,7 +222,15 @@ def _write(report: TimesReport) -> None:
 
 
 def times_chart(records: Sequence[Json], form: str) -> bytes:
-    """Draws mean seconds per sample as bars with standard deviations; PDF or SVG bytes."""
+    """Draws mean seconds per sample as bars with standard deviations, one bar per task.
+
+    Args:
+        records: one mapping per task with the keys `task`, `mean_s` and `std_s`.
+        form: `pdf` or `svg`.
+
+    Returns:
+        The bytes of the file.
+    """
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -98,6 +98,10 @@ def collect(
 def run_collect(request: CollectRequest, callbacks: Callbacks) -> CollectReport:
     """Collects a split with the arguments in `request`, which `gear.collect` describes.
 
+    Args:
+        request: the arguments.
+        callbacks: callbacks that receive progress and warnings.
+
     Raises:
         GearError: an error that the user can correct; the message is one line.
     """

@@ -93,7 +93,12 @@ def defend(
 
 
 def run_defend(request: DefendRequest, callbacks: Callbacks) -> DefendReport:
-    """Cleans a dataset with the arguments in `request`, which `gear.defend` describes.
+    """Cleans the pictures of a dataset with the arguments in `request`, which `gear.defend` describes; samples that an
+    earlier run has cleaned are kept.
+
+    Args:
+        request: the arguments.
+        callbacks: callbacks that receive progress and warnings.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.
@@ -139,6 +144,10 @@ def run_defend(request: DefendRequest, callbacks: Callbacks) -> DefendReport:
 
 def suitable(plugin: PluginEntry, task: str) -> DefenseSpec[Any]:
     """Returns the spec of a defense after checking that the defense needs nothing but pictures.
+
+    Args:
+        plugin: plugin of the defense.
+        task: name of the dataset's task.
 
     Raises:
         GearError: the defense is not for the task, or needs a model or calibration data.

@@ -201,6 +201,15 @@ def compared(here: Sequence[DriveResult], there: Sequence[DriveResult], other: s
 
     McNemar's test in its exact form: of the situations in which only one of the twins crashed, each is equally likely
     to be either's (McNemar, Psychometrika 1947).
+
+    Args:
+        here: drives of one twin.
+        there: drives of the other twin.
+        other: name of the other twin.
+
+    Returns:
+        Numbers of the pairs, the p value of the test, and the mean differences of braking delay and score, first twin
+        minus other twin.
     """
     from scipy import stats
 

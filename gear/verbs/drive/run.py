@@ -101,7 +101,10 @@ def drive(
 
 
 def prepared(request: DriveRequest) -> Drives:
-    """Reads the config and looks up everything that it names, before the first drive.
+    """Reads the config and looks up everything that it names; nothing is driven.
+
+    Args:
+        request: the arguments of `gear.drive`.
 
     Raises:
         GearError: something in the config does not exist, does not fit, or cannot be read.
@@ -113,7 +116,12 @@ def prepared(request: DriveRequest) -> Drives:
 
 
 def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
-    """Runs a study with the arguments in `request`, which `gear.drive` describes.
+    """Runs a study with the arguments in `request`, which `gear.drive` describes. Results and pages are written into
+    the folder `request.out`; finished drives are not repeated.
+
+    Args:
+        request: the arguments.
+        callbacks: callbacks that receive progress and warnings.
 
     Raises:
         GearError: an error that the user can correct, or a drive could not be made; the message is one line.

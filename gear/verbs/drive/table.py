@@ -33,12 +33,21 @@ def legend() -> str:
 
 
 def cells(report: DriveReport) -> list[list[str]]:
-    """The cells of the main table, titles first."""
+    """The cells of the main table of a study: the titles, and one row per driver and twin.
+
+    Args:
+        report: results of the study.
+    """
     return [TITLES, *(_cells(row) for row in report.rows())]
 
 
 def speed_cells(report: DriveReport) -> list[list[str]]:
-    """The cells of the table by speed, titles first; drives on free roads are left out."""
+    """The cells of the table by speed: the titles, and one row per driver, twin and speed; drives on free roads are
+    left out.
+
+    Args:
+        report: results of the study.
+    """
     rows = [
         [row.driver, row.twin, f"{row.speed_kmh:g}", str(row.crashes.total), rate(row.crashes), _kmh(row.impact_mps),
          f"{row.score:.2f}"] for row in report.by_speed()
@@ -71,7 +80,7 @@ def _cells(row: Row) -> list[str]:
 
 
 def rate(value: Rate) -> str:
-    """A share with its interval, in percent: `20 % [4, 48]`."""
+    """The share `value` with its interval, in percent: `20 % [4, 48]`; empty without drives."""
     if value.interval is None:
         return ""
     low, high = value.interval
@@ -79,7 +88,7 @@ def rate(value: Rate) -> str:
 
 
 def share(value: Rate) -> str:
-    """A share in percent."""
+    """The share `value` in percent; empty without drives."""
     return "" if value.interval is None else f"{100 * value.value:.0f} %"
 
 

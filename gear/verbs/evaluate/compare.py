@@ -80,12 +80,19 @@ def streets_of(dataset: Dataset[Any]) -> list[Street]:
     """Returns for each sample an identifier of the scene content that it shows (its street).
 
     Weather, renderer and patch are not part of the identifier, because the positions of cars do not depend on them.
+
+    Args:
+        dataset: the dataset.
     """
     return [(*scenes_of(dataset), number) for number in range(len(dataset))]
 
 
 def row_report(row: EvaluatedDataset) -> RowReport:
-    """Returns the results of one dataset: metrics with intervals, times, and the scores of single samples."""
+    """Returns the results of one dataset: metrics with intervals, times, and the scores of single samples.
+
+    Args:
+        row: the evaluated dataset.
+    """
     results = row.results
     plan = row.dataset.plan
     return RowReport(
@@ -114,7 +121,11 @@ def row_report(row: EvaluatedDataset) -> RowReport:
 
 
 def mean_cost(results: Sequence[SampleResult]) -> dict[str, float]:
-    """Returns the mean seconds per sample of the model (`model_s`) and of the defense (`defense_s`)."""
+    """Returns the mean seconds per sample of the model (`model_s`) and of the defense (`defense_s`).
+
+    Args:
+        results: results of the samples.
+    """
     return {key: float(np.mean([result.cost[key] for result in results])) for key in ("model_s", "defense_s")}
 
 
@@ -136,8 +147,11 @@ def mask_means(results: Sequence[SampleResult], *, has_patch: bool) -> dict[str,
 
 
 def drive_note(dataset: Dataset[Any]) -> str | None:
-    """Returns a warning if the samples are frames of sequences, because intervals and tests treat them as
-    independent; otherwise None.
+    """Returns a warning if the samples are frames of sequences, because intervals and tests treat them as independent;
+    otherwise None.
+
+    Args:
+        dataset: the dataset.
     """
     last = dataset.sidecar(-1).record
     if not last.frame:
@@ -150,8 +164,11 @@ def drive_note(dataset: Dataset[Any]) -> str | None:
 
 
 def together(rows: Sequence[EvaluatedDataset]) -> Iterable[CombinedRow]:
-    """Combines datasets of several scenes or weathers that have patches with the same label, and yields one result
-    per label.
+    """Combines datasets of several scenes or weathers that have patches with the same label, and yields one result per
+    label.
+
+    Args:
+        rows: all evaluated datasets.
     """
     labelled: dict[str, list[EvaluatedDataset]] = {}
     for row in rows:
@@ -169,7 +186,14 @@ def together(rows: Sequence[EvaluatedDataset]) -> Iterable[CombinedRow]:
 
 
 def metrics_of(row: EvaluatedDataset) -> dict[str, dict[str, Estimate]]:
-    """Returns the metrics over all samples with their 95 % intervals, by report and name."""
+    """Returns the metrics over all samples of a dataset with their 95 % intervals.
+
+    Args:
+        row: the evaluated dataset.
+
+    Returns:
+        The metrics by name of the report and name of the metric.
+    """
     metrics = {}
     for report in row.scorer.reports:
         one = row.gathered(report)
@@ -181,7 +205,13 @@ def metrics_of(row: EvaluatedDataset) -> dict[str, dict[str, Estimate]]:
 
 
 def as_one(name: str, members: Sequence[EvaluatedDataset]) -> EvaluatedDataset:
-    """Combines several datasets into one with the given name; its other properties are those of the first dataset."""
+    """Combines several evaluated datasets into one; its other properties, such as task and reports, are those of the
+    first dataset.
+
+    Args:
+        name: name of the new row.
+        members: the datasets.
+    """
     results = [result for row in members for result in row.results]
     streets = [street for row in members for street in row.streets]
     return replace(members[0], name=name, results=results, streets=streets, known={})

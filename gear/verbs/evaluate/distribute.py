@@ -52,7 +52,16 @@ class Predicted:
 def measure_dataset(
     request: EvaluateRequest, dataset: Dataset[Any], name: str, guarded: GuardedModel, done: SampleDone
 ) -> EvaluatedDataset:
-    """Runs the model over one dataset, and returns the scores of its samples."""
+    """Runs the model over one dataset, stores the results of its samples, and returns them; stored results of an
+    earlier run are read.
+
+    Args:
+        request: the arguments of `gear.evaluate`.
+        dataset: the opened split.
+        name: name of the dataset's row, which is also the name of its folder of results.
+        guarded: the model with its defense.
+        done: called without arguments after each sample, when its files are written.
+    """
     scorer = Scorer(dataset, request.folder(dataset.plan.task["name"]), name, request.reports, guarded.plugin)
     batch = request.batch or guarded.usual_batch(dataset)
     row = evaluate_row(dataset, scorer, guarded, batch=batch, workers=request.workers, done=done)
@@ -69,7 +78,13 @@ def measure_dataset(
 
 
 def store_fit(root: Path, guarded: GuardedModel) -> None:
-    """Stores the report of the defense on its calibration for later runs, which need no calibration."""
+    """Writes the report of the defense on its calibration, for later runs in which the defense is not calibrated again;
+    does nothing without such a report.
+
+    Args:
+        root: folder of the evaluation.
+        guarded: the model with its defense.
+    """
     report = guarded.fit_report()
     if report is not None:
         facts: Json = {"values": known_json(report.values), "problems": list(report.problems)}

@@ -14,7 +14,11 @@ PAGE = "report.html"
 
 
 def page(report: EvaluateReport) -> str:
-    """Returns the page as HTML text; the pictures are files next to the page."""
+    """Returns the page of an evaluation as HTML text; its pictures are files next to the page.
+
+    Args:
+        report: results of the evaluation.
+    """
     labels = row_labels(report.rows)
     sheets = {row.name: row.pictures for row in report.rows if row.pictures is not None}
     head, *lines = table_cells(report)

@@ -108,6 +108,13 @@ def most_changed(here: Sequence[SampleResult], there: Sequence[SampleResult]) ->
 
     For tasks with objects the change is the number of changed objects. Otherwise, and among equals, it is the absolute
     change of the task's first metric that is defined for single samples.
+
+    Args:
+        here: results of the dataset, in order of the samples.
+        there: results of its twin, in the same order.
+
+    Returns:
+        The results of `here`, sorted.
     """
     pairs = list(zip(here, there, strict=False))
     return [result for result, _ in sorted(pairs, key=lambda pair: _change(*pair), reverse=True)]

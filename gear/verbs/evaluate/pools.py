@@ -21,6 +21,10 @@ Pools = Mapping[str, Sequence[str | Path]]
 def check_pools(pools: Pools, roots: Iterable[Path]) -> None:
     """Checks that every pool contains only datasets of the evaluation.
 
+    Args:
+        pools: folders of the datasets of each pool, by name.
+        roots: folders of all evaluated datasets.
+
     Raises:
         GearError: a pool is empty, contains a dataset twice, or contains a dataset that is not evaluated or is
             evaluated in several splits.

@@ -141,7 +141,12 @@ def evaluate(
 
 
 def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateReport:
-    """Runs an evaluation with the arguments in `request`, which `gear.evaluate` describes.
+    """Runs an evaluation with the arguments in `request`, which `gear.evaluate` describes. Results and pages are
+    written into the folder of the evaluation; stored results of an earlier run are used again.
+
+    Args:
+        request: the arguments.
+        callbacks: callbacks that receive progress and warnings.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.

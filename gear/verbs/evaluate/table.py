@@ -39,7 +39,11 @@ def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
 
 
 def title(report: EvaluateReport) -> str:
-    """Returns the title of the results: task, model and defense."""
+    """Returns the title of an evaluation: task, model and defense.
+
+    Args:
+        report: results of the evaluation.
+    """
     guarded = report.facts["defense"]
     text = f"{report.facts['task']['name']}: {report.facts['model']['name']}"
     return text + (f" guarded by {guarded['name']}" if guarded else "")
@@ -47,6 +51,9 @@ def title(report: EvaluateReport) -> str:
 
 def table_cells(report: EvaluateReport) -> list[tuple[str | None, list[str]]]:
     """Returns the titles and the rows of the table, without empty columns.
+
+    Args:
+        report: results of the evaluation.
 
     Returns:
         For each line its cells, preceded by the name of the dataset's row (`RowReport.name`); the name is None for the

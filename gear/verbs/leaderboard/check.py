@@ -100,7 +100,12 @@ def check_record(
 
 
 def run_check(request: CheckRequest, callbacks: Callbacks) -> Verdict:
-    """Runs a check with the arguments in `request`, which `gear.check_record` describes.
+    """Runs a check with the arguments in `request`, which `gear.check_record` describes: samples of the record are made
+    and measured again, and compared with the record.
+
+    Args:
+        request: the arguments.
+        callbacks: callbacks that receive progress and warnings.
 
     Raises:
         GearError: the record is refused, a plugin or a patch is missing, or the check would render too many pictures.
@@ -140,7 +145,12 @@ def run_check(request: CheckRequest, callbacks: Callbacks) -> Verdict:
 
 
 def summary(filed: Filed, verdict: Verdict) -> str:
-    """The verdict as text: one line per finding, and the state at the end."""
+    """The verdict as text: one line per finding, and the state at the end.
+
+    Args:
+        filed: the record with its file.
+        verdict: result of the check.
+    """
     lines = [f"{one.level}: {one.text}" for one in verdict.findings]
     return "\n".join([*lines, f"{filed.path.name}: {verdict.state}"]) + "\n"
 

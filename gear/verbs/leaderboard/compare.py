@@ -26,13 +26,23 @@ DRAWS = 9_999
 
 
 def is_same_machine(record: Record, environment: Mapping[str, str]) -> bool:
-    """Whether this machine should give the bytes of the record: same versions, renderer, driver and device."""
+    """Whether this machine should give the same bytes as the machine of the record: same versions, renderer, driver and
+    device.
+
+    Args:
+        record: the record.
+        environment: values of this machine, by the same keys as `record.environment`.
+    """
     keys = [key for key in record.environment if key in DECIDING or key.startswith("renderer.")]
     return all(record.environment[key] == environment.get(key) for key in keys)
 
 
 def compare_plugins(rerun: Rerun) -> Iterator[Finding]:
-    """Yields one finding for each fact in which the installed plugins differ from those of the record."""
+    """Yields one finding for each fact in which the installed plugins differ from those of the record.
+
+    Args:
+        rerun: the record with the plugins that are installed here.
+    """
     for role, there, here in rerun.installed():
         if there.identity[:2] != here.identity[:2] or there.options != here.options:
             yield finding("differs", f"{role}: {there.name} in the record, but its config names {here.name} otherwise")
@@ -92,6 +102,11 @@ def compare_fresh(record: Record, fresh: Sequence[Again], seed: int) -> Iterator
 
     The metric of single samples, and the defense's score, should be distributed as in the record. A defense that
     recognises the pictures of the benchmark does worse on other pictures.
+
+    Args:
+        record: the record.
+        fresh: fresh samples, measured here.
+        seed: seed of the statistical test.
     """
     for patch in dict.fromkeys(one.patch for one in fresh):
         here = [one for one in fresh if one.patch == patch]

@@ -41,7 +41,14 @@ LEGEND = (
 
 
 def index_page(tables: Sequence[Table], refused: Sequence[str], commitment: str | None) -> str:
-    """Returns the main page: for each benchmark and task the defenses, the attacks, and the attacks by knowledge."""
+    """Returns the main page of a leaderboard as HTML text: for each benchmark and task the defenses, the attacks, and
+    the attacks by knowledge.
+
+    Args:
+        tables: one table per benchmark and task.
+        refused: one line for each file that is no valid record.
+        commitment: salted hash of the withheld scenes; None if there are none.
+    """
     parts = [f'<p class="dim">{_safe(LEGEND)}</p>']
     if commitment is not None:
         parts.append(f'<p class="dim">Salted hash of the withheld scenes: {_safe(commitment)}</p>')
@@ -57,7 +64,12 @@ def index_page(tables: Sequence[Table], refused: Sequence[str], commitment: str 
 
 
 def record_page(filed: Filed, verdict: Verdict | None) -> str:
-    """Returns the page of one record: what it claims, and what the check found."""
+    """Returns the page of one record as HTML text: what it claims, and what the check found.
+
+    Args:
+        filed: the record with its file.
+        verdict: result of the check; None if nobody has checked the record.
+    """
     record = filed.record
     entry = record.entry
     facts = [

@@ -116,6 +116,12 @@ class Rerun:
     def guarded(self, *, with_defense: bool = True) -> GuardedModel:
         """The network behind its defense, or alone; the defense is calibrated on data that are made again.
 
+        Args:
+            with_defense: whether the record's defense is used; otherwise the network is returned alone.
+
+        Returns:
+            The model; it is built once and used again.
+
         Raises:
             GearError: a patch of the calibration is missing, or a plugin fails.
         """
@@ -138,6 +144,14 @@ class Rerun:
     def again(self, patch: str, place: int, indices: Sequence[int]) -> list[Again]:
         """Makes samples of one dataset of the benchmark again and measures them.
 
+        Args:
+            patch: kind of patch, such as `none` or `adaptive patch`.
+            place: number of the (scene, weather) pair in the benchmark.
+            indices: indices of the samples.
+
+        Returns:
+            One entry per sample, in the order of `indices`.
+
         Raises:
             GearError: a sample cannot be made, or a plugin fails.
         """
@@ -147,6 +161,13 @@ class Rerun:
 
     def fresh(self, patch: str, place: int, count: int, seed: int, *, with_defense: bool = True) -> list[Again]:
         """Makes samples with another seed, which are not part of the benchmark, and measures them.
+
+        Args:
+            patch: kind of patch, such as `none` or `adaptive patch`.
+            place: number of the (scene, weather) pair in the benchmark.
+            count: number of samples.
+            seed: seed of the samples.
+            with_defense: whether the record's defense is used.
 
         Raises:
             GearError: a sample cannot be made, or a plugin fails.
@@ -161,6 +182,9 @@ class Rerun:
 
     def elsewhere(self, settings: Sequence[str]) -> Rerun:
         """The same benchmark in other places, with the patches of the benchmark's first scene.
+
+        Args:
+            settings: `KEY=VALUE` settings of the bench config that name the other places.
 
         Raises:
             GearError: a place does not exist, or has more surfaces than the first scene.

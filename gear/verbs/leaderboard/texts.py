@@ -39,7 +39,12 @@ def shown(figure: Figure | None) -> str:
 
 
 def defense_cells(row: Row, rank: int | None) -> list[str]:
-    """The cells of a row in the table of defenses."""
+    """The cells of one row in the table of defenses.
+
+    Args:
+        row: the records of one network with one defense.
+        rank: position in the table, from 1; None for rows that are not ranked.
+    """
     record = row.first.record
     auroc = record.figure(ADAPTIVE, "auroc") or record.figure(PATCH, "auroc")
     lowest = "" if row.worst is None else f"{shown(row.worst[0])} {_origin(row)}"

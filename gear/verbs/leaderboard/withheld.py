@@ -54,6 +54,10 @@ class Withheld:
 def read_withheld(path: Path, commitment: str | None = None) -> Withheld:
     """Reads a file with withheld scenes, and compares it with the published hash.
 
+    Args:
+        path: the JSON file.
+        commitment: the published salted hash; None if it is not to be compared.
+
     Raises:
         DatasetError: the file cannot be read, or is not of this form.
         GearError: the file is not the one that the hash was computed from.

@@ -66,7 +66,14 @@ class Canvas:
         return np.asarray(cv2.resize(self._pixels, self.size_px, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
     def to_px(self, points_m: npt.ArrayLike) -> Points:
-        """Converts (N, 2 or more) positions in the world to (N, 2) pixels; further columns are ignored."""
+        """Converts positions in the world to pixels of the canvas.
+
+        Args:
+            points_m: (N, 2 or more) positions in metres; columns after x and y are ignored.
+
+        Returns:
+            (N, 2) pixels, x to the right and y down.
+        """
         points = np.atleast_2d(np.asarray(points_m, dtype=np.float64))[:, :2]
         return np.asarray(self._origin_px + points * (self.px_per_m, -self.px_per_m))
 
@@ -145,8 +152,11 @@ class Canvas:
         return np.zeros(self._pixels.shape[:2], np.uint8)
 
     def fill_triangles(self, mask: Mask, triangles_m: Points) -> None:
-        """Sets the pixels of a mask inside (N, 3, 2) triangles, given in metres in the world; the mask is changed
-        in place.
+        """Sets the pixels of a mask inside triangles to 255; the mask is changed in place.
+
+        Args:
+            mask: (H, W) mask of the size of the canvas.
+            triangles_m: (N, 3, 2) corners in metres in the world.
         """
         for triangle in _fixed_many(self.to_px(triangles_m.reshape(-1, 2))).reshape(-1, 3, 2):
             cv2.fillConvexPoly(mask, triangle, 255, cv2.LINE_8, SHIFT)
@@ -181,7 +191,11 @@ class Canvas:
         return np.asarray(moved, dtype=np.uint8)
 
     def clip(self, paper: Colour) -> None:
-        """Erases everything outside the part of the picture that the map covers."""
+        """Fills everything outside the part of the picture that the map covers.
+
+        Args:
+            paper: colour of the margins.
+        """
         left, top, right, bottom = (round(value * OVERSAMPLING) for value in self.box_px)
         inside = self._pixels[top:bottom, left:right].copy()
         self._pixels[:] = paper

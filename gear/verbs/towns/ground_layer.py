@@ -67,6 +67,9 @@ class TownGeometry:
     def of(path: Path) -> TownGeometry:
         """Compiles the MJCF file of a town.
 
+        Args:
+            path: the MJCF file.
+
         Raises:
             TownError: MuJoCo cannot compile the file, or a visible geom has no label.
         """
@@ -126,7 +129,11 @@ class Obstacle:
 
 
 def obstacles(geometry: TownGeometry) -> list[Obstacle]:
-    """Returns the collision geoms of a town that are not ground."""
+    """Returns the collision geoms of a town that are not ground.
+
+    Args:
+        geometry: the compiled town.
+    """
     found = []
     for geom in np.flatnonzero(geometry.model.geom_group >= FIRST_HIDDEN_GROUP):
         is_plane = geometry.model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE

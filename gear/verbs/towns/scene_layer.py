@@ -136,8 +136,12 @@ def _overlap_px2(first: Box, second: Box) -> float:
 
 
 def limits_outline_m(board: BoardSpec, limits: NpcLimits) -> Array | None:
-    """Returns the (4, 2) corners in the world of an area that is defined relative to a board; None if the area is
-    not relative to a board.
+    """Returns the (4, 2) corners in the world of an area that is defined relative to a board; None if the area is not
+    relative to a board.
+
+    Args:
+        board: the board (billboard) to which the area is relative.
+        limits: where vehicles or people may stand; bounds that are not given are 10 km away.
     """
     if not limits.needs_board:
         return None

@@ -63,7 +63,7 @@ class TrainingState:
 
     @staticmethod
     def from_json(value: Json) -> TrainingState:
-        """Reads the JSON that `as_json` returned.
+        """Reads a state from the JSON `value` that `as_json` returned.
 
         Raises:
             ValueError, KeyError, TypeError: a field that a training needs to continue is missing or invalid, or there

@@ -61,7 +61,13 @@ class RunningMean:
 
     @torch.no_grad()
     def update(self, module: nn.Module, step: int) -> None:
-        """Adds the current weights to the average; `step` is the number of the step, counted from 0."""
+        """Adds the current weights to the average; the first steps have more weight, so the average soon forgets the
+        initial weights.
+
+        Args:
+            module: the trained network.
+            step: number of the step, counted from 0.
+        """
         decay = min(self.decay, (1 + step) / (10 + step))
         newest = module.state_dict()
         moving = [key for key, value in newest.items() if value.is_floating_point()]
@@ -97,7 +103,13 @@ class Buffers:
 
 
 def clip_gradients(module: nn.Module, max_norm: float) -> Tensor:
-    """Scales the gradients to a total norm of at most `max_norm` (0 means no limit) and returns the norm before
-    scaling.
+    """Scales the gradients of all parameters, in place, to a total norm of at most `max_norm`.
+
+    Args:
+        module: the network after the backward pass.
+        max_norm: largest norm; 0 means no limit.
+
+    Returns:
+        The norm before scaling.
     """
     return nn.utils.clip_grad_norm_(module.parameters(), max_norm if max_norm > 0 else math.inf)

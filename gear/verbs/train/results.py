@@ -63,7 +63,11 @@ class Origin:
     picture_share: float
 
     def metadata(self, metrics: AnyMapping[str, Any]) -> dict[str, str]:
-        """Returns the metadata of the weights file; all values are texts, structured values are JSON texts."""
+        """Returns the metadata of the weights file; all values are texts, structured values are JSON texts.
+
+        Args:
+            metrics: metrics of the last or best validation, by name.
+        """
         data = {"training": self.training.facts(), "validation": self.validation.facts()}
         return {
             "model": self.model.spec.name,
@@ -133,8 +137,12 @@ def packed(origin: Origin, state: AnyMapping[str, Tensor], progress: TrainingSta
 
 
 def write_weights(root: Path, weights: bytes) -> None:
-    """Writes the weights file. Files that describe earlier weights are deleted first and written again at the end
-    of the training.
+    """Writes the weights file. Files that describe earlier weights are deleted first and written again at the end of
+    the training.
+
+    Args:
+        root: folder of the training.
+        weights: content of the weights file (safetensors).
     """
     remove_files(root, [CARD, HISTORY, CURVES])
     write_whole(root, WEIGHTS, weights)

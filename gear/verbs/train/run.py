@@ -198,6 +198,10 @@ def run_train(request: TrainRequest, callbacks: Callbacks, on_step: OnStep | Non
 def with_progress(on_step: OnStep | None, callbacks: Callbacks) -> OnStep:
     """Returns a step callback that also reports the progress; with a time budget, the number of all steps is an
     estimate.
+
+    Args:
+        on_step: the callback of the caller; None if it gave none.
+        callbacks: callbacks that receive the numbers of finished and of all steps.
     """
 
     def report(state: TrainingState, share: float, metrics: dict[str, float] | None) -> None:
@@ -253,6 +257,10 @@ def _origin(request: TrainRequest, callbacks: Callbacks) -> Origin:
 
 def trainable(plugin: PluginEntry, task: str) -> Any:
     """Returns the recipe (default hyperparameters) of a network, after checking that it can be trained for a task.
+
+    Args:
+        plugin: plugin of the network.
+        task: name of the task.
 
     Raises:
         GearError: the network is for other tasks, or cannot be trained.

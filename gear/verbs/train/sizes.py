@@ -57,8 +57,12 @@ def picture_scale(plugin: PluginEntry, config: TrainConfig, samples: Samples) ->
 
 
 def without_empty_margins(config: TrainConfig, samples: Samples) -> TrainConfig:
-    """Returns the config with crops reduced to the size of the largest scaled picture, because larger crops would
-    only contain padding.
+    """Returns the config with crops reduced to the size of the largest scaled picture, because larger crops would only
+    contain padding.
+
+    Args:
+        config: config of the training.
+        samples: the training samples; all cameras of their datasets count.
     """
     if config.crop_px is None:
         return config

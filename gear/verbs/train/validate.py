@@ -90,7 +90,12 @@ def total(losses: Mapping[str, torch.Tensor]) -> torch.Tensor:
 
 
 def rank(metrics: Mapping[str, float], spec: TaskSpec[Any]) -> tuple[float, float]:
-    """Returns a sort key for validations, larger for better ones: first the task's metric, then the loss."""
+    """Returns a sort key for validations, larger for better ones: first the task's metric, then the loss.
+
+    Args:
+        metrics: metrics of one validation, by name, with the loss.
+        spec: spec of the task, which names the metric and says whether lower is better.
+    """
     loss = -metrics[LOSS] if metrics[LOSS] == metrics[LOSS] else -math.inf
     value = metrics.get(spec.metric, math.nan)
     if value != value:

@@ -136,6 +136,10 @@ def convert_weights(
 def check_target(target: Path, *origins: Path) -> None:
     """Checks the path of a weights file that will be written.
 
+    Args:
+        target: path of the file to write.
+        *origins: paths of the files to read.
+
     Raises:
         GearError: the path does not end in `.safetensors`, or is one of the source files.
     """
