@@ -38,7 +38,12 @@ from gear.world.world import World
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LaterFrame:
-    """The next frame of a driving sequence, without colour: its record, and the view of its first camera."""
+    """The next frame of a driving sequence, rendered without colour to compute optical flow.
+
+    Attributes:
+        record: scene record of the next frame.
+        view: depth, and ids of the road users, as the first camera sees them without its lens.
+    """
 
     record: SceneRecord
     view: FlowView
@@ -71,8 +76,15 @@ class Shot:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Session:
-    """Everything that one worker needs to make samples of a job: task, world, scene planner, renderer and camera
-    pipeline.
+    """Everything that one worker needs to make samples of a job.
+
+    Attributes:
+        job: the collection job.
+        plugin, task: plugin of the task, and the task built from it.
+        world: the compiled world of the scene.
+        planner: draws the scene record of each sample.
+        renderer: renderer of the world.
+        pipeline: camera pipeline, which turns renders into pictures.
     """
 
     job: Job
@@ -84,7 +96,9 @@ class Session:
     pipeline: CameraPipeline
 
     def record(self, index: int) -> SceneRecord:
-        """The scene record of one sample (actors, surfaces and cameras); it depends only on the job and the index."""
+        """The scene record of the sample `index` (actors, surfaces and cameras); it depends only on the job and the
+        index.
+        """
         return self.pipeline.with_effects(self.planner.plan(index))
 
     def shoot(self, record: SceneRecord) -> Shot:

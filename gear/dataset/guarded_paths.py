@@ -45,6 +45,10 @@ def parts_of(root: Path, relative: str) -> tuple[str, ...]:
 def inside(root: Path, relative: str) -> Path:
     """The path `root/relative` for reading; links are followed if they stay below the root.
 
+    Args:
+        root: folder that the path must not leave, such as the folder of a dataset.
+        relative: path with slashes, relative to the root; the file need not exist.
+
     Raises:
         DatasetError: the path is absolute, contains `..`, or leads out of the root through a link.
     """
@@ -60,6 +64,10 @@ def inside(root: Path, relative: str) -> Path:
 
 def owned(root: Path, relative: str) -> Path:
     """The path `root/relative` for writing and deleting; no component below the root may be a link.
+
+    Args:
+        root: folder that the path must not leave, such as the folder of a dataset.
+        relative: path with slashes, relative to the root; the file need not exist.
 
     Raises:
         DatasetError: the path is absolute, contains `..`, or a component is a link.
@@ -190,6 +198,10 @@ def remove_tree(root: Path, relative: str) -> None:
 
 def remove_empty_folders(root: Path, relative: str) -> None:
     """Deletes the folder `root/relative` and all folders in it, as far as they are empty; innermost folders first.
+
+    Args:
+        root: folder that no path may leave.
+        relative: path of the folder, relative to the root.
 
     Raises:
         DatasetError: a component of the path is a link.

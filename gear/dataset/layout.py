@@ -68,9 +68,12 @@ def plan_path(split: str) -> str:
 
 
 def begun_path(split: str, what: str) -> str:
-    """The path of a JSON list of files that are being written; it is deleted when all of them are complete.
+    """The path of a JSON list of files that are being written; it is deleted when all of them are complete, so after an
+    interruption it names the incomplete files.
 
-    The argument `what` is the index of a sample with 6 digits, or `indexes` for the index files of the split.
+    Args:
+        split: name of the split.
+        what: index of a sample with 6 digits, or `indexes` for the index files of the split.
     """
     return f"{split_folder(split)}/begun/{what}.json"
 

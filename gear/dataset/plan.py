@@ -211,6 +211,10 @@ def begin(root: Path, plan: Plan) -> None:
 
     An existing split can be continued if its plan is equal and has at most as many samples.
 
+    Args:
+        root: folder of the dataset.
+        plan: plan of the split.
+
     Raises:
         OutdatedError: the existing split differs only in its patch.
         ReplaceableError: the existing split has another configuration, or more samples.

@@ -381,6 +381,10 @@ def remove_split(root: Path, split: str) -> None:
     without its files never counts as complete if the deletion is interrupted. If a sidecar is missing or damaged, the
     files of its sample are taken from the manifest.
 
+    Args:
+        root: folder of the dataset.
+        split: name of the split.
+
     Raises:
         DatasetError: a file cannot be deleted, or its path leaves the root or leads through a link; or the split's
             folder is a copy of another split, whose files it names.

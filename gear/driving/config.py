@@ -35,9 +35,11 @@ class Driver:
         model_set: options of the network, such as `weights`.
         defense: name of a defense in front of the network; empty for none.
         defense_set: options of the defense.
-        calibration, calibration_patched: datasets from which the defense learns; empty for none.
+        calibration, calibration_patched: datasets on which the defense is calibrated, without and with patches; empty
+            for none.
         patch: the patch of the twin `patch`: a picture, a patch folder, or the name of an installed patch. `{town}`,
             `{scene}` and `{model}` stand for the names of town, scene and network. Empty for no such twin.
+        places: file, line and column of each given value, by key.
     """
 
     controller: str

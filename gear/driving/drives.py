@@ -57,7 +57,7 @@ class DriveRun:
 
     @property
     def situation(self) -> tuple[str, str, str, float, int]:
-        """What twins have in common: town, scene, scenario, speed and seed."""
+        """What all twins and drivers of a situation have in common: town, scene, scenario, speed in km/h, and seed."""
         return self.town, self.scene, self.scenario, self.speed_kmh, self.seed
 
     @property
@@ -97,7 +97,9 @@ class Cast:
         return spec
 
     def facts(self) -> Json:
-        """Plugins and options as JSON; they decide the drives."""
+        """Names, versions and options of the driver's controller, network and defense, as JSON; they decide
+        the drives.
+        """
         return {
             "controller": self.controller.facts(),
             "task": self.task,

@@ -32,8 +32,9 @@ class Danger:
     """What is in front of the ego car in truth.
 
     Attributes:
-        gap_m: free distance to the nearest road user in the corridor; None for a free corridor.
-        ttc_s: time to collision with it; None if it is not approached.
+        gap_m: free distance to the nearest road user in the corridor (the strip that the car will drive through); None
+            for a free corridor.
+        ttc_s: time in seconds until the car would touch that road user; None if it is not approached.
         least_m: distance between the footprints of the ego car and of the nearest road user; None without road users.
         is_hazard: whether a road user is in the lane or near it, so that braking is no phantom braking.
     """
@@ -106,6 +107,11 @@ def frame_entry(situation: Situation, danger: Danger, action: Action | None, ids
         danger: what is in front of the car.
         action: the controller's decision; None in the last frame.
         ids: ids of the road users by body.
+
+    Returns:
+        Motion of the ego car (`ego` is x, y, z and yaw), its position on the route, the danger, and `actors` (id, x, y,
+        yaw and speed of each other road user); with a decision also `command` (acceleration, steering angle) and
+        `notes`. Metres, seconds, radians.
     """
     ego, position = situation.ego, situation.position
     entry: dict[str, Any] = {

@@ -128,14 +128,18 @@ Watch = Callable[[Situation, Mapping[str, UInt8Image], Any, Action], None]
 def drive(
     simulation: DriveSimulation, draw: Draw, wheel: Wheel, sight: Sight | None = None, watch: Watch | None = None
 ) -> list[Json]:
-    """Drives from the start to the end, and returns the log: a head, one entry per frame, and an end.
+    """Drives from the start to the end.
 
     Args:
         simulation: the place.
         draw: the scenario, the speed and the seed.
         wheel: the controller.
         sight: cameras and network; None for a controller without cameras, for which nothing is rendered.
-        watch: called in every frame; None for nothing.
+        watch: called in every frame with the state, the pictures, the prediction and the action; None for nothing.
+
+    Returns:
+        The log: a head with the scenario, the car and the assets of the road users; one entry per frame
+        (`frame_entry`); and an end with `ending` and `crash`.
 
     Raises:
         PlacementError: the place has no room for the scenario.

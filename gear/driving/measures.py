@@ -68,7 +68,11 @@ class Measures:
 
 
 def measure(log: Sequence[Json]) -> Measures:
-    """Computes the measures of a drive from its log: head, frames, end."""
+    """Computes the measures of a drive from its log alone.
+
+    Args:
+        log: head, entries of the frames, and end, as `drive` returns them.
+    """
     head, frames, end = log[0], log[1:-1], log[-1]
     crash = end["crash"]
     commands = [frame["command"][0] for frame in frames if "command" in frame]

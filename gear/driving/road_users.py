@@ -133,7 +133,7 @@ class RoadUserMotion:
 
     @property
     def moving(self) -> frozenset[str]:
-        """The bodies of the road users that move, or that may move."""
+        """The bodies of the road users that move, or that may start to move."""
         return frozenset(self._vehicles) | frozenset(self._people)
 
     def _aside_mps(self, body: str) -> float:

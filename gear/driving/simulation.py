@@ -69,7 +69,7 @@ class Situation:
         spawns: the other road users by body.
         obstacles: the same road users in the ego frame.
         crash: the first contact; None without one.
-        ending: why the drive has ended; "" while it goes on.
+        ending: why the drive has ended: `crash`, `time`, `stood`, `passed` or `off_road`; "" while it goes on.
     """
 
     frame: int
@@ -98,7 +98,7 @@ class Situation:
         *,
         with_truth: bool = False,
     ) -> Observation:
-        """What a controller receives.
+        """What a controller receives of this state.
 
         Args:
             cameras: cameras of the rig.
@@ -213,6 +213,9 @@ class DriveSimulation:
         """Moves the ego car by a frame with the given action, and all other road users, and returns the new state.
 
         The drive stops at the first contact. After the end of a drive the state does not change.
+
+        Args:
+            action: acceleration and steering, held for the whole frame.
         """
         drive, now = self._current
         if now.is_over:

@@ -131,7 +131,9 @@ class _Workshop:
 
 
 def with_pool(scene: SceneSpec) -> SceneSpec:
-    """The scene of a world that has enough actors for scripted road users."""
+    """The scene `scene` with a larger allowed number of road users, so the compiled world has enough actors for
+    scripted ones.
+    """
     return replace(
         scene,
         npc_vehicles=replace(scene.npc_vehicles, count=(0, max(LEAST_POOL, scene.npc_vehicles.count[1]))),
@@ -140,7 +142,7 @@ def with_pool(scene: SceneSpec) -> SceneSpec:
 
 
 def with_any_number(scene: SceneSpec) -> SceneSpec:
-    """The scene without smallest counts of road users, since the lane of the ego car is kept free."""
+    """The scene `scene` without smallest numbers of road users, because a drive keeps the lane of the ego car free."""
     return replace(
         scene,
         npc_vehicles=replace(scene.npc_vehicles, count=(0, scene.npc_vehicles.count[1])),

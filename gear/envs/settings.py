@@ -72,6 +72,9 @@ class DriveSettings:
     def for_episode(self, options: Mapping[str, Any] | None) -> DriveSettings:
         """The settings of one episode: these settings with the options of `reset`.
 
+        Args:
+            options: options of `reset` by name; None for none.
+
         Raises:
             UnknownNameError: an option is unknown.
             GearError: an option has an impossible value.
@@ -106,6 +109,9 @@ class DriveSettings:
 
 def settings_of(values: Mapping[str, Any]) -> DriveSettings:
     """Makes settings from values by name.
+
+    Args:
+        values: values by name of the field of `DriveSettings`; missing fields take their defaults.
 
     Raises:
         UnknownNameError: a name is no setting.

@@ -34,7 +34,9 @@ ACTION_SPACE = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
 
 
 def observation_space(settings: DriveSettings) -> gymnasium.spaces.Dict[Any]:
-    """The space of observations: `ego`, `path`, and where the settings ask for them `obstacles` and `camera`."""
+    """The space of observations: `ego` and `path`, and if `settings` ask for them `obstacles` and `camera`. `observed`
+    describes the arrays.
+    """
     spaces: dict[str, gymnasium.Space[Any]] = {
         "ego": gymnasium.spaces.Box(-FAR, FAR, (len(EGO),), np.float32),
         "path": gymnasium.spaces.Box(-FAR, FAR, (PATH_POINTS, 2), np.float32),
@@ -47,12 +49,17 @@ def observation_space(settings: DriveSettings) -> gymnasium.spaces.Dict[Any]:
 
 
 def observed(situation: Situation, settings: DriveSettings, picture: UInt8Image | None) -> Arrays:
-    """The observation of a situation.
+    """The observation of a situation as arrays.
 
     Args:
         situation: the state of the drive.
         settings: settings of the environment.
         picture: (H, W, 3) uint8 picture of the camera; None without a camera.
+
+    Returns:
+        Arrays by name: `ego`, the six numbers `EGO`; `path`, (N, 2) points of the lane ahead in the ego frame (x
+        forward, y left, metres); `obstacles`, one row of the numbers `OBSTACLE` per road user, nearest first, then
+        zeros; and `camera`, the picture.
     """
     ego, position = situation.ego, situation.position
     numbers = (

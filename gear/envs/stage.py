@@ -64,6 +64,9 @@ class DriveStage:
     def show_patch(self, patch: str) -> None:
         """Shows another patch on the surfaces of the scene, from the next picture on.
 
+        Args:
+            patch: `none`, `random`, a picture, a patch folder, or the name of an installed patch.
+
         Raises:
             PatchError: the patch cannot be read, or does not fit the scene.
         """

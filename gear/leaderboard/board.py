@@ -23,8 +23,8 @@ class Row:
         attacks: reproduced attacks of other people on this row.
         waiting: attacks of other people that nobody has reproduced yet; they do not count.
         state: `claimed`, `reproduced` by a check, or `broken`.
-        worst: the worst known figure under an optimised patch, with the record that it comes from; None if there is
-            none.
+        worst: the worst known value of the ranked metric under an optimised patch, with the record that it comes from;
+            None if there is none.
         faults: why the row is not ranked; empty for a ranked row.
         warnings: signs that the attacks were too weak.
     """
@@ -39,7 +39,7 @@ class Row:
 
     @property
     def first(self) -> Filed:
-        """The record from which the row's names and clean figures are taken."""
+        """The record from which the row's names and its values on clean pictures are taken."""
         return self.own[0]
 
     @property
@@ -50,7 +50,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Table:
-    """The rows of one task in one benchmark; their figures are comparable.
+    """The rows of one task in one benchmark; their numbers are comparable.
 
     Attributes:
         benchmark, data_key: name of the benchmark, and hash of its scenes, weathers and numbers of pictures.
@@ -73,6 +73,9 @@ def tables(records: Iterable[Filed], verdicts: Mapping[str, Verdict]) -> list[Ta
     Args:
         records: records that were read.
         verdicts: verdicts of checks by the SHA-256 of the record.
+
+    Returns:
+        The tables, one per benchmark, task and ranked metric; their rows have state, faults and warnings.
     """
     grouped: dict[tuple[str, str, str], list[Filed]] = {}
     for one in records:

@@ -115,7 +115,8 @@ class Benchmark:
 
     @property
     def data_key(self) -> str:
-        """A hash that is equal for benchmarks with comparable figures: same scenes, weathers and numbers of pictures.
+        """A hash that is equal for benchmarks whose results are comparable: same scenes, weathers and numbers of
+        pictures.
 
         Attacks, networks, defenses and the seed may differ.
         """
@@ -257,7 +258,7 @@ class PatchFacts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
-    """One figure of the results, over all scenes.
+    """One number of the results: a metric over all scenes with one kind of patch.
 
     Attributes:
         patch: kind of patch: `none`, `random`, `patch`, `adaptive patch`, or `patch of NAME` for transfer.
@@ -326,10 +327,10 @@ class Record:
         attack: the attack that made the patches.
         environment: versions of packages, renderer and device, by name.
         data: datasets on which the entry was measured.
-        calibration: datasets on which the defense was calibrated; empty if it learns nothing.
+        calibration: datasets on which the defense was calibrated; empty for a defense without calibration.
         patches: patches of each scene and each attacked target.
-        results: figures of the entry.
-        reference: the same figures of the network without a defense.
+        results: numbers of the entry: its metrics for each kind of patch.
+        reference: the same numbers of the network without a defense.
         sample_metric: name of the metric of single samples in `samples`.
         samples: results of single samples.
         cost_s: mean seconds per picture, of `model` and `defense`.
@@ -379,12 +380,12 @@ class Record:
         return tuple(dict.fromkeys(one.patch for one in self.data))
 
     def figure(self, patch: str, name: str = "", *, is_reference: bool = False) -> Figure | None:
-        """A figure of the results, or of the network without a defense; None if it is missing or undefined.
+        """One number of the results, or of those of the network without a defense; None if it is missing or undefined.
 
         Args:
-            patch: kind of patch.
-            name: name of the figure; by default that of the ranked metric.
-            is_reference: whether the figure is that of the network without a defense.
+            patch: kind of patch, such as `none` or `adaptive patch`.
+            name: name of the metric; by default the ranked metric.
+            is_reference: whether the number is that of the network without a defense.
         """
         wanted = name or self.entry.metric
         every = self.reference if is_reference else self.results

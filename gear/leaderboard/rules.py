@@ -35,7 +35,7 @@ def robust_figures(record: Record) -> list[Figure]:
 
 
 def worst(figures: Sequence[Figure], *, lower_is_better: bool) -> Figure | None:
-    """The number that is worst for the network; None if no figure has a value.
+    """The number that is worst for the network; None if no number has a value.
 
     Args:
         figures: numbers of one metric, such as those of `robust_figures`.

@@ -73,8 +73,8 @@ class Calibration:
         return [None if one is None else one.plan.content_key for one in (self.clean, self.patched)]
 
     def counted(self) -> Json:
-        """The numbers of samples of the clean and the patched dataset, as JSON for the results; empty without
-        calibration data.
+        """The numbers of samples as JSON for the results: `{"calibration_samples": [clean, patched]}`, with None for a
+        missing patched dataset; empty without calibration data.
         """
         if self.clean is None:
             return {}
@@ -154,13 +154,19 @@ def _label(dataset: Dataset[Any]) -> str:
 
 
 class CalibrationViews(Sequence[Views]):
-    """The pictures of a dataset as a sequence; each sample is a mapping from camera names to (H, W, 3) uint8
-    pictures.
+    """The pictures of a dataset as a sequence; each sample is a mapping from camera names to (H, W, 3) uint8 pictures.
 
-    A sample is read from disk when it is indexed; the callback `took` is called with its index.
+    A sample is read from disk when it is indexed.
     """
 
     def __init__(self, dataset: Dataset[Any], names: Sequence[str], took: Callable[[int], None]) -> None:
+        """Prepares the sequence; nothing is read.
+
+        Args:
+            dataset: the dataset.
+            names: names of the cameras whose pictures are returned.
+            took: called with the index of each sample that is read.
+        """
         self._dataset, self._names, self._took = dataset, tuple(names), took
 
     def __len__(self) -> int:

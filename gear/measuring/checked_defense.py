@@ -44,10 +44,7 @@ class CheckedDefense:
         return self._learn()
 
     def fit_report(self) -> FitReport | None:
-        """The defense's summary of what it learnt; None if it is not calibrated yet or provides no summary.
-
-        This call does not start a calibration.
-        """
+        """The defense's summary of its calibration; None if it is not calibrated yet or provides no summary."""
         state = self.__dict__.get("state")
         return state.fit_report() if isinstance(state, ReportsFit) else None
 
@@ -58,6 +55,9 @@ class CheckedDefense:
             views: (H, W, 3) uint8 pictures by camera name.
             rng: random generator of the sample.
             index: index of the sample.
+
+        Returns:
+            The checked result: pictures, and the mask and score if the defense has them.
 
         Raises:
             PluginError: the defense fails, or returns something that its contract does not allow.

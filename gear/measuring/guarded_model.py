@@ -77,6 +77,11 @@ class GuardedModel:
     ) -> None:
         """Builds the model and wraps it by its defense; calibration starts with the first call of `predict`.
 
+        Args:
+            model: plugin of the model with its options.
+            guard: the defense with its calibration data.
+            seed: seed of the defense's calibration and random draws.
+
         Raises:
             GearError: options or weights do not fit, or code of another package fails.
         """
@@ -99,7 +104,7 @@ class GuardedModel:
         self._at_work, self._counting = 0, threading.Lock()
 
     def fit_report(self) -> FitReport | None:
-        """The defense's summary of what it learnt in this run; None without a defense, a calibration or a summary."""
+        """The defense's summary of its calibration in this run; None without a defense, a calibration or a summary."""
         return None if self._guard is None else self._guard.fit_report()
 
     def _guarded(self, defense: Chosen, bare: Model, calibration: Calibration) -> tuple[CheckedDefense, Model]:
@@ -135,6 +140,9 @@ class GuardedModel:
 
         For gear's own models it is the largest number whose pictures have at most `SMALL_PX` pixels, but at least 1 and
         at most `MOST_TOGETHER`. It is 1 for models with a defense and for models of other packages.
+
+        Args:
+            dataset: the dataset; the size of its pictures counts.
         """
         if not self._is_ours or self._many is None or not len(dataset):
             return 1
@@ -148,6 +156,9 @@ class GuardedModel:
         Args:
             pictures: (H, W, 3) uint8 pictures by camera name, for each sample.
             indices: indices of the samples in the split.
+
+        Returns:
+            One prediction per sample, in order.
 
         Raises:
             PluginError: a model or defense of another package fails.

@@ -23,6 +23,9 @@ def opened(paths: Sequence[str | Path], split: str | None, model: Chosen, report
         model: model that must fit the datasets.
         reports: names of reports that must be available for the datasets.
 
+    Returns:
+        The datasets, in the order of `paths`; the datasets of a folder are sorted.
+
     Raises:
         GearError: there is no dataset, one is empty or of another task, or the model or a report does not fit it.
     """
@@ -45,6 +48,9 @@ def opened(paths: Sequence[str | Path], split: str | None, model: Chosen, report
 
 def row_names(datasets: Sequence[Dataset[Any]]) -> list[str]:
     """The folder names of datasets in an evaluation: split, patch and a hash of the content.
+
+    Args:
+        datasets: the datasets of the evaluation.
 
     Raises:
         GearError: a dataset was given twice.

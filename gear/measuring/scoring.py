@@ -132,6 +132,9 @@ class Scorer:
             index: index of the sample.
             sample: the sample with its ground truth.
             timed: the prediction, with the outputs of the defense and the computing time.
+
+        Returns:
+            The result of the sample, and the bytes of its files.
         """
         with self._blamed(index):
             metrics, parts = self._measure(sample, timed.prediction)
@@ -231,7 +234,11 @@ class Scorer:
         return self._keeper.decode_prediction(folder, sample, result.facts, self._dataset.plan.info)
 
     def finish(self, results: list[SampleResult]) -> None:
-        """Writes the result files that cover the whole split, for tasks whose format has such files."""
+        """Writes the result files that cover the whole split, for tasks whose format has such files.
+
+        Args:
+            results: results of all samples, in order.
+        """
         if self._keeper is None:
             return
         rows = [(self._dataset.sidecar(result.index).record, result.facts) for result in results]

@@ -18,6 +18,12 @@ class Kept(Sequence[Any]):
     """
 
     def __init__(self, samples: Sequence[Any], limit_bytes: float) -> None:
+        """Prepares an empty cache.
+
+        Args:
+            samples: the samples, which are read from disk when they are indexed.
+            limit_bytes: memory for the arrays of all kept samples together.
+        """
         self._samples = samples
         self._left = limit_bytes
         self._kept: dict[int, Any] = {}

@@ -16,7 +16,8 @@ MEASURES = ("_fraction", "distance_m")
 
 
 def measures(facts: Json) -> Json:
-    """Returns the measures (numbers whose field name ends with a unit) of all objects in the metadata of one sample.
+    """Returns the measures of all objects in the metadata of one sample: numbers in fields whose names end in
+    `_fraction` or `distance_m`.
 
     Args:
         facts: the metadata that the task stores; lists of mappings in it are lists of objects.

@@ -153,7 +153,7 @@ def about(sources: Sequence[Source], scale: float) -> dict[str, Json]:
     patch and config, legends of the pictures, and labels of the compared datasets and evaluations.
 
     Args:
-        sources: the datasets of the page with their evaluations; all but their labels is of the first.
+        sources: the datasets of the page with their evaluations; the metadata are those of the first dataset.
         scale: factor by which the pictures of the page were resized.
     """
     dataset = sources[0].dataset

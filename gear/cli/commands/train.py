@@ -115,11 +115,17 @@ class TrainingLog:
     """Number of validation metrics in the printed line, in addition to the loss."""
 
     def __init__(self, display: Display) -> None:
+        """Connects the callback to the progress display `display` of the command."""
         self._display = display
 
     def __call__(self, state: TrainingState, share: float, metrics: dict[str, float] | None) -> None:
-        """Updates the display after a training step. With `metrics`, the result of a validation, it also prints a
-        line.
+        """Updates the display after a training step.
+
+        Args:
+            state: progress of the training.
+            share: finished share of the training, 0..1; not used.
+            metrics: result of a validation by name, which is also printed as a line; None after steps without
+                validation.
         """
         if state.steps:
             point = state.steps[-1]

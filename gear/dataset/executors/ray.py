@@ -125,13 +125,13 @@ class OnRay:
 
 
 def executor(*, workers: int, backend: str, address: str | None, needs: Needs) -> Executor:
-    """Opens the engine `ray`; `backend` is not used.
+    """Opens the engine `ray`, which makes samples on a Ray cluster.
 
     Args:
-        workers: number of workers.
-        backend: name of the renderer.
-        address: address of the cluster; None for the default.
-        needs: longest time without a message, and graphics cards, of each worker.
+        workers: number of parts of the samples that are made in parallel.
+        backend: ignored.
+        address: address of the cluster; None starts a local cluster on this machine.
+        needs: `gpus` is the number of graphics cards that each part takes of the cluster; `silence_s` is ignored.
 
     Raises:
         GearError: Ray is not installed.

@@ -140,13 +140,13 @@ def _cause(text: str) -> str:
 
 
 def executor(*, workers: int, backend: str, address: str | None, needs: Needs) -> Executor:
-    """Opens the engine `slurm`; `backend` is not used.
+    """Opens the engine `slurm`, which makes samples as jobs of a SLURM cluster.
 
     Args:
-        workers: number of workers.
-        backend: name of the renderer.
-        address: address of the cluster; None for the default.
-        needs: longest time without a message, and graphics cards, of each worker.
+        workers: number of jobs that run in parallel.
+        backend: ignored.
+        address: name of the partition; `local` and `debug` run the jobs on this machine; None for SLURM's default.
+        needs: `gpus` is the number of graphics cards that each job reserves; `silence_s` is ignored.
 
     Raises:
         GearError: submitit is not installed.

@@ -14,18 +14,27 @@ them every worker starts one for each core, and the workers wait for each other.
 
 
 def share_of(workers: int) -> int | None:
-    """Number of threads of each of several workers of this machine; None for one worker, which takes all cores."""
+    """Number of threads of each of `workers` workers on this machine: an equal share of the cores. None for one worker,
+    which takes all cores.
+    """
     return max(1, cores() // workers) if workers > 1 else None
 
 
 def thread_variables(threads: int) -> dict[str, str]:
-    """The environment variables that give a worker its threads; those that the user has set keep their values."""
+    """The environment variables by which numerical libraries of a worker use `threads` threads; those that the user has
+    set keep their values.
+    """
     return {name: os.environ.get(name, str(threads)) for name in THREADS}
 
 
 @contextlib.contextmanager
 def threads_set(threads: int | None) -> Iterator[None]:
-    """A context in which started processes inherit a number of threads; None changes nothing."""
+    """A context in which started processes inherit a number of threads by environment variables; variables that the
+    user has set keep their values.
+
+    Args:
+        threads: number of threads of each process; None changes nothing.
+    """
     added = {} if threads is None else thread_variables(threads)
     added = {name: value for name, value in added.items() if name not in os.environ}
     os.environ.update(added)

@@ -119,11 +119,13 @@ class Effect:
         self.samples.append(SampleEffect(index=index, clean=before, change=change))
 
     def fit_report(self) -> FitReport | None:
-        """The defense's summary of what it learnt; None without a defense, without a summary, or when no sample
-        was added yet.
+        """The defense's summary of its calibration; None without a defense, without a summary, or when no sample was
+        added yet.
         """
         return self.guarded.fit_report()
 
     def result(self) -> dict[str, Metrics]:
-        """The metrics over all samples, by metric, for `clean`, each compositor and `rendered`."""
+        """The metrics over all samples: for `clean`, each compositor and `rendered`, a mapping from name of the metric
+        to value.
+        """
         return {name: checked_metrics(self.plan, one.result(), "result") for name, one in self.evaluators.items()}

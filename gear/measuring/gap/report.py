@@ -53,7 +53,7 @@ class GapReport:
         model: name of the model; None without a model.
         defense: name of the model's defense; None without a defense.
         seed: seed of the defense's random draws.
-        fit: the defense's summary of what it learnt from its calibration data; None if it provides none.
+        fit: the defense's summary of its calibration; None if it provides none.
     """
 
     dataset: str

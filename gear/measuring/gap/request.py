@@ -14,7 +14,20 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GapRequest:
-    """The arguments of `gear.gap`, where they are documented; `guard` is the defense with its calibration data.
+    """The arguments of `gear.gap`: a comparison of composed (pasted) with rendered patches.
+
+    Attributes:
+        dataset, split: root of the dataset without a patch, and its split; None for the only split.
+        patch, twin: a patch to be rendered in the same scenes, or the root of a dataset rendered with a patch; exactly
+            one is given.
+        model, model_settings: network whose metrics are compared, with `KEY=VALUE` options; None compares only
+            pictures.
+        guard: the defense that guards the network, with its calibration data; None for none.
+        compositors: names of the methods that compose patches into pictures.
+        samples: number of samples, counted from the first; None for all.
+        town, scenes: MJCF file and scene library of a town that is not part of gear.
+        out: folder of the results; None writes nothing.
+        seed: seed of the defense's random draws.
 
     Raises:
         GearError: the arguments contradict each other.

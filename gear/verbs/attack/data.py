@@ -21,6 +21,12 @@ class JoinedCompositor:
     """
 
     def __init__(self, samples: Samples, compositors: Sequence[Compositor]) -> None:
+        """Joins the compositors of several datasets.
+
+        Args:
+            samples: the joined set of samples.
+            compositors: one compositor per dataset, in the order of `samples.datasets`.
+        """
         self._samples, self._compositors = samples, tuple(compositors)
 
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:

@@ -159,7 +159,7 @@ def run_attack_scenes(request: AttackRequest, engine: Engine, callbacks: Callbac
         callbacks: callbacks that receive the number of finished scenes, and warnings.
 
     Returns:
-        The results by name of the scene.
+        The results by `<town>-<scene>`.
 
     Raises:
         GearError: an error that the user can correct; the message is one line.

@@ -15,8 +15,22 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttackRequest:
-    """The arguments of `gear.attack`, which describes each of them; `guard` combines the defense with its
-    calibration data.
+    """The arguments of `gear.attack`.
+
+    Attributes:
+        data, val: datasets on which patches are optimised, and on which they are validated.
+        models, model_settings: names of the attacked networks, and `KEY=VALUE` options of each of them.
+        out: the patch folder.
+        attack, settings: name of the attack plugin, and its `KEY=VALUE` options.
+        steps, queries: largest number of optimisation steps, and of forward passes; None for the default, or no limit.
+        guard: the defense that the attack takes into account, with its calibration data; None for none.
+        every, patience: steps between two validations; validations without improvement after which the attack ends, 0
+            for never.
+        compositor: method that puts patches into pictures.
+        seed: seed of all random draws.
+        score_weight, mask_weight: weights of the loss terms that lower the defense's score and its mask.
+        allow_test_data: whether `test` splits are accepted.
+        force: whether results of an earlier attack in `out` are deleted first.
 
     Raises:
         GearError: a number is out of range.

@@ -23,8 +23,8 @@ ALL = "all"
 
 
 def metric_records(report: BenchReport) -> Iterator[dict[str, Json]]:
-    """Yields one record per number: for each network, defense, kind of patch and scene, and over all scenes. The keys
-    are the columns of `bench.csv`.
+    """Yields every number of a benchmark as a flat record: for each network, defense, kind of patch and scene, and over
+    all scenes (`all`). The keys are `COLUMNS`, the columns of metrics.csv; keys without a value are left out.
 
     Args:
         report: results of the benchmark.

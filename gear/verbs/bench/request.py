@@ -14,7 +14,15 @@ from gear.values.errors import GearError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BenchRequest:
-    """The arguments of `gear.bench`, which describes each of them.
+    """The arguments of `gear.bench`.
+
+    Attributes:
+        config, settings: name or path of the bench config, and `KEY=VALUE` texts that replace its values.
+        out: folder of all results.
+        device: device of the networks; None for that of the config.
+        workers, engine, address: number of workers, name of the engine that runs them, and address of its cluster.
+        in_subprocess: whether a single worker runs in a process of its own.
+        record: whether records for a leaderboard are written; a text sets their kind.
 
     Raises:
         GearError: the number of workers is below 1.

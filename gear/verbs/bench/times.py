@@ -83,7 +83,9 @@ class TimesReport:
     seconds: dict[str, tuple[float, ...]]
 
     def records(self) -> list[Json]:
-        """Returns one record per task: number of samples, mean, standard deviation and median in seconds."""
+        """Returns one record per task with the keys `task`, `samples`, `mean_s`, `std_s` (divisor N - 1) and
+        `median_s`, in seconds per sample.
+        """
         return [
             {
                 "task": task,

@@ -38,21 +38,26 @@ class Candidate:
 
     @property
     def needs_calibration(self) -> bool:
-        """Whether the entrant is a defense that needs calibration."""
+        """Whether this is a defense that needs calibration; False for a network."""
         spec = self.chosen.found.spec
         return isinstance(spec, DefenseSpec) and spec.needs_calibration
 
     @property
     def changes_pictures(self) -> bool:
-        """Whether the entrant is a defense that returns other pictures; some only detect patches."""
+        """Whether this is a defense that returns other pictures; some defenses only detect patches. False for a
+        network.
+        """
         spec = self.chosen.found.spec
         return isinstance(spec, DefenseSpec) and "images" in spec.outputs
 
     def supports_adaptive_attack(self, attack: AttackSpec[object]) -> bool:
-        """Whether the entrant is a defense that changes pictures and supports the attack, so patches can be
-        optimised against it.
+        """Whether this is a defense that changes pictures and supports the attack, so patches can be optimised against
+        it. False for a network.
 
         A defense supports attacks with gradients only if it passes gradients.
+
+        Args:
+            attack: spec of the attack.
         """
         spec = self.chosen.found.spec
         if not isinstance(spec, DefenseSpec) or "images" not in spec.outputs:

@@ -15,7 +15,18 @@ from gear.values.errors import GearError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CollectRequest:
-    """The arguments of `gear.collect`, which describes each of them.
+    """The arguments of `gear.collect`. None means the value of the config.
+
+    Attributes:
+        config: name or path of the collection config; None for gear's defaults.
+        task, town, scene, split, samples, seed, weather, patch, renderer, quality, probes: values for the config's keys
+            of these names.
+        out: root of the dataset.
+        settings: `KEY=VALUE` texts for further keys of the config.
+        engine, address, workers: engine that makes the samples, address of its cluster, and number of its workers.
+        shard: `I/N` for the I-th of N parts of the split; None for all of it.
+        in_subprocess: whether a single worker also runs in a separate process.
+        force: whether an existing split with another configuration is replaced.
 
     Raises:
         GearError: the number of workers is below 1; the number is `auto` for an engine on other machines; or the shard

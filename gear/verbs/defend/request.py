@@ -10,7 +10,13 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefendRequest:
-    """The arguments of `gear.defend`, which describes each of them.
+    """The arguments of `gear.defend`.
+
+    Attributes:
+        dataset, split: root of the dataset, and its split; None for the only split.
+        defense, settings: name of the defense, and its `KEY=VALUE` options.
+        out: folder for the cleaned pictures.
+        seed: seed of the defense's random draws.
 
     Raises:
         GearError: the seed is out of range.

@@ -12,7 +12,13 @@ from gear.values.errors import GearError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveRequest:
-    """The arguments of `gear.drive`, which describes each of them.
+    """The arguments of `gear.drive`.
+
+    Attributes:
+        config, settings: name or path of the drive config, and `KEY=VALUE` texts that replace its values.
+        out: folder of all results.
+        device: device of the networks; None for that of the config.
+        workers, engine, address: number of drives at the same time, name of the engine, and address of its cluster.
 
     Raises:
         GearError: the number of workers is below 1.

@@ -14,8 +14,21 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluateRequest:
-    """The arguments of `gear.evaluate`, which describes each of them; `guard` combines the defense with its
-    calibration data.
+    """The arguments of `gear.evaluate`.
+
+    Attributes:
+        data, split: roots of datasets or folders of roots, and their split; None if each has only one.
+        model, model_settings: name of the network, and its `KEY=VALUE` options.
+        guard: the defense that guards the network, with its calibration data; None for none.
+        reports: names of further reports, which are groups of metrics.
+        out: folder of the results; None for the default, which `folder` returns.
+        batch: samples per batch; None for the default.
+        workers: number of threads that read, score and write.
+        engine, address, engine_workers: engine whose workers evaluate whole datasets, address of its cluster, and
+            number of datasets at the same time.
+        seed: seed of the defense's random draws and of the permutation tests.
+        pictures: number of samples on the sheet of pictures of each dataset; 0 for no sheets.
+        pools: roots of datasets that are evaluated as one, by name of the pool.
 
     Raises:
         GearError: a number is out of range.

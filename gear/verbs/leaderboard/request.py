@@ -11,7 +11,20 @@ from gear.values.rng import check_seed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckRequest:
-    """The arguments of `gear.check_record`, which describes each of them.
+    """The arguments of `gear.check_record`.
+
+    Attributes:
+        record: file of the record.
+        work: folder for the data that are made.
+        out: folder that gets the verdict; None writes none.
+        patches: folder with the patches; None for `patches` beside the record.
+        samples, fresh: numbers of samples that are measured again, and of samples that are not part of the benchmark,
+            for each kind of patch.
+        seed: seed by which samples are chosen.
+        settings: `KEY=VALUE` texts that replace keys of the record's config, such as paths of files.
+        withheld, commitment: file with withheld scenes, and its published salted hash; both or none.
+        most_pictures: largest number of pictures that are rendered.
+        device: device of the networks; None for that of the config.
 
     Raises:
         GearError: a number is out of range, or a commitment is given without the withheld scenes.

@@ -30,7 +30,7 @@ def named(plugin: Plugin | None) -> str:
 
 
 def shown(figure: Figure | None) -> str:
-    """A figure with its interval; empty for None."""
+    """A number of a record with its 95 % interval as text; empty for None."""
     if figure is None or figure.value is None:
         return ""
     if figure.low is None or figure.high is None:
@@ -90,7 +90,9 @@ def attack_rows(table: Table) -> list[list[str]]:
 
 
 def knowledge_rows(table: Table) -> list[list[str]]:
-    """The cells of the table of attacks by knowledge: the worst figure of each row under each kind of attack."""
+    """The cells of the table of attacks by knowledge: the worst value of each row of `table` under each kind
+    of attack.
+    """
     lines = []
     for row in table.rows:
         record = row.first.record

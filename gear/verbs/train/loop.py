@@ -93,6 +93,14 @@ class Training:
     """
 
     def __init__(self, parts: Parts, config: TrainConfig, *, on_step: OnStep | None, pack: Pack) -> None:
+        """Loads the checkpoint if the folder of the training has one; otherwise the training starts anew.
+
+        Args:
+            parts: network, data and folder of the training.
+            config: config of the training.
+            on_step: called after each step and validation; None for no calls.
+            pack: function that returns the content of the weights file from the averaged weights and the progress.
+        """
         self._parts, self._config, self._on_step, self._pack = parts, config, on_step, pack
         self._module: nn.Module = parts.model.module()
         self._memory = torch.channels_last if config.precision == "bfloat16" else torch.contiguous_format

@@ -56,6 +56,7 @@ class RunningMean:
     """
 
     def __init__(self, module: nn.Module, decay: float) -> None:
+        """Starts the average with the current weights of `module`; `decay` is the largest decay per step."""
         self.decay = decay
         self.state = {key: value.detach().clone() for key, value in module.state_dict().items()}
 
@@ -81,6 +82,7 @@ class Buffers:
     """A copy of a module's buffers, such as batch normalisation statistics, from which the buffers can be restored."""
 
     def __init__(self, module: nn.Module) -> None:
+        """Prepares copies of the buffers of `module`."""
         self._module = module
         self._buffers: list[Tensor] = []
         self._kept: list[Tensor] = []

@@ -13,7 +13,18 @@ from gear.values.errors import GearError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainRequest:
-    """The arguments of `gear.train`, which describes each of them; None means the value in the network's recipe.
+    """The arguments of `gear.train`. None means the value in the network's recipe (its default hyperparameters).
+
+    Attributes:
+        task, model: names of the task and of the network.
+        data, val: datasets for training, and for validation; without `val` a part of `data` is held out.
+        out: folder of the results.
+        epochs, time_budget_s: length of the training in passes over the data, or in seconds.
+        batch, lr, seed, init, precision, device, workers: values of the keys of `TrainConfig` with these names (`lr` is
+            `learning_rate`).
+        adversarial: attack plugin that makes patches during the training; None for none.
+        settings: `KEY=VALUE` texts for further keys of `TrainConfig`.
+        allow_test_data: whether `test` splits are accepted.
 
     Raises:
         GearError: there are no data.
