@@ -141,7 +141,9 @@ def resolve(config: CollectionConfig) -> Job:
 
 
 def recipe_of(config: CollectionConfig) -> Json:
-    """A collection's config as JSON without the paths of this machine, for the plan and the manifest of the dataset."""
+    """A collection's config as JSON without paths of this machine and without the patch, for the plan and the manifest
+    of the dataset.
+    """
     recipe: Json = to_plain(config)
     unused = [kind for kind in KINDS if not getattr(config, kind)]
     for name in ("root", "patch", "town", "scenes", "simulation", *unused):

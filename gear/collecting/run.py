@@ -65,6 +65,7 @@ def executor_of(
 
     Raises:
         UnknownNameError: there is no such engine.
+        GearError: the engine cannot use the address, or a package that it needs is not installed.
     """
     if workers == 1 and engine == DEFAULT and address is None and not in_subprocess:
         return InThisProcess()

@@ -24,11 +24,12 @@ from gear.values.serial import Json
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ClosedPart:
-    """The first samples of a split, which an earlier run closed and which have not changed since.
+    """The first samples of a split, for which an earlier run wrote manifest and index files (closed the split), and
+    which have not changed since.
 
     Attributes:
-        entries: the manifest's entries of the samples.
-        hashes: hashes of their sidecars.
+        entries: the manifest's entries of the samples, in order.
+        hashes: SHA-256 of their sidecars (JSON files of the samples), in order.
         indexes: bytes of the index files by path.
     """
 

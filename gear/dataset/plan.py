@@ -73,10 +73,8 @@ class Plan:
 
 
 def manifest_facts(plan: Plan) -> dict[str, Json]:
-    """The metadata of a split for its manifest: task, options, seed, patch, renderer, versions, scene, weather,
-    config.
-
-    The metadata do not depend on paths of the machine, the time or the workers.
+    """The metadata of a split for its manifest, with the keys `task`, `options`, `info`, `seed`, `patch`, `renderer`,
+    `versions`, `scene`, `weather`, `assets` and `config`.
 
     Raises:
         DatasetError: the plan lacks an entry, because it was edited.

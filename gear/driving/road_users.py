@@ -22,7 +22,9 @@ CROWD_STEP_S = 0.05
 
 
 class RoadUserMotion:
-    """Moves all road users except the ego car, step by step."""
+    """Moves all road users except the ego car, step by step: scripted ones follow their script, all others react to the
+    ego car.
+    """
 
     def __init__(self, start: Start, lanes: LaneGraph, junctions: Junctions, *, seed: int, duration_s: float) -> None:
         """Prepares the motion.
@@ -86,7 +88,7 @@ class RoadUserMotion:
             person.speed_mps = walker.pace_mps if 0 < walked_m < walker.line.length_m else 0.0
 
     def spawns(self) -> dict[str, Spawn]:
-        """All road users by body except the ego car, with their current positions and speeds."""
+        """All road users except the ego car, by name of their body, with their current positions and speeds."""
         return {body: self._now(body) for body in self._spawns if body != self._ego_body}
 
     def within(self, x_m: float, y_m: float, radius_m: float) -> dict[str, Spawn]:

@@ -66,8 +66,8 @@ class Situation:
         position: its position on its route.
         cruise_mps: its desired speed.
         path_m: (N, 2) centre line of the lane ahead, in the ego frame.
-        spawns: the other road users by body.
-        obstacles: the same road users in the ego frame.
+        spawns: the other road users with their positions in the world, by name of their body.
+        obstacles: the same road users with positions and outlines in the ego frame (x forward, y left).
         crash: the first contact; None without one.
         ending: why the drive has ended: `crash`, `time`, `stood`, `passed` or `off_road`; "" while it goes on.
     """

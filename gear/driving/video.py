@@ -46,7 +46,7 @@ def check_video() -> None:
 
 
 class Video:
-    """Collects the frames of one drive and encodes them."""
+    """Collects the frames of one drive and encodes them as a video."""
 
     def __init__(self) -> None:
         self._frames: list[UInt8Image] = []

@@ -81,7 +81,9 @@ class Plugin:
 
     @property
     def identity(self) -> tuple[str, str, str, str]:
-        """What makes two plugins the same row of the leaderboard: name, package, version and options."""
+        """Name, package, version, and hash of the options; plugins that agree in these belong to the same row of the
+        leaderboard.
+        """
         return self.name, self.package, self.version, digest(self.options)
 
 
@@ -376,7 +378,7 @@ class Record:
             raise FieldError("results", "has a figure twice")
 
     def kinds(self) -> tuple[str, ...]:
-        """The kinds of patches in the datasets, each once."""
+        """The kinds of patches in the datasets, each once, in their order."""
         return tuple(dict.fromkeys(one.patch for one in self.data))
 
     def figure(self, patch: str, name: str = "", *, is_reference: bool = False) -> Figure | None:

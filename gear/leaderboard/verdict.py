@@ -64,7 +64,7 @@ class Verdict:
             raise FieldError("findings", "has more than 1000 entries")
 
     def as_json(self) -> Json:
-        """The content of the verdict's file."""
+        """The content of the verdict's file: all fields, with `format` and `version`."""
         return {"format": FORMAT, "version": VERSION, **to_json(self)}
 
     def encoded(self) -> bytes:

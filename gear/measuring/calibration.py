@@ -39,7 +39,7 @@ class Calibration:
     on_fit_progress: Progress | None = None
 
     def fit(self, defense: Chosen, product: Defense, model: Model, cameras: Sequence[str], seed: int) -> Any:
-        """Calibrates a defense for one model and returns the defense's state; None without calibration data.
+        """Calibrates a defense for one model; this may take minutes.
 
         Args:
             defense: plugin of the defense with its options.
@@ -47,6 +47,9 @@ class Calibration:
             model: the model without the defense.
             cameras: names of the cameras whose pictures the model uses.
             seed: seed of the defense's random draws.
+
+        Returns:
+            The state of the calibrated defense; None without calibration data.
 
         Raises:
             GearError: the data do not fit the defense, or code of another package fails.

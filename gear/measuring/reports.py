@@ -95,8 +95,8 @@ class Report:
             raise plugin_error(self.plugin.found, f"{method} of its evaluator", one_line(error)) from error
 
     def facts(self) -> Json:
-        """A plugin metric's name, package, version, options and unit, as JSON for the results; None for the task's
-        own reports.
+        """A plugin metric's name, package, version, options, `metric`, `unit` and `lower_is_better`, as JSON for the
+        results; None for the task's own reports.
         """
         if self.plugin is None:
             return None

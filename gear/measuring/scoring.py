@@ -67,7 +67,9 @@ class SampleResult:
     defended: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> Json:
-        """The result as JSON: the content of the file that marks the sample as finished."""
+        """The content of the JSON file that marks the sample as finished: the fields by name, without `parts`, and with
+        the `objects` of tasks with objects.
+        """
         return {
             "index": self.index,
             "metrics": {name: known_json(one) for name, one in self.metrics.items()},

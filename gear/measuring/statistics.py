@@ -98,6 +98,10 @@ def difference_interval(one: Metrics, other: Metrics, name: str) -> Interval | N
     Args:
         one, other: metrics of the two datasets with their jackknife replicates.
         name: name of the metric.
+
+    Returns:
+        Lower and upper end of `one` minus `other`; None if a metric has no replicates or no interval, or if it is
+        undefined without one of the clusters.
     """
     if name not in one.replicates or name not in other.replicates:
         return None
@@ -214,7 +218,14 @@ def _added(parts: Sequence[Any], draws: Draws) -> dict[str, npt.NDArray[Any]]:
 def auroc(positives: Sequence[float], negatives: Sequence[float]) -> float:
     """The area under the ROC curve: the share of pairs in which the positive sample scores above the negative one.
 
-    Ties count half. The area is NaN without positives or negatives.
+    Ties count half.
+
+    Args:
+        positives: scores of samples with the patch.
+        negatives: scores of samples without the patch.
+
+    Returns:
+        The area in 0..1; NaN without positives or negatives.
     """
     if not len(positives) or not len(negatives):
         return float("nan")
@@ -232,6 +243,9 @@ def auroc_interval(
     Args:
         positives, negatives: (N,) scores of the same N scenes with and without the patch.
         clusters: the cluster of each scene.
+
+    Returns:
+        Lower and upper end; None for fewer than two clusters, or if the area is undefined without one of them.
     """
     high, low = np.asarray(positives, np.float64), np.asarray(negatives, np.float64)
     kept = [row[row != LEFT_OUT] for row in leave_one_out(clusters)]

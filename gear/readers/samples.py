@@ -39,8 +39,8 @@ class Samples(Sequence[Any]):
         return shrunk(self.datasets[dataset][place], self.scale)
 
     def facts(self) -> list[Json]:
-        """The metadata of the sequence for the record of a training: one JSON entry per split, with scene,
-        weather, patch and number of samples.
+        """The metadata of the sequence for the record of a training: one JSON entry per split with `scene`, `weather`,
+        `split`, `seed`, `patch`, number of `samples`, and `content` (hash of all that decides the pictures).
         """
         numbers = [dataset for dataset, _ in self.places]
         return [

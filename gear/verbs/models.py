@@ -64,7 +64,9 @@ class ModelFacts:
         return self.found.spec
 
     def to_json(self) -> Json:
-        """Returns the description as JSON."""
+        """Returns the description as JSON: name, package, tasks, cameras (`views`), `parameters`, feature maps
+        (`taps`), missing modules, and weights (`published`, `shipped`).
+        """
         spec = self.spec
         return {
             "name": spec.name,

@@ -63,7 +63,9 @@ def detail(sidecar: Sidecar, links: dict[str, str]) -> dict[str, Json]:
 
 
 def finite(value: Any) -> Json:
-    """Returns a copy of a JSON value in which None replaces NaN and infinities, which JSON does not allow."""
+    """Returns a copy of the JSON value `value` in which None replaces NaN and infinities, which JSON does not allow;
+    tuples become lists.
+    """
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):

@@ -107,7 +107,9 @@ class GapReport:
         }
 
     def as_json(self) -> Json:
-        """The whole report as JSON; numbers that are not finite become null."""
+        """All fields as JSON, with the median PSNR (`median_psnr_db`) and the remaining share of the effect
+        (`rendered_share_of_digital_effect`) of each compositor; numbers that are not finite become null.
+        """
         content = to_json(self)
         content["median_psnr_db"] = {name: self.median_db(name) for name in self.compositors}
         content["rendered_share_of_digital_effect"] = {name: self.kept(name) for name in self.compositors}

@@ -105,6 +105,7 @@ class Plan:
         root: Path,
         workers: Mapping[str, str | int],
     ) -> None:
+        """Keeps the inputs of the benchmark, which the class describes; nothing is checked or written."""
         self.config, self.plugins_of_tasks, self.scenes = config, plugins_of_tasks, scenes
         self.weathers = tuple(weathers(config.weathers))
         self._calibration, self._attack, self._root = calibration, attack, root
@@ -198,7 +199,8 @@ class Plan:
         return model.label if defense is None else f"{model.label}+{defense.label}"
 
     def picture_settings(self, task_plugins: TaskPlugins) -> tuple[str, ...]:
-        """Returns the `KEY=VALUE` settings that all collections of a task share.
+        """Returns the `KEY=VALUE` settings that all collections of a task share: those for all tasks, then those of
+        this task.
 
         Args:
             task_plugins: networks and defenses of the task.

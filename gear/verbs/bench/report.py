@@ -67,7 +67,7 @@ class Metric:
         return metric_title(self.report, self.name)
 
     def among(self, metrics: Metrics) -> Estimate | None:
-        """Returns the value of this metric from measured metrics; None if it is missing."""
+        """Returns the value of this metric from `metrics`, the estimates by report and name; None if it is missing."""
         return metrics.get(self.report, {}).get(self.name)
 
 
@@ -109,6 +109,9 @@ class Result:
     def pool(self, patch: str) -> Pool:
         """Returns the results over all scenes with one kind of patch.
 
+        Args:
+            patch: kind of patch, such as `none`, `random` or `patch`.
+
         Raises:
             KeyError: the network was not measured with this kind of patch.
         """
@@ -118,10 +121,16 @@ class Result:
         raise KeyError(patch)
 
     def against(self, pool: Pool) -> Difference | None:
-        """Returns the difference between a pool (all scenes with one kind of patch) and its control pool.
+        """Returns the differences between a pool and its control pool; a pool is the datasets of all scenes with one
+        kind of patch.
 
-        The control of the random patch is no patch; the control of every other patch is the random patch. None if this
-        difference was not measured.
+        The control of the random patch is no patch; the control of every other patch is the random patch.
+
+        Args:
+            pool: a pool of these results.
+
+        Returns:
+            The differences; None if they were not measured.
         """
         control = NO_PATCH if pool.name == RANDOM else RANDOM
         return next((one for one in pool.differences if one.against == control), None)
@@ -186,7 +195,9 @@ class BenchReport:
     tasks: tuple[TaskResult, ...]
 
     def as_json(self) -> Json:
-        """Returns the content of bench.json."""
+        """Returns the content of bench.json: the entries of `facts`, and under `tasks` the metric and the results of
+        each task, by name.
+        """
         from gear.verbs.bench.report_json import task_json  # which needs the classes of this module
 
         return {
@@ -202,7 +213,7 @@ class BenchReport:
         return f"gear bench {self.facts['name']}"
 
     def records(self) -> Iterator[Mapping[str, Json]]:
-        """Yields the lines of bench.csv as flat records.
+        """Yields the lines of bench.csv as flat records; the keys are `COLUMNS`, and keys without a value are left out.
 
         A pool is all scenes with one kind of patch. The task's main metric has one record per pool and one per scene.
         For detectors, each kind of change of the detected objects has one record per pool.

@@ -16,6 +16,10 @@ def task_json(task: TaskResult, out: Path) -> Json:
     Args:
         task: the results.
         out: folder of the benchmark, to which paths are relative.
+
+    Returns:
+        `metric` (`name` and `lower_is_better`; None for a task without a metric), and `results`, one entry per network
+        and defense.
     """
     metric = task.metric
     return {

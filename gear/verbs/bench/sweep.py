@@ -65,7 +65,9 @@ class Point:
         return float(np.std(self.metrics, ddof=1)) if len(self.metrics) > 1 else 0.0
 
     def as_json(self) -> Json:
-        """Returns the point as a flat record."""
+        """Returns the point as a flat record: task, metric, network, defense, kind of patch and value, and over the
+        seeds their number (`seeds`), `mean` and `std`.
+        """
         who = {name: getattr(self, name) for name in COLUMNS[:6]}
         return {**who, "seeds": len(self.metrics), "mean": self.mean, "std": self.std}
 
@@ -85,7 +87,7 @@ class SweepReport:
     points: tuple[Point, ...]
 
     def as_json(self) -> Json:
-        """Returns the content of sweep.json."""
+        """Returns the content of sweep.json: `key`, `values`, `seeds`, and the `points` as flat records."""
         key = {"key": self.sweep.key, "values": list(self.sweep.values), "seeds": self.sweep.seeds}
         return {"format": "gear-sweep", "version": 1, **key, "points": [point.as_json() for point in self.points]}
 

@@ -98,7 +98,7 @@ class TimesReport:
         ]
 
     def as_json(self) -> Json:
-        """Returns the content of times.json."""
+        """Returns the content of times.json: `versions` of packages, and under `tasks` one record per task."""
         return {"format": "gear-times", "version": 1, "versions": versions(), "tasks": self.records()}
 
     def text(self) -> str:

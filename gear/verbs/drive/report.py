@@ -131,7 +131,9 @@ class DriveReport:
     free: frozenset[str] = frozenset()
 
     def rows(self) -> list[Row]:
-        """One row for each driver, scenario and twin, and one over all scenarios that are not free roads."""
+        """One row for each driver, scenario and twin, and one for each driver and twin over all scenarios that are not
+        free roads.
+        """
         return self._grouped(lambda one: (one.run.driver, one.run.scenario, one.run.twin, None))
 
     def by_speed(self) -> list[Row]:
@@ -139,7 +141,9 @@ class DriveReport:
         return self._grouped(lambda one: (one.run.driver, ALL, one.run.twin, one.run.speed_kmh), with_free=False)
 
     def as_json(self) -> Json:
-        """The report as JSON: facts, rows, rows by speed, drives, failures."""
+        """The report as JSON, with the keys `facts`, `rows`, `by_speed`, `drives` (run, measures and hashes of each
+        drive) and `failed` (`drive` and `problem`).
+        """
         return {
             "facts": self.facts,
             "rows": [_known(to_json(row)) for row in self.rows()],

@@ -14,7 +14,11 @@ SPEED_TITLES = ["driver", "twin", "speed km/h", "drives", "crashes", "impact km/
 
 
 def text(report: DriveReport) -> str:
-    """The tables of a report as text, followed by a legend and by the drives that could not be made."""
+    """The tables of a study as text, followed by a legend and by the drives that could not be made.
+
+    Args:
+        report: results of the study.
+    """
     parts = ["\n".join(number_table(cells(report))), "\n".join(number_table(speed_cells(report))), legend()]
     if report.failed:
         parts.append("\n".join([f"not made: {title}: {problem}" for title, problem in report.failed]))
@@ -22,7 +26,7 @@ def text(report: DriveReport) -> str:
 
 
 def legend() -> str:
-    """Explanation of the columns, one line."""
+    """One line of text that explains the columns of the tables."""
     return (
         "crashes: share of drives, with the exact 95 % interval; impact: mean speed at first contact; least m, least"
         " TTC: means of the least distance and the least time to collision; braking delay: mean, against the twin"
@@ -33,7 +37,8 @@ def legend() -> str:
 
 
 def cells(report: DriveReport) -> list[list[str]]:
-    """The cells of the main table of a study: the titles, and one row per driver and twin.
+    """The cells of the main table of a study: the titles, then one row per driver, scenario and twin, and one row over
+    all scenarios that are not free roads.
 
     Args:
         report: results of the study.

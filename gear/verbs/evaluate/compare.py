@@ -165,7 +165,7 @@ def drive_note(dataset: Dataset[Any]) -> str | None:
 
 def together(rows: Sequence[EvaluatedDataset]) -> Iterable[CombinedRow]:
     """Combines datasets of several scenes or weathers that have patches with the same label, and yields one result per
-    label.
+    label. Labels with a single dataset, and datasets with different task options, are left out.
 
     Args:
         rows: all evaluated datasets.

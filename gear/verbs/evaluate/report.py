@@ -31,7 +31,9 @@ class Estimate:
     ceiling: float = 1.0
 
     def as_json(self) -> Json:
-        """Returns the estimate as JSON; numbers that are not finite become null, and a ceiling of 1 is left out."""
+        """Returns `value`, `low` and `high` as JSON; numbers that are not finite become null. A `ceiling` of 1 is left
+        out.
+        """
         low, high = self.interval or (math.nan, math.nan)
         value = known_json({"value": self.value, "low": low, "high": high})
         return value | ({"ceiling": self.ceiling} if self.ceiling < 1 else {})
@@ -78,7 +80,9 @@ class RowReport:
         return str(self.facts["patch"])
 
     def as_json(self) -> Json:
-        """Returns the entry of this dataset in results.json."""
+        """Returns the entry of this dataset in results.json; the keys are `name`, `dataset` (its metadata), `samples`,
+        `metrics`, `cost`, `defense`, `per_sample`, and with a sheet `pictures`.
+        """
         return {
             "name": self.name,
             "dataset": self.facts,
@@ -108,7 +112,7 @@ class CombinedRow:
     metrics: Metrics
 
     def as_json(self) -> Json:
-        """Returns the entry of these datasets in results.json."""
+        """Returns the entry of these datasets in results.json: `patch`, `rows`, `samples` and `metrics`."""
         return {
             "patch": self.patch,
             "rows": list(self.rows),
@@ -133,7 +137,7 @@ class PairedTest:
     pairs: int
 
     def as_json(self) -> Json:
-        """Returns the test as JSON, with null for NaN."""
+        """Returns `mean`, `p` and `pairs` as JSON, with null for NaN."""
         return {**known_json({"mean": self.mean, "p": self.p}), "pairs": self.pairs}
 
 
@@ -157,7 +161,7 @@ class ChangeCount:
     paired: PairedTest
 
     def as_json(self) -> Json:
-        """Returns the entry of this kind of change in results.json."""
+        """Returns the entry of this kind of change in results.json: `count`, `reverse`, `rate` and `paired`."""
         return {
             "count": self.count,
             "reverse": self.reverse,
@@ -186,7 +190,9 @@ class DistanceBin:
     rate: Estimate
 
     def as_json(self) -> Json:
-        """Returns the entry of this bin in results.json; the upper end of the last bin is null."""
+        """Returns the entry of this bin in results.json: `low`, `high` (null for the last bin), `found`, the number of
+        lost objects of each kind, and `rate`.
+        """
         limits = known_json({"low": self.low, "high": self.high})
         return {**limits, "found": self.found, **self.lost, "rate": self.rate.as_json()}
 
@@ -210,7 +216,9 @@ class ObjectChanges:
     by_distance: Mapping[str, tuple[DistanceBin, ...]]
 
     def as_json(self) -> Json:
-        """Returns the entry of the object changes in results.json."""
+        """Returns the entry of the object changes in results.json: `found`, `counts`, `by_distance`, and `changes` with
+        the index of the `sample`.
+        """
         return {
             "found": self.found,
             "counts": {name: one.as_json() for name, one in self.counts.items()},
@@ -240,7 +248,9 @@ class Difference:
     objects: ObjectChanges | None = None
 
     def as_json(self) -> Json:
-        """Returns the entry of the difference in results.json."""
+        """Returns the entry of the difference in results.json: `row`, `against`, `metrics`, `auroc`, `paired`, and for
+        tasks with objects `objects`.
+        """
         return {
             "row": self.row,
             "against": self.against,
@@ -281,7 +291,9 @@ class Pool:
     gathered: Mapping[str, GatheredMetrics] = field(default_factory=dict, repr=False)
 
     def as_json(self) -> Json:
-        """Returns the entry of the pool in results.json."""
+        """Returns the entry of the pool in results.json: `name`, `rows`, `samples`, `metrics`, `cost`, `defense` and
+        `differences`.
+        """
         return {
             "name": self.name,
             "rows": list(self.rows),
@@ -315,7 +327,9 @@ class EvaluateReport:
     pools: tuple[Pool, ...] = ()
 
     def as_json(self) -> Json:
-        """Returns the content of results.json."""
+        """Returns the content of results.json: the entries of `facts`, and the lists `rows`, `together`, `differences`,
+        and `pools` if there are any.
+        """
         return {
             "format": "gear-evaluation",
             "version": 1,
@@ -328,6 +342,9 @@ class EvaluateReport:
 
     def row(self, patch: str) -> RowReport:
         """Returns the results of the first dataset whose patch has this label, such as `none` or `random`.
+
+        Args:
+            patch: label of the patch.
 
         Raises:
             KeyError: no dataset has such a patch.

@@ -31,7 +31,7 @@ class BoardReport:
     refused: tuple[str, ...]
 
     def as_json(self) -> Json:
-        """Returns the content of board.json."""
+        """Returns the content of board.json: the lines `refused`, and the `tables` with their rows."""
         return board_json(self.tables, self.refused)
 
     def summary(self) -> str:

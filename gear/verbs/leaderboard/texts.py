@@ -116,7 +116,12 @@ def _effort(record: Record) -> str:
 
 
 def board_json(tables: Sequence[Table], refused: Sequence[str]) -> Json:
-    """Returns the content of board.json: all tables with their rows, and the refused files."""
+    """Returns the content of board.json: the lines `refused`, and the `tables` with their rows.
+
+    Args:
+        tables: one table per benchmark, task and metric.
+        refused: one line for each file that is no valid record.
+    """
     return {
         "format": "gear-leaderboard",
         "version": 1,

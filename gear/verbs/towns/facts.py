@@ -50,7 +50,9 @@ class Town:
         return sum(lane.line.length_m for lane in self.lanes.lanes.values()) / 1000
 
     def to_json(self) -> Json:
-        """Returns the metadata of the town as JSON, with all fields of its scenes."""
+        """Returns the town as JSON: `name`, `path`, `bounds_m`, numbers of lanes, walks and parking bays, `scenes` with
+        all their fields, and `faulty_scenes` with their errors.
+        """
         scenes = {} if self.scenes is None else self.scenes.scenes
         return {
             "name": self.name,

@@ -87,6 +87,9 @@ class TownGeometry:
 
         An infinite plane is cut 10 km from its centre.
 
+        Args:
+            geom: id of the geom in the compiled model.
+
         Raises:
             TownError: the geom has no triangles, such as a height field.
         """

@@ -15,7 +15,7 @@ VALIDATION = ("val",)
 
 
 def spread(samples: Samples, max_count: int) -> Samples:
-    """Returns at most `max_count` of the samples, evenly spaced."""
+    """Returns at most `max_count` of the samples, evenly spaced over the sequence, in its order."""
     count = min(max_count, len(samples))
     return Samples(samples.datasets, tuple(samples.places[i * len(samples) // count] for i in range(count)))
 
@@ -30,6 +30,9 @@ def keep_some(samples: Samples, share: float, seed: int) -> tuple[Samples, Sampl
         samples: all samples.
         share: share of the samples that is held out for validation, 0..1.
         seed: seed of the draw.
+
+    Returns:
+        The training samples, and the validation samples.
 
     Raises:
         GearError: there are too few samples.

@@ -94,12 +94,12 @@ class Origin:
 
 
 def known(metrics: AnyMapping[str, Any]) -> dict[str, Any]:
-    """Returns the metrics without those that are NaN or infinite, which JSON does not allow."""
+    """Returns the entries of `metrics` without those that are NaN or infinite, which JSON does not allow."""
     return {key: value for key, value in metrics.items() if not isinstance(value, float) or math.isfinite(value)}
 
 
 def metrics_of(validation: AnyMapping[str, Any]) -> dict[str, float]:
-    """Returns the metrics of a validation entry, without its step and its times."""
+    """Returns the metrics of `validation`, an entry of the validations, without its step and its times."""
     return {key: value for key, value in validation.items() if key not in ("step", "elapsed_s", "took_s")}
 
 

@@ -49,7 +49,7 @@ class VerifyReport:
         return [*lines, f"{self.root}: {', '.join(counts)} of {self.files} files"]
 
     def as_json(self) -> Json:
-        """Returns the report as JSON."""
+        """Returns the fields of the report as JSON, and `is_whole`."""
         return {
             "root": str(self.root),
             "files": self.files,

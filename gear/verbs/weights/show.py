@@ -27,7 +27,9 @@ class WeightsFacts:
     sha256: str
 
     def to_json(self) -> Json:
-        """Returns the metadata and the hash as JSON, without the shapes of the tensors."""
+        """Returns `path`, `size_mb`, `sha256`, the numbers of `tensors` and of their values (`numbers`), and the
+        `metadata` of the header, as JSON.
+        """
         return {
             "path": str(self.file.path),
             "size_mb": round(self.file.size_mb, 3),
