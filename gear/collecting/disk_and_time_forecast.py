@@ -29,11 +29,13 @@ class Forecast:
     def __init__(
         self, store: Store, missing: int, on_warning: Warn, clock_s: Callable[[], float] = time.monotonic
     ) -> None:
-        """Args:
-        store: writer of the split's files.
-        missing: number of samples to be made.
-        on_warning: called once with the disk space and the time of a large collection.
-        clock_s: clock in seconds, with any zero point.
+        """Prepares the forecast of a run.
+
+        Args:
+            store: writer of the split's files.
+            missing: number of samples to be made.
+            on_warning: called once with the disk space and the time of a large collection.
+            clock_s: clock in seconds, with any zero point.
         """
         self._store, self._missing, self._on_warning, self._clock_s = store, missing, on_warning, clock_s
         self._sizes: list[int] = []

@@ -45,9 +45,11 @@ class Claims:
     """
 
     def __init__(self, root: Path, split: str) -> None:
-        """Args:
-        root: root of the dataset.
-        split: name of the split.
+        """Prepares the claims of a worker; no sample is claimed.
+
+        Args:
+            root: root of the dataset.
+            split: name of the split.
         """
         self._root, self._split = root, split
         self._held: dict[int, int] = {}

@@ -90,12 +90,14 @@ class SidecarStream(Sequence[Sidecar]):
     """
 
     def __init__(self, root: Path, split: str, samples: int, views: Set[str], closed: ClosedPart | None = None) -> None:
-        """Args:
-        root: root of the dataset.
-        split: name of the split.
-        samples: number of samples.
-        views: names of the cameras that each record must have.
-        closed: the part of the split that was closed before; None for no such part.
+        """Prepares the stream; nothing is read.
+
+        Args:
+            root: root of the dataset.
+            split: name of the split.
+            samples: number of samples.
+            views: names of the cameras that each record must have.
+            closed: the part of the split that was closed before; None for no such part.
         """
         self._root, self._split, self._views = root, split, views
         self._entries: list[Json] = [None] * samples

@@ -31,13 +31,17 @@ class Crash:
 
 
 class CrashDetector:
-    """Finds contacts of the ego car: first by footprints, then by MuJoCo's collision detection."""
+    """Finds contacts of the ego car: first it compares footprints (rectangles on the ground), then it runs MuJoCo's
+    collision detection.
+    """
 
     def __init__(self, space: PlacementSpace, ego_body: str, ego_type: ActorType) -> None:
-        """Args:
-        space: the placement model of the world.
-        ego_body: name of the ego car's body.
-        ego_type: asset of the ego car.
+        """Prepares the detector for the ego car of one drive.
+
+        Args:
+            space: the placement model of the world.
+            ego_body: name of the ego car's body.
+            ego_type: asset of the ego car.
         """
         self._space, self._body, self._type = space, ego_body, ego_type
 
@@ -94,11 +98,11 @@ class CrashDetector:
         return {body: spawn for body, spawn in spawns.items() if own.overlaps(spawn.footprint)}
 
     def hit(self, ego: RigidTransform, spawns: Mapping[str, Spawn]) -> str | None:
-        """The body of the road user that the ego car touches; None without a contact.
+        """The name of the body of the road user that the ego car touches; None without a contact.
 
         Args:
             ego: pose of the ego car.
-            spawns: the road users that may be touched, by body.
+            spawns: the road users that may be touched, by name of their body.
         """
         for body, spawn in spawns.items():
             pairs = self._space.overlaps({self._body: ego, body: self.pose(spawn)})

@@ -46,7 +46,7 @@ class Danger:
 
 
 def danger_of(situation: Situation, scripted: int | None) -> Danger:
-    """Measures the danger in one frame.
+    """Measures the danger in one frame, from the true positions of all road users.
 
     Args:
         situation: the state of the drive.

@@ -59,7 +59,7 @@ class Lead:
             raise FieldError("speed_share", f"is a share, 0 to 1, got {self.speed_share:g}")
 
     def speed_mps(self, ego_mps: float) -> float:
-        """Speed of the vehicle in front at the start, in m/s; never above the speed of the ego car.
+        """Speed of the vehicle ahead in m/s, as the scenario states it, but never above the speed of the ego car.
 
         Args:
             ego_mps: speed of the ego car, m/s.

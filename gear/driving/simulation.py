@@ -65,9 +65,9 @@ class Situation:
         car: its sizes and limits.
         position: its position on its route.
         cruise_mps: its desired speed.
-        path_m: (N, 2) centre line of the lane ahead, in the ego frame.
+        path_m: (N, 2) centre line of the lane ahead, in the ego frame (x forward, y left).
         spawns: the other road users with their positions in the world, by name of their body.
-        obstacles: the same road users with positions and outlines in the ego frame (x forward, y left).
+        obstacles: the same road users with positions, sizes and velocities in the ego frame.
         crash: the first contact; None without one.
         ending: why the drive has ended: `crash`, `time`, `stood`, `passed` or `off_road`; "" while it goes on.
     """
@@ -134,7 +134,9 @@ class _Drive:
 
 
 class DriveSimulation:
-    """One world in which drives take place, one after another. A drive depends only on its draw and on the actions."""
+    """One world in which drives take place, one after another; it moves cars and people, and renders nothing. A drive
+    depends only on its draw (scenario, speed and seed) and on the actions.
+    """
 
     def __init__(self, world: World, crowd: SceneSpec) -> None:
         """Prepares drives in a world.
@@ -210,7 +212,7 @@ class DriveSimulation:
         return self._situation
 
     def step(self, action: Action) -> Situation:
-        """Moves the ego car by a frame with the given action, and all other road users, and returns the new state.
+        """Moves the ego car and all other road users by one frame, and returns the new state.
 
         The drive stops at the first contact. After the end of a drive the state does not change.
 

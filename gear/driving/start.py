@@ -124,7 +124,7 @@ class Start:
 
 
 class StartSampler:
-    """Draws starts of drives in one world."""
+    """Draws starts of drives in one world: where the ego car, the scripted road users and all others begin."""
 
     def __init__(self, world: World, crowd: SceneSpec, space: PlacementSpace) -> None:
         """Prepares the data that all drives share.

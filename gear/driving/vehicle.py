@@ -73,7 +73,8 @@ def car_facts(actor_type: ActorType) -> CarFacts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KinematicBicycle:
-    """A car that follows its wheels, in the plane.
+    """A model of a car's motion in the plane, the kinematic bicycle: the car moves where its wheels roll, without
+    slipping sideways.
 
     Attributes:
         car: sizes and limits.

@@ -135,7 +135,8 @@ class Entry:
     """The recorded network, with its defense if there is one.
 
     Attributes:
-        kind: what the record claims.
+        kind: what the record claims: results of a network alone (`model`), of a defense (`defense`), or of an attack on
+            an entry of others (`attack`).
         task: name of the task plugin.
         metric: metric by which rows are ranked, such as `miou`.
         lower_is_better: whether the metric is an error.
@@ -182,7 +183,7 @@ class AttackFacts:
 
     Attributes:
         plugin: the attack plugin.
-        knowledge: whether it uses gradients of the network.
+        knowledge: `white-box` if the attack uses gradients of the network, `black-box` if only its predictions.
         steps: number of optimisation steps; 0 if queries are limited instead.
         queries: largest number of forward passes; 0 for attacks that count steps.
         restarts: number of restarts from other random patches.

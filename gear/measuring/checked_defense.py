@@ -30,11 +30,13 @@ class CheckedDefense:
         model: Model | None = None,
         learn: Callable[[], Any] = lambda: None,
     ) -> None:
-        """Args:
-        found: plugin of the defense.
-        defense: the built defense.
-        model: the model without the defense, for a defense that uses its feature maps or predictions.
-        learn: function that calibrates the defense and returns its state; called once, before the first sample.
+        """Wraps a defense; it is not calibrated yet.
+
+        Args:
+            found: plugin of the defense.
+            defense: the built defense.
+            model: the model without the defense, for a defense that uses its feature maps or predictions.
+            learn: function that calibrates the defense and returns its state; called once, before the first sample.
         """
         self._found, self._defense, self._model, self._learn = found, defense, model, learn
 

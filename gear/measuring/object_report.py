@@ -34,8 +34,10 @@ class ObjectEvaluator:
     """An evaluator that counts, for each picture, found and missed objects and false alarms."""
 
     def __init__(self, task: WithObjects) -> None:
-        """Args:
-        task: task of the samples, which provides the objects and detections of each picture.
+        """Prepares an evaluator without pictures.
+
+        Args:
+            task: task of the samples, which provides the objects and detections of each picture.
         """
         self._task = task
         self.pictures: list[PictureOutcomes] = []

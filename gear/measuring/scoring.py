@@ -46,8 +46,8 @@ class SampleResult:
 
     Attributes:
         index: index of the sample in the split.
-        metrics: metrics of this sample by name, for each report.
-        parts: evaluators that hold only this sample, by report.
+        metrics: metrics of this sample by name, for each report (a group of metrics).
+        parts: evaluators that hold only this sample, by name of the report.
         cost: computing times `model_s` and `defense_s` in seconds.
         score: the defense's confidence in 0..1 that the sample is attacked; None if there is none.
         mask: agreement of the defense's mask with the patch, by metric; None without a mask.
@@ -108,12 +108,14 @@ class Scorer:
     def __init__(
         self, dataset: Dataset[Any], root: Path, folder: str, reports: tuple[str, ...], model: PluginEntry
     ) -> None:
-        """Args:
-        dataset: the evaluated dataset.
-        root: folder of the evaluation.
-        folder: name of this dataset's folder in the folder of the evaluation.
-        reports: names of the requested reports.
-        model: plugin of the model that predicts.
+        """Prepares the scores of one dataset; nothing is written.
+
+        Args:
+            dataset: the evaluated dataset.
+            root: folder of the evaluation.
+            folder: name of this dataset's folder in the folder of the evaluation.
+            reports: names of the requested reports.
+            model: plugin of the model that predicts.
         """
         self._dataset, self._root, self._folder, self._model = dataset, root, folder, model
         self._task = dataset.task

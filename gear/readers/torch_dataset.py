@@ -65,7 +65,9 @@ class TorchDataset(torch.utils.data.Dataset[Item]):
         change: Change | None = None,
         seed: int = 0,
     ) -> None:
-        """Args:
+        """Opens the samples; none is read.
+
+        Args:
             samples: an opened split, the root folder of a dataset, or any sequence of samples, such as `Samples`.
             split: name of the split, for a root that holds several.
             views: names of the cameras to read; all cameras of the sample by default.

@@ -99,8 +99,8 @@ def row_of(one: Result, patch: str, place: int) -> RowReport | None:
 
     Args:
         one: results of a network.
-        patch: kind of patch.
-        place: number of the (scene, weather) pair.
+        patch: kind of patch, such as `none`, `random` or `patch`.
+        place: position of the scene (with its weather) in the benchmark.
     """
     pool = next((each for each in one.evaluation.pools if each.name == patch), None)
     if pool is None:

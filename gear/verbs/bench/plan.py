@@ -57,7 +57,7 @@ class PlannedEvaluation:
         model, defense: the network and the defense that are evaluated together; `defense` is None for the network
             alone.
         out: folder of the evaluation.
-        pools: roots of the datasets, by kind of patch.
+        pools: roots of the datasets of all scenes, by kind of patch, such as `none`, `random` or `patch`.
     """
 
     task_plugins: TaskPlugins

@@ -77,7 +77,7 @@ class SceneMetric:
 
     Attributes:
         scene, weather: names of the scene and of the weather.
-        patch: kind of patch in the pictures.
+        patch: kind of patch in the pictures, such as `none`, `random` or `patch`.
         samples: number of samples.
         value: value of the metric, with its interval.
     """

@@ -41,7 +41,7 @@ class Point:
     Attributes:
         task, metric: name of the task and of its main metric.
         model, defense: network and defense; `defense` is empty for the network alone.
-        patch: kind of patch.
+        patch: kind of patch, such as `none`, `random` or `patch`.
         value: value of the swept key.
         metrics: the metric over all scenes, one per seed; undefined values are left out.
     """
@@ -161,7 +161,7 @@ def sweep_of(request: BenchRequest) -> tuple[Sweep | None, int]:
 
 
 def requests_of(request: BenchRequest, chosen: Sweep, seed: int) -> Iterator[tuple[str, BenchRequest]]:
-    """Yields each value with the request of one of its benchmarks.
+    """Yields the requests of all benchmarks of a sweep, one per value and seed, each with its value.
 
     Args:
         request: the request of the sweep.

@@ -34,7 +34,12 @@ def page(report: DriveReport, figures: Sequence[tuple[str, bytes]] = ()) -> str:
 
 
 def table(rows: Sequence[Sequence[str]], named: int) -> str:
-    """An HTML table; cells of the first `named` - 1 columns that repeat the row above are left empty."""
+    """Returns a table as HTML. Cells of the first `named` - 1 columns that repeat the row above are left empty.
+
+    Args:
+        rows: the titles, and the cells of each row.
+        named: number of columns that name the row, such as driver and twin.
+    """
     head, *body = rows
     top = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
     lines, before = [], [""] * named

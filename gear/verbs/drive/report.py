@@ -28,7 +28,7 @@ class Rate:
 
     @staticmethod
     def of(flags: Iterable[bool]) -> Rate:
-        """The share of True among flags."""
+        """The share of the values True among `flags`, one flag per drive, with its exact interval."""
         from scipy import stats
 
         values = list(flags)
@@ -53,7 +53,7 @@ class Paired:
         only_here, only_there: situations in which only this twin, or only the other twin, crashed.
         p: two-sided p of McNemar's exact test: how often chance alone gives crashes as unequal as these.
         braking_delay_s: mean delay of the first braking, over situations in which both braked; None without any.
-        score: mean difference of the driving score.
+        score: mean difference of the driving score, this twin minus the other one.
     """
 
     other: str
@@ -119,7 +119,7 @@ class DriveReport:
     Attributes:
         out: folder of the results.
         results: the result of each drive.
-        failed: drives that could not be made, with the reason.
+        failed: drives that could not be made: title of the drive, and the reason.
         facts: config and versions, as JSON.
         free: names of the scenarios without anything in the way.
     """

@@ -152,6 +152,9 @@ def drive_note(dataset: Dataset[Any]) -> str | None:
 
     Args:
         dataset: the dataset.
+
+    Returns:
+        The line of text; None if the samples are single pictures.
     """
     last = dataset.sidecar(-1).record
     if not last.frame:

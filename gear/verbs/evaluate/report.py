@@ -54,7 +54,7 @@ class RowReport:
         samples: number of samples.
         made: number of samples predicted in this run.
         damaged: one line per stored prediction that could not be read and was made again.
-        metrics: metrics over all samples, by report and name.
+        metrics: metrics over all samples, by name of the report (a group of metrics) and of the metric.
         cost: mean seconds per sample: `model_s`, `defense_s`.
         defense: mean metrics of the defense's masks, and the share of pictures that raise its alarm; empty without a
             defense.
@@ -103,7 +103,7 @@ class CombinedRow:
         patch: label of the patches.
         rows: names of the datasets (`RowReport.name`).
         samples: number of samples in all these datasets.
-        metrics: metrics over all samples, by report and name.
+        metrics: metrics over all samples, by name of the report (a group of metrics) and of the metric.
     """
 
     patch: str
@@ -233,7 +233,7 @@ class Difference:
 
     Attributes:
         row, against: names of the dataset and of the twin; differences are `row` minus `against`.
-        metrics: differences of the metrics, by report and name.
+        metrics: differences of the metrics, by name of the report (a group of metrics) and of the metric.
         auroc: area under the ROC curve of the defense's score, which should be high for samples of `row` and low for
             those of `against`; None without scores.
         paired: tests of the metrics that are defined for single samples, by report and metric.

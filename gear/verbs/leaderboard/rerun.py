@@ -40,10 +40,10 @@ class Again:
     """One sample that was measured again.
 
     Attributes:
-        patch: kind of patch.
+        patch: kind of patch, such as `none`, `random`, `patch` or `adaptive patch`.
         place: number of the (scene, weather) pair in the benchmark.
         index: index of the sample.
-        content_key: content key of the dataset that was made again.
+        content_key: hash of everything that decides the pictures of the dataset that was made again.
         sha256: hash over the files of the prediction.
         value: metric of the sample; None if it is undefined.
         score: the defense's score; None without a score.

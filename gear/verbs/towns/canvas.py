@@ -191,7 +191,7 @@ class Canvas:
         return np.asarray(moved, dtype=np.uint8)
 
     def clip(self, paper: Colour) -> None:
-        """Fills everything outside the part of the picture that the map covers.
+        """Fills the margins of the picture with a colour: everything outside the part that the map covers (`box_px`).
 
         Args:
             paper: colour of the margins.
