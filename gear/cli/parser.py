@@ -33,7 +33,7 @@ class Parser(argparse.ArgumentParser):
         code 2.
 
         Args:
-            unknown: the words.
+            unknown: the words, as argparse returns those that it does not know.
         """
         flag = next((word.partition("=")[0] for word in unknown if word.startswith("-")), None)
         if flag is None:

@@ -88,11 +88,14 @@ class LanePath:
 
 
 def to_ego(state: VehicleState, points_m: Points) -> Points:
-    """Converts points from world coordinates to the ego frame (x forward, y left).
+    """Converts points from world coordinates to the ego frame (origin in the middle of the car, x forward, y left).
 
     Args:
         state: the ego car.
-        points_m: (N, 2) points in world coordinates.
+        points_m: (N, 2) points in world coordinates, metres.
+
+    Returns:
+        (N, 2) points in the ego frame, metres.
     """
     c, s = math.cos(state.yaw_rad), math.sin(state.yaw_rad)
     offsets_m = points_m - np.array([state.x_m, state.y_m])

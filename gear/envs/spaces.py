@@ -86,7 +86,7 @@ def action_of(pedals_and_steering: npt.NDArray[Any], car: CarFacts) -> Action:
 
     Args:
         pedals_and_steering: (2,) numbers in -1..1, larger ones are clipped: pedals (1 full acceleration, -1 full
-            braking), and steering (1 full lock to the left).
+            braking) and steering (1 fully to the left).
         car: limits of the car, by which the numbers are scaled.
     """
     pedals, steering = (float(value) for value in np.clip(pedals_and_steering, -1.0, 1.0))

@@ -47,7 +47,7 @@ class GapReport:
         dataset, twin: roots of the clean dataset and of the same dataset rendered with the patch.
         split, patch, renderer, quality: split, label of the patch, renderer and render quality of the pictures.
         samples: comparisons of the pictures that show a patch; other pictures are left out.
-        effect: the task's metrics for `clean`, each compositor and `rendered`; empty without a model.
+        effect: the task's metrics by name, for `clean`, each compositor and `rendered`; empty without a model.
         sample_effects: changes of the metrics of single samples.
         metric: name of the metric in the table of single samples.
         model: name of the model; None without a model.

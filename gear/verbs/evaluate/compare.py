@@ -195,7 +195,7 @@ def metrics_of(row: EvaluatedDataset) -> dict[str, dict[str, Estimate]]:
         row: the evaluated dataset.
 
     Returns:
-        The metrics by name of the report and name of the metric.
+        The estimates by name of the report (a group of metrics) and name of the metric.
     """
     metrics = {}
     for report in row.scorer.reports:

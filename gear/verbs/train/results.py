@@ -63,10 +63,12 @@ class Origin:
     picture_share: float
 
     def metadata(self, metrics: AnyMapping[str, Any]) -> dict[str, str]:
-        """Returns the metadata of the weights file; all values are texts, structured values are JSON texts.
+        """Returns the metadata of the weights file: `model`, `package`, `task`, `gear` (version), `command`, `seed`,
+        `look` and `look_hash` (appearance of the training pictures), `data`, `metrics` and `options`. All values are
+        texts; structured values are JSON texts.
 
         Args:
-            metrics: metrics of the last or best validation, by name.
+            metrics: validation metrics of the weights, by name; those that are not finite are left out.
         """
         data = {"training": self.training.facts(), "validation": self.validation.facts()}
         return {
