@@ -81,10 +81,10 @@ def evaluate(
     """Evaluates a model, with or without a defense, on datasets of its task; resumes an interrupted run.
 
     The folder `out` gets results.json, table.txt, report.html with pictures, and one folder per dataset with
-    predictions in the result layout of the dataset's format and a note (scores) per sample. Samples with a note are not
-    predicted again, unless their files are damaged. Datasets that differ only in their patch are compared sample by
-    sample, and detections object by object. Intervals are 95 % jackknife intervals over streets, groups of samples with
-    the same scene content.
+    predictions in the result layout of the dataset's format and a result file (scores) per sample. Samples with a
+    result file are not predicted again, unless their files are damaged. Datasets that differ only in their patch are
+    compared sample by sample, and detections object by object. Intervals are 95 % jackknife intervals over streets,
+    groups of samples with the same scene content.
 
     Args:
         data: roots of datasets, or folders of such roots, all of one task; `DIR:SPLIT` selects a split.
