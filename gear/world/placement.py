@@ -67,7 +67,8 @@ class PlacementSpace:
     def __init__(
         self, model: mujoco.MjModel, bodies: Mapping[str, ActorType], parked_m: float = -PARKED_DEPTH_M
     ) -> None:
-        """Prepares the placement model for queries: all actors are moved out of the way.
+        """Prepares the placement model for queries. All actors are moved out of the way, and the time step and the
+        integrator of `model` are changed.
 
         Args:
             model: the placement model.
@@ -86,8 +87,15 @@ class PlacementSpace:
         self._pose({})
 
     def ground_m(self, x_m: float, y_m: float, near_z_m: float) -> float | None:
-        """The height in metres of the ground at (x_m, y_m), world coordinates; None if there is no ground near the
-        height `near_z_m`.
+        """The height of the ground at one point, measured by a vertical ray.
+
+        Args:
+            x_m, y_m: the point, world coordinates.
+            near_z_m: height near which the ground is searched: from `STEP_UP_M` above it to twice this distance below
+                it.
+
+        Returns:
+            The height in world coordinates, metres; None if there is no ground near `near_z_m`.
         """
         start_m = np.array([x_m, y_m, near_z_m + STEP_UP_M])
         geom = np.zeros(1, np.int32)
@@ -144,8 +152,13 @@ class PlacementSpace:
         return GroundPose(pose, bool(uneven_m <= EVEN_M))
 
     def overlaps(self, poses: Mapping[str, RigidTransform]) -> list[tuple[str, str]]:
-        """The pairs of actors' bodies that overlap at the given poses, by name. The second name is "" if an actor
-        overlaps the town or a board.
+        """Finds actors that overlap each other, the town or a board.
+
+        Args:
+            poses: world pose of each actor, by name of its body; all other actors are out of the way.
+
+        Returns:
+            Sorted pairs of body names. The second name is "" if an actor overlaps the town or a board.
         """
         self._pose(poses)
         mujoco.mj_collision(self._model, self._data)
@@ -165,7 +178,14 @@ class PlacementSpace:
         return ACTOR_GROUP in groups and all(group in (ACTOR_GROUP, OBSTACLE_GROUP) for group in groups)
 
     def settle(self, poses: Mapping[str, RigidTransform]) -> dict[str, RigidTransform]:
-        """Drops actors from just above the given poses and returns the poses at which they come to rest."""
+        """Drops actors from just above the given poses and simulates until they come to rest on uneven ground.
+
+        Args:
+            poses: world pose of each actor, by name of its body.
+
+        Returns:
+            The pose after the simulation, by the same names.
+        """
         lifted = {
             name: RigidTransform.from_parts(
                 "world", "actor", pose.rotation, pose.translation_m + pose.rotation[:, 2] * SETTLE_DROP_M
@@ -185,8 +205,15 @@ class PlacementSpace:
         return settled
 
     def visible(self, eye_m: Array, targets_m: Array) -> npt.NDArray[np.bool_]:
-        """Tests which of (N, 3) points are visible from the point `eye_m`, (3,): (N,) bool. Only the town, its boards
-        and its ground can hide a point.
+        """Tests which points are visible from one point. Only the town, its boards and its ground can hide a
+        point; actors cannot.
+
+        Args:
+            eye_m: (3,) position of the camera, world coordinates.
+            targets_m: (N, 3) points, world coordinates; none equals `eye_m`.
+
+        Returns:
+            (N,) bool.
         """
         return self._rays(eye_m, targets_m, _STATIC)[0] < 0
 

@@ -38,6 +38,9 @@ class SceneFile:
     def scene(self, name: str) -> SceneSpec:
         """Returns the scene with this name.
 
+        Args:
+            name: name of the scene.
+
         Raises:
             ConfigError: that scene is faulty.
             UnknownNameError: there is no scene with this name.
@@ -51,6 +54,9 @@ class SceneFile:
 
 def read_scene_file(path: Path) -> SceneFile:
     """Reads a scene library.
+
+    Args:
+        path: path of the YAML file.
 
     Raises:
         ConfigError: the file is not YAML, is no scene library, or none of its scenes can be read.

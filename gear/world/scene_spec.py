@@ -216,7 +216,12 @@ class SceneSpec:
                 raise FieldError(name, "ahead_m and lateral_m are in the frame of the first board; use radius_m")
 
     def capped(self, max_vehicles: int, max_pedestrians: int) -> SceneSpec:
-        """The same scene with at most `max_vehicles` other vehicles and `max_pedestrians` people."""
+        """The same scene with upper limits on the counts of road users.
+
+        Args:
+            max_vehicles: largest number of other vehicles.
+            max_pedestrians: largest number of people.
+        """
         return replace(
             self,
             npc_vehicles=_capped(self.npc_vehicles, max_vehicles),
@@ -224,7 +229,11 @@ class SceneSpec:
         )
 
     def crowded(self, factor: float) -> SceneSpec:
-        """The same scene with `factor` times as many other vehicles and people."""
+        """The same scene with `factor` times as many other vehicles and people.
+
+        Args:
+            factor: factor on the smallest and the largest count.
+        """
         if factor == 1:
             return self
         return replace(
@@ -232,7 +241,11 @@ class SceneSpec:
         )
 
     def mixed(self, mix: Mapping[str, float]) -> SceneSpec:
-        """The same scene, in which the factors of the vehicle mix are multiplied by the factors in `mix`."""
+        """The same scene, in which the factors of the vehicle mix are multiplied by the factors in `mix`.
+
+        Args:
+            mix: factors by kind of vehicle, such as `{"bus": 3}`.
+        """
         if not mix:
             return self
         return replace(self, npc_vehicles=replace(self.npc_vehicles, mix=product_of(self.npc_vehicles.mix, mix)))

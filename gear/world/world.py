@@ -166,8 +166,10 @@ class World:
         return self.library.town_name
 
     def surface_records(self, carrier_id: int | None = None) -> tuple[SurfaceRecord, ...]:
-        """The records of all faces that can show patches. `carrier_id` is the id of the actor that carries the faces in
-        a scene with a truck, otherwise None.
+        """The records of all faces that can show patches, in patch order.
+
+        Args:
+            carrier_id: id of the actor that carries the faces in a scene with a truck, otherwise None.
         """
         return tuple(face.record(carrier_id) for face in self.faces)
 

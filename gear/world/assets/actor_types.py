@@ -96,19 +96,21 @@ def body_tree(model: mujoco.MjModel, body_id: int) -> list[int]:
     Args:
         model: the compiled model.
         body_id: id of the body.
+
+    Returns:
+        The ids in increasing order, `body_id` first.
     """
     outside = np.flatnonzero(model.body_parentid[body_id + 1 :] < body_id)
     return list(range(body_id, body_id + 1 + int(outside[0]) if len(outside) else model.nbody))
 
 
 def visible_geoms(model: mujoco.MjModel, body_id: int, label_code: npt.NDArray[np.uint8]) -> list[int]:
-    """The ids of the visible geoms of a body and of its descendants. `label_code` is the (ngeom,) uint8 array of label
-    codes.
+    """The ids of the visible geoms of a body and of its descendants.
 
     Args:
         model: the compiled model.
         body_id: id of the body.
-        label_code: (ngeom,) uint8 label code of each geom.
+        label_code: (ngeom,) uint8 label code of each geom; geoms with `HIDDEN_CODE` are left out.
     """
     owners = np.isin(model.geom_bodyid, body_tree(model, body_id))
     return [int(geom) for geom in np.flatnonzero(owners & (label_code != HIDDEN_CODE))]
@@ -188,6 +190,9 @@ def static_objects(
         classes: labels of the geoms.
         slots: the pool of actors; their bodies are not objects of the town.
         path: the town's file, for error messages.
+
+    Returns:
+        The objects, and the object id of each geom.
 
     Raises:
         TownError: a geom with such a label has no body of its own, or is infinite.

@@ -18,7 +18,14 @@ ASSET_SUFFIXES = (".xml", ".obj", ".msh", ".stl", ".png")
 
 
 def asset_files(library: AssetLibrary) -> dict[str, Path]:
-    """All MJCF files, meshes and textures of a town, by a name that does not depend on where the folders are."""
+    """All MJCF files, meshes and textures of a town and of the actors and boards that it uses, for a hash of them.
+
+    Args:
+        library: the asset library of the town.
+
+    Returns:
+        The paths by a name that does not depend on where the folders are, so the hash is the same on every machine.
+    """
     own = data_dir("mjcf")
     roots = [library.town, library.town.with_suffix("")]
     roots += [library.folder("vehicle"), library.folder("pedestrian"), library.folder("surface")]
@@ -89,7 +96,11 @@ def _bases(path: Path, file: Path) -> list[Path]:
 
 
 def assets_digest(library: AssetLibrary) -> str:
-    """The SHA-256 hash (hex) of the names and contents of all assets of a town: MJCF files, meshes and textures."""
+    """The SHA-256 hash (hex) of the names and contents of all assets of a town: MJCF files, meshes and textures.
+
+    Args:
+        library: the asset library of the town.
+    """
     files = asset_files(library)
     digest = hashlib.sha256()
     for name in sorted(files):

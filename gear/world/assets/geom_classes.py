@@ -37,6 +37,9 @@ class GeomClasses:
 def unprefixed_class(classname: str) -> str:
     """The name of a default class in its own file, without the prefix `<file>/` that dm_control adds when it
     composes files.
+
+    Args:
+        classname: name of the class in the composed world, such as `town10/building.brick`.
     """
     return classname.rsplit("/", 1)[-1]
 
@@ -47,6 +50,9 @@ def classify(spec: mujoco.MjSpec, path: Path) -> GeomClasses:
     Args:
         spec: spec of the model; it must have been compiled, so that its geoms have ids.
         path: the town's file, for error messages.
+
+    Returns:
+        Label codes, paint and faces of all geoms, by geom id.
 
     Raises:
         TownError: the class of a visible geom does not start with a known label.

@@ -95,7 +95,11 @@ def world_triangles(model: mujoco.MjModel, data: mujoco.MjData, geom_id: int) ->
 
 
 def static_geoms(model: mujoco.MjModel) -> npt.NDArray[np.bool_]:
-    """Which geoms belong to the town and its boards: (ngeom,) bool, False for geoms of actors."""
+    """Which geoms belong to the town and its boards: (ngeom,) bool, False for geoms of actors.
+
+    Args:
+        model: compiled render model, in which actors are mocap bodies.
+    """
     return np.asarray(model.body_mocapid[model.body_rootid[model.geom_bodyid]] < 0)
 
 
@@ -114,6 +118,9 @@ def body_shape(
         body_id: the body.
         geom_ids: the geoms; at least one.
         label_code: (ngeom,) uint8 labels of all geoms.
+
+    Returns:
+        The triangles with the label code of their geom, and the box around them along the axes of the body's frame.
 
     Raises:
         ValueError: a geom is a plane or a height field, which have no finite surface.

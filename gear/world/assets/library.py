@@ -42,6 +42,9 @@ FOLDERS = {"town": "towns", "vehicle": "vehicles", "pedestrian": "pedestrians", 
 def read_xml(path: Path) -> ET.Element:
     """Parses an MJCF file and returns its root element.
 
+    Args:
+        path: path of the file.
+
     Raises:
         TownError: the file is not XML, or cannot be read.
     """
@@ -57,8 +60,11 @@ def read_xml(path: Path) -> ET.Element:
 
 
 def read_numbers(path: Path) -> ET.Element:
-    """Parses an MJCF file, returns its root element, and rejects NaN. MuJoCo only prints a warning for NaN and leaves
-    out the geom.
+    """Parses an MJCF file, returns its root element, and rejects NaN. MuJoCo only prints a warning for NaN and
+    leaves out the geom.
+
+    Args:
+        path: path of the file.
 
     Raises:
         TownError: the file is not XML, cannot be read, or contains a NaN.
@@ -106,6 +112,9 @@ class ActorFacts:
 
 def read_actor_facts(path: Path) -> ActorFacts:
     """Reads the metadata of an actor from the `<custom>` sections of its MJCF file and of included files.
+
+    Args:
+        path: path of the actor's MJCF file.
 
     Raises:
         TownError: a file is not XML, or an entry breaks gear's conventions for MJCF.
@@ -226,7 +235,14 @@ class AssetLibrary:
         return self.town.stem
 
     def folder(self, kind: Literal["vehicle", "pedestrian", "surface"]) -> Path:
-        """The folder with the MJCF files of all vehicles, pedestrians or surfaces."""
+        """The folder with the MJCF files of all vehicles, pedestrians or surfaces.
+
+        Args:
+            kind: the kind of asset.
+
+        Returns:
+            The town's own folder if it has one next to its folder `towns`, otherwise gear's folder.
+        """
         own = self.town.parent.parent / FOLDERS[kind]
         if self.town.parent.name == "towns" and own.is_dir():
             return own
@@ -234,6 +250,10 @@ class AssetLibrary:
 
     def path(self, kind: Literal["vehicle", "pedestrian", "surface"], name: str) -> Path:
         """Path of the MJCF file of the asset with this kind and name.
+
+        Args:
+            kind: the kind of asset.
+            name: name of the asset: its file's name without suffix.
 
         Raises:
             UnknownNameError: there is no asset with this name.

@@ -63,6 +63,10 @@ class SceneAssets:
 def read_scene_assets(library: AssetLibrary, scene: SceneSpec) -> SceneAssets:
     """Finds the assets of a scene and reads their metadata.
 
+    Args:
+        library: the asset library of the town.
+        scene: the scene, which names its boards or truck and the mix of vehicles.
+
     Raises:
         UnknownNameError: the town has no such board or truck, or no ego car.
         TownError: an actor's file breaks the conventions, or a vehicle and a pedestrian have the same name.

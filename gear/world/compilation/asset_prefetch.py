@@ -33,13 +33,20 @@ class AssetPrefetcher:
     """Reads meshes and textures into MuJoCo's cache, in the threads of a pool."""
 
     def __init__(self, readers: ThreadPoolExecutor | None) -> None:
-        """Stores the thread pool; if it is None, no file is read."""
+        """Makes a prefetcher.
+
+        Args:
+            readers: the threads that read; None if no file should be read in advance.
+        """
         self._readers = readers
 
     def prefetch(self, files: Iterable[str]) -> None:
         """Starts to read files: paths that end in `.png` are textures, all others are meshes.
 
         Files that cannot be read are ignored; the compilation of the world reports them.
+
+        Args:
+            files: paths of meshes and textures.
         """
         if self._readers is not None:
             for batch in _batches(files):
@@ -53,10 +60,11 @@ class AssetPrefetcher:
 
 @contextlib.contextmanager
 def asset_prefetcher(readers: int) -> Iterator[AssetPrefetcher]:
-    """Context with a prefetcher. It opens MuJoCo's cache at the start, and empties and closes the cache at the end.
+    """A context with a prefetcher. MuJoCo's cache is open inside the context, and empty and closed afterwards.
 
     Args:
-        readers: number of threads that read; with 0 no file is prefetched, which saves memory.
+        readers: number of threads that read. With 0 the cache stays closed and no file is read in advance, which saves
+            memory.
     """
     disable_asset_cache()
     if not readers:

@@ -36,11 +36,15 @@ _CODE_SUFFIXES = (".py", ".pyc", ".so")
 
 
 def main(folder: str) -> None:
-    """Compiles a world and saves it into the folder. The world's key (a JSON text) is the first line of standard input.
+    """Compiles a world and saves it into the folder. The world's key (a JSON text) is the first line of standard
+    input.
 
     When the world is saved, the worker writes `DONE` to standard output. The worker also creates the file `MAY_CACHE`
     if the key covers every file that was read. The key does not cover files outside the town's assets, or a file that
     was edited in the meantime.
+
+    Args:
+        folder: existing, empty folder for the compiled world.
     """
     gc.disable()  # half a million objects live to the end; collecting garbage took a third of the time
     sys.setswitchinterval(_SWITCH_S)

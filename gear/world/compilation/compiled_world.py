@@ -55,6 +55,9 @@ class CompiledWorld:
 
         The bounding volumes of the render model's meshes are left out, because only rays need them.
 
+        Args:
+            folder: the folder, which must exist.
+
         Raises:
             OSError: the disk is full.
         """

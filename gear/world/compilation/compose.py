@@ -62,6 +62,9 @@ class Composition:
         """Writes the textures into a folder and returns a composition that refers only to files.
 
         This saves memory: MuJoCo copies all assets in memory at once, but reads files one by one.
+
+        Args:
+            folder: an existing folder; the returned composition needs it until the world is compiled.
         """
         for name, content in self.assets.items():
             if not isinstance(content, MeshPath):

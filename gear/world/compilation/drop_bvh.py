@@ -23,12 +23,15 @@ _ALIGNMENT_BYTES = 64
 
 @contextlib.contextmanager
 def without_mesh_bvh(model: mujoco.MjModel) -> Iterator[None]:
-    """Context in which a model has only the BVHs of its bodies. A model that is saved in this context has no BVHs of
-    meshes in its file.
+    """Context in which a model has only the BVHs of its bodies. A model that is saved in this context has no BVHs
+    of meshes in its file.
 
     In the loaded model all meshes share one empty box as BVH, so rays miss them. A model with flexes is not changed. A
     model is also not changed if its memory layout differs from that of the MuJoCo release for which this module was
     written.
+
+    Args:
+        model: the model; it is changed inside the context and restored at its end.
     """
     sizes, count = _sizes(model), int(np.max(model.body_bvhadr + model.body_bvhnum, initial=0))
     if sizes is None or count >= model.nbvh or model.nflex or not model.nmesh:

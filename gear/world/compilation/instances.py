@@ -92,8 +92,15 @@ def class_name(dclass: Any) -> str:
 
 
 def free_name(root: mjcf.RootElement, kind: str, name: str) -> str:
-    """A name that no element of this kind has in the tree: `name`, followed by underscores if the name is
-    already used.
+    """A name that no element of this kind has in the tree.
+
+    Args:
+        root: the tree.
+        kind: tag of the element, such as `texture` or `material`.
+        name: the name to begin with.
+
+    Returns:
+        `name`; with underscores appended if another element already has it.
     """
     while root.find(kind, name) is not None:
         name += "_"
@@ -104,11 +111,11 @@ class AssetInstances:
     """Makes instances of assets in a composition; the file of each asset is attached once."""
 
     def __init__(self, root: mjcf.RootElement, files: Mapping[AssetFile, SplitAsset]) -> None:
-        """Stores the tree of a town, to which instances are added, and the MJCF of the assets.
+        """Makes an object that adds instances to one composed world.
 
         Args:
-            root: the tree.
-            files: the MJCF of the assets.
+            root: MJCF tree of the town, to which instances are added.
+            files: MJCF of each asset, by its file.
         """
         self._root = root
         self._files = files
@@ -127,10 +134,15 @@ class AssetInstances:
         return tuple(file.path for file in self._models)
 
     def add_instance(self, file: AssetFile, body: Any) -> None:
-        """Adds an instance of an asset to a body. The instance shares meshes and materials with all other instances of
-        the asset.
+        """Adds an instance of an asset to a body. The instance shares meshes and materials with all other
+        instances of the asset.
 
         The instances of an asset use the number plates in its file in turn.
+
+        Args:
+            file: file of the asset.
+            body: dm_control's empty body in the town's tree; its name becomes the prefix of the names of the instance's
+                elements.
 
         Raises:
             TownError: the file cannot be attached, or another element already has the name of the instance.
@@ -139,12 +151,20 @@ class AssetInstances:
         self._originals.setdefault(file, body.name)
 
     def has_instance(self, file: AssetFile) -> bool:
-        """Whether the asset has an instance that `copy_instance` can copy, made by `add_instance`."""
+        """Whether the asset has an instance that `copy_instance` can copy, made by `add_instance`.
+
+        Args:
+            file: file of the asset.
+        """
         return file in self._originals
 
     def copy_instance(self, file: AssetFile, name: str) -> None:
-        """Requests a copy of an asset's first instance, in a body with the given name. `put_copies_into` writes the
-        copy later, without dm_control.
+        """Requests a copy of an asset's first instance, in a body with the given name. `put_copies_into` writes
+        the copy later, without dm_control.
+
+        Args:
+            file: file of an asset for which `has_instance` is True.
+            name: name of the copy's body.
         """
         plates = {geom: plate.full_identifier for geom, plate in self._next_plates(file).items()}
         frame = self._model(file).full_identifier  # names the empty body that dm_control puts after the first instance
@@ -210,13 +230,20 @@ class AssetInstances:
                 child.remove()
 
     def put_copies_into(self, tree: ET.Element) -> None:
-        """Inserts the copies that `copy_instance` requested into the MJCF tree that dm_control wrote."""
+        """Inserts the copies that `copy_instance` requested into the MJCF tree that dm_control wrote.
+
+        Args:
+            tree: root of the tree, changed in place.
+        """
         for worldbody in tree.iterfind("worldbody"):
             put_copies_into(worldbody, self._copies)
 
     def put_defaults_into(self, xml: str) -> str:
-        """Inserts the default classes that dm_control did not read into the MJCF text that dm_control wrote. Returns
-        the complete text.
+        """Inserts the default classes that dm_control did not read into the MJCF text that dm_control wrote.
+        Returns the complete text.
+
+        Args:
+            xml: the MJCF text of the whole world.
         """
         for name, defaults in self._defaults.items():
             before, empty, after = xml.partition(f'<default class="{name}/"/>')

@@ -26,8 +26,11 @@ LARGEST_SIDE_PX = 16384
 
 
 def effective_rgba(model: mujoco.MjModel) -> Array:
-    """The (ngeom, 4) float64 RGBA colours of geoms, 0..1: the geom's own colour if it has one, otherwise the colour of
-    its material.
+    """The (ngeom, 4) float64 RGBA colours of geoms, 0..1: the geom's own colour if it has one, otherwise the
+    colour of its material.
+
+    Args:
+        model: compiled model.
     """
     rgba: Array = model.geom_rgba.astype(np.float64)
     plain = ~has_own_colour(model)
@@ -36,7 +39,11 @@ def effective_rgba(model: mujoco.MjModel) -> Array:
 
 
 def visible_materials(model: mujoco.MjModel) -> dict[int, int]:
-    """The materials that visible geoms use: the id of the first visible geom with the material, by material id."""
+    """The materials that visible geoms use: the id of the first visible geom with the material, by material id.
+
+    Args:
+        model: compiled model.
+    """
     first_geoms: dict[int, int] = {}
     for geom in np.flatnonzero((model.geom_group < FIRST_HIDDEN_GROUP) & (model.geom_matid >= 0)).tolist():
         first_geoms.setdefault(int(model.geom_matid[geom]), geom)
@@ -44,7 +51,12 @@ def visible_materials(model: mujoco.MjModel) -> dict[int, int]:
 
 
 def textures_of(model: mujoco.MjModel, material: int) -> list[tuple[int, int]]:
-    """The textures of a material as pairs (role, texture id); roles are values of `mujoco.mjtTextureRole`."""
+    """The textures of a material as pairs (role, texture id); roles are values of `mujoco.mjtTextureRole`.
+
+    Args:
+        model: compiled model.
+        material: id of the material.
+    """
     return [(role, int(texture)) for role, texture in enumerate(model.mat_texid[material]) if texture >= 0]
 
 

@@ -64,6 +64,10 @@ def release_render_arrays(model: mujoco.MjModel) -> None:
     """Releases the texels and triangles of a model after a renderer has copied them.
 
     Afterwards no further renderer can be opened for the model.
+
+    Args:
+        model: the render model, changed in place. Code that reads its meshes or textures, such as `find_lamps`, must
+            run before.
     """
     _give_back(getattr(model, name) for name in _SHOWN)
 

@@ -21,6 +21,13 @@ Bytes: TypeAlias = np.ndarray[tuple[int], np.dtype[np.uint8]]
 def write_model(model: mujoco.MjModel, path: Path) -> int:
     """Writes a model into a new file and returns the CRC-32 of its content.
 
+    Args:
+        model: the compiled model.
+        path: path of the new file.
+
+    Returns:
+        The CRC-32 of the content, which `read_model` checks.
+
     Raises:
         OSError: the disk is full.
     """

@@ -59,6 +59,9 @@ class PlacementBody:
 def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]:
     """Compiles the render model of a world, which has no collision geoms; actors are mocap bodies.
 
+    Args:
+        composition: the composed world.
+
     Returns:
         The model, and the labels of its geoms.
 
@@ -76,10 +79,14 @@ def render_model(composition: Composition) -> tuple[mujoco.MjModel, GeomClasses]
 
 
 def placement_spec(composition: Composition) -> mujoco.MjSpec:
-    """Reads the spec of the placement model, which has only collision geoms; every actor is a free body on four feet.
+    """Reads the spec of the placement model, which has only collision geoms; every actor is a free body on four
+    feet.
 
     Sizes and masses of the actors are missing, because they are measured on the render model; `placement_model` sets
     them later. This function can therefore run while the render model is compiled.
+
+    Args:
+        composition: the composed world.
 
     Raises:
         TownError: MuJoCo cannot read the MJCF, a collision geom is not a primitive, or an actor has no collision geom.

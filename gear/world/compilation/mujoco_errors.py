@@ -21,7 +21,11 @@ def without_breaks(error: BaseException) -> str:
 
 
 def compile_problem(path: Path) -> str:
-    """MuJoCo's error message for a single MJCF file; "" if the file compiles."""
+    """MuJoCo's error message for a single MJCF file; "" if the file compiles.
+
+    Args:
+        path: path of the file.
+    """
     try:
         read_spec(path).compile()
     except ValueError as error:

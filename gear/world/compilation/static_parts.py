@@ -34,7 +34,7 @@ _WORLD = "<worldbody>"
 
 
 class MeshPath(bytes):
-    """The path of a mesh file, passed to dm_control instead of the file's content."""
+    """The encoded path (`os.fsencode`) of a mesh file, passed to dm_control instead of the file's content."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,11 @@ class StaticParts:
     geom_materials: tuple[tuple[str, str | None], ...] = ()
 
     def insert_into(self, xml: str) -> str:
-        """Inserts these elements at the start of the worldbody of an MJCF text. Returns the new text."""
+        """Inserts these elements at the start of the worldbody of an MJCF text. Returns the new text.
+
+        Args:
+            xml: MJCF text of the world, as dm_control wrote it.
+        """
         before, world, after = xml.partition(_WORLD)
         return before + world + self.xml + after if self.xml else xml
 
@@ -81,6 +85,9 @@ def split_town(path: Path) -> SplitTown:
     A town is not split if it includes other files, or if its worldbody has other elements (joints, cameras, sites,
     geoms without a class). dm_control then reads the file itself. There is one exception: if such a file calls its root
     default class `main`, dm_control gets a text without that name, because it would make a second class.
+
+    Args:
+        path: path of the town's MJCF file.
 
     Raises:
         TownError: the file is not XML, cannot be read, or contains a NaN.
@@ -131,6 +138,9 @@ def split_asset(file: AssetFile) -> SplitAsset:
 
     A file is not split if it includes other files, or if its default classes refer to other elements (such as a
     material) or apply to elements other than geoms and meshes.
+
+    Args:
+        file: file of the asset, a board or an actor.
 
     Raises:
         TownError: the file is not XML, cannot be read, contains a NaN, or cannot be scaled.

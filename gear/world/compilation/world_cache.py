@@ -119,6 +119,9 @@ def _from_cache(cache_dir: Path, plan: WorldPlan) -> CompiledWorld:
 def world_key(plan: WorldPlan) -> dict[str, Json]:
     """The key of a compiled world in the cache, as JSON: town, scene and weather of `plan`, a hash of its assets,
     a hash of gear's code, and the versions of MuJoCo and dm_control.
+
+    Args:
+        plan: the contents of the world.
     """
     return {
         "town": str(plan.town.resolve()),

@@ -46,6 +46,9 @@ def plan_world(library: AssetLibrary, scene: SceneSpec, weather: Weather) -> Wor
         scene: the scene with its boards and trucks.
         weather: the weather.
 
+    Returns:
+        The plan, from which `compile_world` compiles the world.
+
     Raises:
         UnknownNameError: the town has no such board or truck, or no ego car.
         TownError: an actor's file breaks the conventions.

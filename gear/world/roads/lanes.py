@@ -172,6 +172,9 @@ class LaneGraph:
         """Finds the point on the lanes that is nearest to a position (3,) in world coordinates.
 
         The distance is measured in 3D, so a lane on a bridge is far from a car below it.
+
+        Args:
+            position_m: (3,) position.
         """
         best: tuple[float, LanePoint] | None = None
         for lane in self.lanes.values():

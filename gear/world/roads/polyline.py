@@ -24,7 +24,11 @@ class Polyline:
 
     @staticmethod
     def through(points_m: Array) -> Polyline:
-        """Makes the polyline through (N, 3) points in metres."""
+        """Makes the polyline through points, and computes its arc lengths.
+
+        Args:
+            points_m: (N, 3) points in world coordinates, metres, at least two.
+        """
         steps_m = np.linalg.norm(np.diff(points_m[:, :2], axis=0), axis=1)
         return Polyline(frozen(points_m), frozen(np.concatenate([[0.0], np.cumsum(steps_m)])))
 
@@ -34,7 +38,14 @@ class Polyline:
         return float(self.s_m[-1])
 
     def segment(self, s_m: float) -> int:
-        """Index of the segment at an arc length; beyond the ends, the index of the first or last segment."""
+        """Index of the segment at an arc length; beyond the ends, the index of the first or last segment.
+
+        Args:
+            s_m: arc length in metres.
+
+        Returns:
+            The index i of the segment between `points_m[i]` and `points_m[i + 1]`.
+        """
         return min(max(int(self.s_m.searchsorted(s_m, side="right")) - 1, 0), len(self.s_m) - 2)
 
     def at(self, s_m: float, lateral_m: float = 0.0) -> tuple[Array, float]:
@@ -55,9 +66,15 @@ class Polyline:
         return point, math.atan2(step[1], step[0])
 
     def heading(self, s_m: float, reach_m: float) -> float:
-        """Mean heading in radians from `reach_m` metres before an arc length to `reach_m` metres after it.
+        """The mean heading of the line around an arc length, which changes steadily around a corner, unlike the
+        heading of a segment.
 
-        The mean heading changes steadily around a corner, unlike the heading of a segment.
+        Args:
+            s_m: arc length in metres.
+            reach_m: the mean is taken from `reach_m` metres before this arc length to `reach_m` metres after it.
+
+        Returns:
+            Radians, counter-clockwise from east.
         """
         steps = np.diff(self.points_m[:, :2], axis=0)
         headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
@@ -82,6 +99,9 @@ class Polyline:
 
     def project(self, position_m: Array) -> tuple[float, float, float]:
         """Finds the position on the line that is nearest to a point (3,) in world coordinates.
+
+        Args:
+            position_m: (3,) point.
 
         Returns:
             Arc length, distance of the point to the left of the line, and 3D distance; all in metres.

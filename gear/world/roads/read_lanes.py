@@ -17,6 +17,9 @@ def read_lanes(path: Path) -> LaneGraph:
 
     Only the custom fields of the file are compiled, because compiling meshes would take seconds.
 
+    Args:
+        path: path of the town's MJCF file.
+
     Raises:
         TownError: the file is not XML, MuJoCo cannot read the file, or a lane is malformed.
     """

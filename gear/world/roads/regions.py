@@ -38,7 +38,11 @@ class Region:
     centre_m: tuple[float, float] = (0.0, 0.0)
 
     def holds(self, xy_m: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Tests which of (N, 2) points in world coordinates lie inside the region: (N,) bool."""
+        """Tests which of (N, 2) points in world coordinates lie inside the region: (N,) bool.
+
+        Args:
+            xy_m: (N, 2) x and y of the points, metres.
+        """
         places = np.atleast_2d(np.asarray(xy_m, dtype=np.float64))
         inside = np.ones(len(places), bool)
         if self.board is not None:
@@ -74,7 +78,11 @@ class LineTable:
 
     @staticmethod
     def of(lines: Iterable[tuple[str, Polyline, float]]) -> LineTable:
-        """Cuts lines, given as tuples (name, line, weight), into pieces."""
+        """Cuts lines into pieces of about a metre.
+
+        Args:
+            lines: tuples (name, line, weight) of the lanes or walks; the weight is the relative probability per metre.
+        """
         names: list[str] = []
         rows: list[tuple[float, float, float, float, float, float]] = []
         for name, line, weight in lines:
@@ -89,7 +97,11 @@ class LineTable:
         return LineTable(tuple(names), table[:, 0], table[:, 1], table[:, 2:5], table[:, 5])
 
     def inside(self, region: Region) -> npt.NDArray[np.intp]:
-        """The (M,) indices of the pieces whose middle lies inside a region."""
+        """The (M,) indices of the pieces whose middle lies inside a region.
+
+        Args:
+            region: the region of the ground.
+        """
         return np.flatnonzero(region.holds(self.points_m[:, :2])) if self.names else np.zeros(0, np.intp)
 
     def draw(self, pieces: npt.NDArray[np.intp], rng: np.random.Generator) -> tuple[str, float]:

@@ -43,7 +43,12 @@ class Route:
 
     @staticmethod
     def along(graph: LaneGraph, lanes: tuple[str, ...]) -> Route:
-        """Makes the route along the given lanes; each lane must continue the previous lane."""
+        """Makes the route along the given lanes; each lane must continue the previous lane.
+
+        Args:
+            graph: lane graph of the town.
+            lanes: names of the lanes in the direction of travel, at least one.
+        """
         points: list[Array] = []
         firsts: list[int] = []
         for name in lanes:
@@ -61,12 +66,19 @@ class Route:
         )
 
     def lane_at(self, s_m: float) -> int:
-        """Index in `lanes` of the lane at an arc length on the route."""
+        """Index in `lanes` of the lane at an arc length on the route.
+
+        Args:
+            s_m: arc length on the route in metres; before its start the first lane counts, after its end the last one.
+        """
         return max(0, int(np.searchsorted(self.starts_m, s_m, side="right")) - 1)
 
     def speed_at(self, s_m: float) -> float:
         """The lowest usual speed, in m/s, on the part of the route that begins at arc length `s_m` (metres) and is
         `BRAKING_WAY_M` long.
+
+        Args:
+            s_m: arc length on the route.
         """
         return min(self.speeds_mps[self.lane_at(s_m) : self.lane_at(s_m + BRAKING_WAY_M) + 1])
 
@@ -95,12 +107,13 @@ def extend_route(graph: LaneGraph, lane: str, length_m: float, rng: np.random.Ge
 def trace_back(
     graph: LaneGraph, lane: str, s_m: float, distance_m: float, rng: np.random.Generator
 ) -> tuple[tuple[str, ...], float] | None:
-    """Goes back along the lanes from a position; at each junction the previous lane is drawn at random.
+    """Goes back along the lanes from a position. Where several lanes lead into a lane, one of them is drawn at
+    random.
 
     Args:
         graph: lane graph of the town.
         lane: name of the lane of the position.
-        s_m: arc length of the position on that lane.
+        s_m: arc length of the position on that lane, metres.
         distance_m: how far to go back.
         rng: random generator.
 
@@ -120,7 +133,8 @@ def trace_back(
 
 
 def vehicle_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: float = 0.0) -> tuple[Array, float]:
-    """The position and heading of a vehicle on a line.
+    """The position of a vehicle on a line, and its heading: the direction from its rear axle to its front axle,
+    which are both on the line.
 
     Args:
         line: centre line of its lane or route.
@@ -147,6 +161,9 @@ def offset_left(point_m: Array, yaw_rad: float, lateral_m: float) -> Array:
         point_m: (3,) point in world coordinates.
         yaw_rad: heading of the road user, counter-clockwise from east.
         lateral_m: distance in metres.
+
+    Returns:
+        (3,) the moved point.
     """
     return point_m + lateral_m * np.array([-math.sin(yaw_rad), math.cos(yaw_rad), 0.0])
 
@@ -154,9 +171,14 @@ def offset_left(point_m: Array, yaw_rad: float, lateral_m: float) -> Array:
 def moving_pose(line: Polyline, s_m: float, half_length_m: float, lateral_m: float = 0.0) -> tuple[Array, float, float]:
     """The position and heading of a vehicle that moves along a line, and its motion per metre of the line.
 
+    Unlike `vehicle_pose`, the position is moved sideways at a right angle to the heading of the vehicle, so it changes
+    steadily from segment to segment.
+
     Args:
-        line, s_m, half_length_m, lateral_m: centre line, arc length of the vehicle's middle, half of its length, and
-            distance to the left of the line.
+        line: centre line of its lane or route.
+        s_m: arc length of its middle, metres.
+        half_length_m: half of its length.
+        lateral_m: distance of its middle to the left of the line.
 
     Returns:
         (3,) point under the vehicle's middle in metres, heading in radians counter-clockwise from east, and the

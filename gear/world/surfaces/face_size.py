@@ -16,6 +16,9 @@ from gear.world.assets.mjspec import read_spec
 def asset_face_size_m(path: Path) -> tuple[float, float]:
     """Width and height in metres of a board's face, from the board's MJCF file.
 
+    Args:
+        path: path of the board's MJCF file.
+
     Raises:
         TownError: the file cannot be compiled, or has no face with a surface.
     """

@@ -56,13 +56,27 @@ def box_matrix(source_px: int, target_px: int) -> Array:
 
 
 def linear_from_srgb(srgb: npt.ArrayLike) -> Array:
-    """Converts sRGB values in 0..1 to linear light in 0..1, elementwise (IEC 61966-2-1)."""
+    """Converts sRGB values in 0..1 to linear light in 0..1, elementwise (IEC 61966-2-1).
+
+    Args:
+        srgb: values of any shape.
+
+    Returns:
+        float64 of the same shape.
+    """
     values = np.asarray(srgb, dtype=np.float64)
     return np.asarray(np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4))
 
 
 def srgb_from_linear(linear: npt.ArrayLike) -> Array:
-    """Converts linear light, clipped to 0..1, to sRGB values in 0..1, elementwise (IEC 61966-2-1)."""
+    """Converts linear light, clipped to 0..1, to sRGB values in 0..1, elementwise (IEC 61966-2-1).
+
+    Args:
+        linear: values of any shape.
+
+    Returns:
+        float64 of the same shape.
+    """
     values = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
     return np.asarray(np.where(values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055))
 
@@ -112,7 +126,15 @@ def face_from_patch(patch: UInt8Image, size_px: tuple[int, int] = FACE_SIZE_PX) 
 
 
 def uniform_face(value: int, size_px: tuple[int, int] = FACE_SIZE_PX) -> UInt8Image:
-    """A texture of one grey: (size_px[1], size_px[0], 3) uint8, read-only; all values equal the sRGB byte `value`."""
+    """A face's texture of one grey.
+
+    Args:
+        value: the sRGB byte of all values, 0..255.
+        size_px: width and height of the texture.
+
+    Returns:
+        (size_px[1], size_px[0], 3) uint8, read-only.
+    """
     face = np.full((size_px[1], size_px[0], 3), value, np.uint8)
     face.setflags(write=False)
     return face

@@ -49,8 +49,10 @@ class Face:
     neutral: UInt8Image
 
     def record(self, carrier_id: int | None) -> SurfaceRecord:
-        """The record of the face for the sample's JSON file. `carrier_id` is the id of the actor that carries the face,
-        None for a board.
+        """The record of the face for the sample's JSON file.
+
+        Args:
+            carrier_id: id of the actor that carries the face; None for a board.
         """
         return SurfaceRecord(
             name=self.name,
@@ -62,8 +64,13 @@ class Face:
         )
 
     def texture(self, albedo: SurfaceAlbedo) -> UInt8Image:
-        """The (H, W, 3) uint8 sRGB texture of the face for `albedo`: its neutral texture, white, black, or a resampled
-        patch.
+        """The texture of the face for one sample.
+
+        Args:
+            albedo: what the face shows: its neutral texture, white, black, or a patch, which is resampled.
+
+        Returns:
+            (H, W, 3) uint8 sRGB.
         """
         if not isinstance(albedo, str):
             return face_from_patch(albedo)
@@ -80,6 +87,9 @@ def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceN
         data: MuJoCo data of the model with kinematics up to date.
         names: names of the faces' elements, in patch order.
         path: the town's file, for error messages.
+
+    Returns:
+        The faces in patch order.
 
     Raises:
         TownError: a face is not flat in its `surface` frame, is smaller or larger than any board, or would not show a

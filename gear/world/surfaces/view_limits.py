@@ -44,7 +44,12 @@ class FaceInWorld:
 
     @staticmethod
     def of(face: Face, world_from_surface: RigidTransform) -> FaceInWorld:
-        """Converts a face to world coordinates, for a given pose of its surface frame."""
+        """Converts a face to world coordinates.
+
+        Args:
+            face: the face.
+            world_from_surface: world pose of its surface frame, whose z axis points into the board.
+        """
         u, v = np.meshgrid((np.arange(GRID[0]) + 0.5) / GRID[0] - 0.5, (np.arange(GRID[1]) + 0.5) / GRID[1] - 0.5)
         local_m = np.stack([u * face.width_m, v * face.height_m, np.full(u.shape, -STAND_OFF_M)], axis=-1)
         return FaceInWorld(
@@ -102,5 +107,10 @@ class ViewLimits:
 
 
 def reference_camera(rig: Rig, world_from_ego: RigidTransform) -> tuple[CameraMount, CameraRecord]:
-    """The reference camera (the first camera of a rig), and its record for a world pose of the ego car."""
+    """The reference camera (the first camera of a rig), and its record for a world pose of the ego car.
+
+    Args:
+        rig: the cameras on the ego car.
+        world_from_ego: world pose of the ego car.
+    """
     return rig.cameras[0], rig.place(world_from_ego)[0]

@@ -63,7 +63,11 @@ class RoadUsers:
     drive_m: float = 0.0
 
     def drop(self, body: str) -> None:
-        """Removes a road user, so that its entry in the pool of actors is free again."""
+        """Removes a road user, so that its entry in the pool of actors is free again.
+
+        Args:
+            body: name of the road user's body.
+        """
         spawn = self.spawns.pop(body)
         self.poses.pop(body, None)
         self.free.release(spawn.actor_type.facts.name, body)
@@ -104,11 +108,13 @@ class Crowd:
     def fill(
         self, road_users: RoadUsers, seed: int, sequence: int, occlusion_test: OcclusionTest | None = None
     ) -> None:
-        """Adds vehicles and people around the ego car.
+        """Adds vehicles and people around the ego car. Those that overlap, fall over or hide a face are removed
+        and drawn again a few times.
 
         Args:
             road_users: contains the ego car and the carrier, if there is one; changed in place.
-            seed, sequence: numbers from which the random generators are seeded.
+            seed: seed of the split.
+            sequence: number of the sample's sequence; together with `seed` it determines all random draws.
             occlusion_test: finds road users that hide a face; None if the scene has no face.
 
         Raises:
@@ -233,7 +239,11 @@ class Crowd:
 
 
 def is_upright(pose: RigidTransform) -> bool:
-    """Whether an actor stands upright enough to drive or walk."""
+    """Whether an actor stands upright enough to drive or walk.
+
+    Args:
+        pose: the actor's pose in the world; its z axis may be up to 26 degrees from the vertical.
+    """
     return bool(pose.rotation[2, 2] >= UPRIGHT)
 
 
@@ -242,8 +252,12 @@ def _distance_m(first: RigidTransform, second: RigidTransform) -> float:
 
 
 def region_of(limits: NpcLimits, boards: Sequence[BoardSpec], centre_m: tuple[float, float]) -> Region:
-    """The region of the ground in which limits allow road users, relative to the first board and to `centre_m` (x, y in
-    world coordinates).
+    """The region of the ground in which limits allow road users.
+
+    Args:
+        limits: the limits of a scene for other vehicles or for people.
+        boards: the scene's boards; `ahead_m` and `lateral_m` are relative to the first one.
+        centre_m: x and y of the ego car in world coordinates, to which `radius_m` is relative.
     """
     return Region(
         board=boards[0] if boards and limits.needs_board else None,
@@ -269,12 +283,15 @@ class OcclusionTest:
     min_free: float
 
     def occluders(self, space: PlacementSpace, poses: Mapping[str, RigidTransform]) -> set[str]:
-        """The names of the actors' bodies that hide a face, for faces of which actors together hide more than
-        allowed.
+        """The road users that hide a face. If actors together hide more of a face than allowed, all of them are
+        named.
 
         Args:
-            space: collision model in which rays are cast.
+            space: the placement model, in which rays are cast from the camera to the points of each face.
             poses: world pose of each actor, by name of its body.
+
+        Returns:
+            Names of bodies in the placement model; empty if all faces are visible enough.
         """
         found: set[str] = set()
         for grid_m in self.grids_m:

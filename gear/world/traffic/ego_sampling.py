@@ -77,10 +77,14 @@ class EgoSampler:
         """Draws the ego car, and the truck that carries the patch if the scene has one.
 
         Args:
-            seed, sequence: numbers from which the random generators are seeded.
+            seed: seed of the split.
+            sequence: number of the sample's sequence; together with `seed` it determines all random draws.
             duration_s: length of the sequence in seconds, 0 for a single picture. In a sequence, the ego car starts at
                 or before the start of its limits, from where the boards are visible, and drives to the end of its
                 limits.
+
+        Returns:
+            The ego car and the truck; all other road users are still missing.
 
         Raises:
             PlacementError: no drawn position is within the limits; the message names the limit that is too tight.
@@ -107,6 +111,10 @@ class EgoSampler:
 
     def enter(self, road_users: RoadUsers, spawns: Sequence[Spawn]) -> str | None:
         """Places the ego car and the carrier of the patch on the ground, and adds them to `road_users`.
+
+        Args:
+            road_users: the object to which they are added; changed in place, also if a position is not valid.
+            spawns: the ego car, then the carrier if there is one.
 
         Returns:
             The reason why a position is not valid; None if all positions are valid.
@@ -142,7 +150,14 @@ class EgoSampler:
         return self.limits.judge(self.space, self.faces_in_world(road_users), mount, camera)
 
     def faces_in_world(self, road_users: RoadUsers) -> list[FaceInWorld]:
-        """The faces in world coordinates, on boards or on the carrier at its pose."""
+        """The faces in world coordinates, on boards or on the carrier at its pose.
+
+        Args:
+            road_users: contains the carrier if there is one.
+
+        Returns:
+            One entry for each face, in patch order.
+        """
         placed = []
         for face in self.faces:
             frame = face.parent_from_surface
@@ -222,6 +237,9 @@ class EgoSampler:
             lane: name of the lane.
             s_m: arc length on the lane in metres.
             rng: random generator.
+
+        Returns:
+            The ego car, which is not yet added to `road_users`.
         """
         return self.spawner.on_lane(self.ego_type, road_users.free.take(EGO_ASSET), "ego", lane, s_m, rng)
 
@@ -243,7 +261,8 @@ class EgoSampler:
 
     @cached_property
     def places(self) -> npt.NDArray[np.intp]:
-        """The (N,) indices of the pieces of lanes on which the ego car, or the truck, may be.
+        """The (N,) indices into `spawner.lane_table` of the pieces of lanes on which the ego car may be. In a
+        scene with a truck, they are those of the truck.
 
         Raises:
             PlacementError: there are no such pieces; the message gives the reason why the pieces within the limits are

@@ -29,7 +29,12 @@ class Footprint:
     half_width_m: float
 
     def grown(self, length_m: float, width_m: float) -> Footprint:
-        """The rectangle extended by `length_m` at both ends and by `width_m` at both sides."""
+        """The rectangle extended by `length_m` at both ends and by `width_m` at both sides.
+
+        Args:
+            length_m: added at the front and at the rear, metres.
+            width_m: added at the left and at the right, metres.
+        """
         return Footprint(
             self.x_m, self.y_m, self.z_m, self.yaw_rad, self.half_length_m + length_m, self.half_width_m + width_m
         )
@@ -42,6 +47,9 @@ class Footprint:
     def overlaps(self, other: Footprint) -> bool:
         """Whether this rectangle and `other` are on the same level and have a common point (separating axis
         theorem).
+
+        Args:
+            other: another footprint.
         """
         dx, dy = other.x_m - self.x_m, other.y_m - self.y_m
         if math.hypot(dx, dy) > self.radius_m + other.radius_m or abs(other.z_m - self.z_m) > LEVEL_M:

@@ -66,18 +66,19 @@ class SequenceSimulator:
     ) -> list[FrameState]:
         """Simulates all frames of a sequence and returns the state of the road users in each frame.
 
-        If two actors overlap during the simulation, one of the two is removed and the sequence is simulated again,
-        until there is no overlap. The frames may therefore contain fewer road users than the scene's smallest count,
-        which is only guaranteed before the simulation.
+        If two actors overlap, or an actor has no ground below it, one actor is removed and the sequence is simulated
+        again, until this does not occur. The frames may therefore contain fewer road users than the scene's smallest
+        count, which is only guaranteed before the simulation.
 
         Args:
             road_users: the road users at the start; removed actors are removed from this object as well.
-            seed, sequence: numbers from which the random generators are seeded.
+            seed: seed of the split.
+            sequence: number of the sequence; together with `seed` it determines all random draws.
             frames: number of frames.
             interval_s: time between two frames, seconds.
 
         Raises:
-            PlacementError: the ego car cannot drive without an overlap.
+            PlacementError: the ego car, or the carrier of the patch, overlaps another object or leaves the ground.
         """
         while True:
             states, overlapping = self._simulate_once(road_users, seed, sequence, frames, interval_s)
@@ -223,7 +224,11 @@ def moving_person(lanes: LaneGraph, spawn: Spawn) -> MovingPedestrian:
 
 
 def standing_discs(spawn: Spawn) -> list[tuple[float, float, float, float]]:
-    """Discs (x, y, z, radius) in metres that cover a standing road user."""
+    """Discs (x, y, z, radius) in metres that cover a standing road user.
+
+    Args:
+        spawn: the road user.
+    """
     actor_type = spawn.actor_type
     point_m = np.array([spawn.x_m, spawn.y_m, spawn.near_z_m])
     return vehicle_discs(point_m, spawn.yaw_rad, actor_type.front_m, actor_type.rear_m, actor_type.half_width_m)

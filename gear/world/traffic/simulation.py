@@ -103,16 +103,22 @@ class MovingPedestrian:
         return left_m < -self.beyond_m
 
     def place(self) -> tuple[Array, float]:
-        """The position of a person in motion: (3,) point on the ground and heading in radians, which changes steadily
-        around corners.
+        """The position of a person in motion: (3,) point on the ground and heading in radians, which changes
+        steadily around corners.
+
+        Returns:
+            The point in world coordinates, and the direction in which the person walks, counter-clockwise from east.
         """
         heading_rad = self.line.heading(self.s_m, TURNING_M * max(1.0, abs(self.lateral_m)))
         point = offset_left(self.line.at(self.s_m)[0], heading_rad, self.lateral_m)
         return point, heading_rad if self.direction > 0 else heading_rad + math.pi
 
     def first_place(self) -> tuple[Array, float]:
-        """The position of a person in a single picture: (3,) point on the ground and heading in radians. The heading is
-        that of the line's segment.
+        """The position of a person in a single picture: (3,) point on the ground and heading in radians. The
+        heading is that of the line's segment.
+
+        Returns:
+            The point in world coordinates, and the direction in which the person walks, counter-clockwise from east.
         """
         point, heading_rad = self.line.at(self.s_m, self.lateral_m)
         return point, heading_rad if self.direction > 0 else heading_rad + math.pi
@@ -188,7 +194,12 @@ class TrafficSimulation:
             vehicle.speed_mps = min(vehicle.speed_mps, vehicle.cruise_mps, brakeable_mps)
 
     def advance(self, duration_s: float) -> None:
-        """Moves all road users by a time span, in steps of at most `MAX_STEP_S`, except those that the caller moves."""
+        """Moves all road users, except those that the caller moves, by a time span, in steps of at most
+        `MAX_STEP_S`.
+
+        Args:
+            duration_s: the time span in seconds.
+        """
         steps = max(1, math.ceil(duration_s / MAX_STEP_S - 1e-9))
         for _ in range(steps):
             self._step(duration_s / steps)

@@ -108,7 +108,11 @@ class FreeSlots:
 
     @staticmethod
     def of(slots: Sequence[Slot]) -> FreeSlots:
-        """Makes an object in which all slots of the pool are free, except the slot of the carrier of the patch."""
+        """Makes an object in which all slots of the pool are free, except the slot of the carrier of the patch.
+
+        Args:
+            slots: the pool of actors.
+        """
         free = FreeSlots()
         for slot in slots:
             if not slot.carries_surface:
@@ -116,21 +120,33 @@ class FreeSlots:
         return free
 
     def take(self, asset: str) -> str:
-        """Takes a free slot of an asset, so that the slot is used, and returns the name of its body."""
+        """Takes a free slot of an asset, so that the slot is used, and returns the name of its body.
+
+        Args:
+            asset: name of the asset; it must have a free slot.
+        """
         return self.bodies[asset].pop(0)
 
     def release(self, asset: str, body: str) -> None:
-        """Makes the slot of a body free again."""
+        """Makes the slot of a body free again.
+
+        Args:
+            asset: name of the asset.
+            body: name of the body that was taken.
+        """
         self.bodies[asset].append(body)
 
     def draw(self, types: Mapping[str, ActorType], rng: np.random.Generator, *, people: bool) -> ActorType | None:
-        """Draws a random asset that has a free slot; probabilities are proportional to the weights of the assets. None
-        if no slot is free.
+        """Draws a random asset that has a free slot; the slot is not taken. The probabilities are proportional to
+        the weights of the assets.
 
         Args:
-            types: assets by name.
+            types: measured assets by name.
             rng: random generator.
             people: whether a person is drawn; otherwise a vehicle.
+
+        Returns:
+            The asset; None if no asset of this kind has a free slot.
         """
         kinds = [
             actor_type
@@ -162,7 +178,11 @@ class Spawner:
     """Draws road users at random positions on the lanes, walks and parking bays of one town."""
 
     def __init__(self, lanes: LaneGraph) -> None:
-        """Cuts the lanes and walks of a town into pieces, from which positions are drawn."""
+        """Cuts the lanes and walks of a town into pieces of about a metre, from which positions are drawn.
+
+        Args:
+            lanes: the lanes, walks and parking bays of the town.
+        """
         self.lanes = lanes
         self.lane_table = LineTable.of(
             (lane.name, lane.line, JUNCTION_WEIGHT if lane.is_junction else 1.0) for lane in lanes.lanes.values()
@@ -173,13 +193,22 @@ class Spawner:
         self._bays_m = np.array([bay.position_m for bay in lanes.bays]).reshape(-1, 3)
 
     def bays_inside(self, region: Region) -> list[ParkingBay]:
-        """Parking bays whose middle lies inside a region."""
+        """Parking bays whose middle lies inside a region.
+
+        Args:
+            region: the region of the ground.
+        """
         return (
             [self.lanes.bays[i] for i in np.flatnonzero(region.holds(self._bays_m[:, :2]))] if len(self._bays_m) else []
         )
 
     def is_allowed_on(self, actor_type: ActorType, lane: str) -> bool:
-        """Whether a vehicle may use a lane: vehicles slower than `MOTORWAY_MPS` may not use lanes of a motorway."""
+        """Whether a vehicle may use a lane: vehicles slower than `MOTORWAY_MPS` may not use lanes of a motorway.
+
+        Args:
+            actor_type: asset of the vehicle.
+            lane: name of the lane.
+        """
         vehicle = actor_type.vehicle
         is_slow = vehicle is not None and vehicle.max_speed_mps < MOTORWAY_MPS
         return not is_slow or self.lanes.lanes[lane].speed_mps < MOTORWAY_MPS
@@ -193,16 +222,17 @@ class Spawner:
         s_m: float,
         rng: np.random.Generator,
     ) -> Spawn:
-        """Draws a vehicle at a position on a lane.
+        """Draws a vehicle at a position on a lane: its speed, colour and small deviations from the position.
 
         The vehicle is shifted from the centre line and turned by small random amounts; two-wheelers keep to the right
-        edge.
+        edge. A vehicle with the role `npc` may stand outside of junctions.
 
         Args:
             actor_type: asset of the vehicle.
             body: name of its body in the placement model.
             role: role in the scene record, such as `ego` or `npc`.
-            lane, s_m: name of the lane, and arc length on it.
+            lane: name of the lane.
+            s_m: arc length of the vehicle's middle on this lane, metres.
             rng: random generator.
         """
         road = self.lanes.lanes[lane]
@@ -260,18 +290,18 @@ class Spawner:
     def on_walk(
         self, actor_type: ActorType, body: str, pieces: npt.NDArray[np.intp], rng: np.random.Generator
     ) -> Spawn | None:
-        """Draws a person on a sidewalk or crosswalk.
+        """Draws a person at a random position on a sidewalk or crosswalk.
 
-        People who walk keep to the right half; people who stand look in any direction.
+        People who walk keep to the right half and look along the walk; people who stand look in any direction.
 
         Args:
-            actor_type: asset of the person.
-            body: name of its body in the placement model.
-            pieces: (N,) indices of the pieces of walks from which the position is drawn.
+            actor_type: asset of the person; its gait decides whether the person walks or stands.
+            body: name of the body that the person takes, one of `FreeSlots.bodies`.
+            pieces: (N,) indices into `walk_table` of the pieces from which the position is drawn.
             rng: random generator.
 
         Returns:
-            The person; None if a standing person was drawn on a crosswalk.
+            The person; None if a person who stands was drawn on a crosswalk.
         """
         name, s_m = self.walk_table.draw(pieces, rng)
         walk = self.lanes.walks[name]

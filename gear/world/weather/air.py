@@ -120,7 +120,12 @@ def contact_shadows_of(weather: Weather, renderer_name: str, shapes: Mapping[str
 
 
 def even_share(weather: Weather, light: Lighting) -> float:
-    """The share, 0..1, of the light on open level ground that does not come directly from the sun."""
+    """The share, 0..1, of the light on open level ground that does not come directly from the sun.
+
+    Args:
+        weather: the weather.
+        light: the light of the same weather, of any size of sky pictures.
+    """
     even = ambient_radiance(weather)[0].mean()
     sun = light.sun.mean() * max(light.towards_sun[2], 0) / math.pi
     return float(even / (even + sun))
@@ -132,8 +137,13 @@ def _shown(light: Floats, renderer_name: str) -> Floats:
 
 
 def air_of(weather: Weather, renderer_name: str, left: float = 1.0) -> Air:
-    """The air of a weather (fog, haze and clear air), in the units of a renderer's frames. `left` is the share of the
-    air's light that remains at night; 1 by day.
+    """The air of a weather (fog, haze and clear air) in the units of a renderer's frames.
+
+    Args:
+        weather: the weather.
+        renderer_name: name of the renderer; frames of the classic renderer hold display values, all others linear
+            light.
+        left: share of the air's light that remains at night; 1 by day.
     """
     aerosol = AEROSOL_PER_M * weather.mie_scattering_scale / 0.03
     molecules = np.array(MOLECULES_PER_M) * weather.rayleigh_scattering_scale / 0.0331
@@ -150,6 +160,9 @@ def fogs_of(weather: Weather) -> tuple[Fog, ...]:
     CARLA's fog density ranges from 0 percent (clear air) to 100 percent (thick fog). The fog has the start distance and
     falloff of the weather, the veil of rain those of CARLA's presets. If these values are equal, the fog and the veil
     are joined to one fog.
+
+    Args:
+        weather: the weather.
     """
     fog = DENSEST_FOG_PER_M * (weather.fog_density / 100) ** 1.5
     rain = RAIN_PER_M * math.pow(weather.precipitation / 100, 1.5)

@@ -76,8 +76,11 @@ HORIZON_AZIMUTHS = 64
 
 
 def lighting_of(weather: Weather, *, sky_face_px: int = SKY_FACE_PX) -> Lighting:
-    """Computes the light of a weather; `sky_face_px` is the side in pixels of each cube face of
-    `Lighting.sky_faces`.
+    """Computes the light of a weather.
+
+    Args:
+        weather: the weather.
+        sky_face_px: side in pixels of each cube face of `Lighting.sky_faces`.
     """
     sky = Sky.of(weather)
     exposure, from_above = _exposure(sky)
@@ -115,10 +118,13 @@ def mirrored_radiance(weather: Weather, rows: int, columns: int) -> Floats:
 
 
 def lamplit_houses(rows: int) -> Floats:
-    """The radiance of houses in the light of lamps at night, which still water reflects: (rows, 1, 3), in units of the
-    frame.
+    """The radiance of houses in the light of lamps at night, which still water reflects: (rows, 1, 3), in units of
+    the frame.
 
     Rows are elevations, whose sines are evenly spaced from the horizon to the zenith.
+
+    Args:
+        rows: number of elevations.
     """
     return np.asarray(_house_share(np.linspace(0, 1, rows))[:, None, None] * LAMPLIT_HOUSES)
 
@@ -145,6 +151,9 @@ def ambient_radiance(weather: Weather) -> Floats:
 
     The rows are for surfaces that face up, sideways (mean over all azimuths) and down; the columns are red, green and
     blue.
+
+    Args:
+        weather: the weather.
     """
     sky = Sky.of(weather)
     coarse, solid_angle = face_directions(_INTEGRATION_PX), _solid_angles(_INTEGRATION_PX)
@@ -156,11 +165,14 @@ def ambient_radiance(weather: Weather) -> Floats:
 
 
 def airlight(weather: Weather) -> Floats:
-    """The radiance of distant air by azimuth, counter-clockwise from east: (`HORIZON_AZIMUTHS`, 3), in units of the
-    frame.
+    """The radiance of distant air by azimuth, counter-clockwise from east: (`HORIZON_AZIMUTHS`, 3), in units of
+    the frame.
 
     After sunset the sun no longer reaches the air in a street. The air then has the colour of the light from the whole
     sky, so the glow in the west does not colour a fog.
+
+    Args:
+        weather: the weather.
     """
     sky = Sky.of(weather)
     exposure, roof_klx = _exposure(sky)
@@ -197,6 +209,9 @@ def face_directions(size: int) -> Floats:
 
     The cube is that of OpenGL, rotated so that its y axis points up in the world: the face `right` is east, `back` is
     north.
+
+    Args:
+        size: side of each face in texels.
     """
     return np.stack(list(_faces(size)))
 

@@ -76,7 +76,14 @@ def night_of(world: World, weather: Weather, renderer_name: str) -> Night | None
 
 
 def materials_of(model: mujoco.MjModel) -> list[str]:
-    """The name of each geom's material, as in the geom's own MJCF file; "" for a geom without a material."""
+    """The name of each geom's material, as in the geom's own MJCF file; "" for a geom without a material.
+
+    Args:
+        model: compiled model.
+
+    Returns:
+        One name per geom, by geom id.
+    """
     return [model.mat(index).name.rsplit("/", 1)[-1] if index >= 0 else "" for index in model.geom_matid]
 
 

@@ -75,7 +75,11 @@ def apply_weather(
 
 
 def wetness(weather: Weather) -> float:
-    """Wetness of open ground, 0..1: the largest of the weather's wetness, puddles and rain."""
+    """Wetness of open ground, 0..1: the largest of the weather's wetness, puddles and rain.
+
+    Args:
+        weather: the weather.
+    """
     return float(min(1.0, max(weather.wetness, 1.4 * weather.precipitation_deposits, weather.precipitation) / 100))
 
 

@@ -83,7 +83,11 @@ class Sky:
 
     @staticmethod
     def of(weather: Weather) -> Sky:
-        """Makes the sky for a weather, which has CARLA's parameters."""
+        """Makes the sky for a weather, which has CARLA's parameters.
+
+        Args:
+            weather: the weather.
+        """
         altitude = math.radians(weather.sun_altitude_deg)
         azimuth = math.radians(weather.sun_azimuth_deg)
         shown_altitude = max(altitude, _MIN_ALTITUDE_RAD)

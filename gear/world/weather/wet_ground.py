@@ -29,7 +29,8 @@ _SMOOTHING = 0.7
 
 
 def wet_materials(root: mjcf.RootElement, amount: float, geom_materials: Sequence[GeomMaterial] = ()) -> None:
-    """Makes the materials of open ground wet: darker and smoother.
+    """Makes the materials of open ground wet: darker and smoother. Used before compiling; `wet_own_colours` does
+    the same for colours that belong to no material.
 
     Args:
         root: MJCF of a world, changed in place.
