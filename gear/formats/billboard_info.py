@@ -86,7 +86,11 @@ def billboard_info(
 
 
 def xyzrpy(world_from_frame: RigidTransform) -> list[float]:
-    """A pose as six numbers: x, y, z in metres, and roll, pitch, yaw in radians for Rz(yaw) Ry(pitch) Rx(roll)."""
+    """A pose as six numbers: x, y, z in metres, and roll, pitch, yaw in radians for Rz(yaw) Ry(pitch) Rx(roll).
+
+    Args:
+        world_from_frame: the pose.
+    """
     r = world_from_frame.rotation
     roll = math.atan2(r[2, 1], r[2, 2])
     pitch = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
@@ -96,10 +100,14 @@ def xyzrpy(world_from_frame: RigidTransform) -> list[float]:
 
 
 def world_from_board(record: SceneRecord, index: int) -> RigidTransform:
-    """The pose in the world of the billboard of surface `index`, in CARLA-GeAR's billboard frame.
+    """The pose in the world of a billboard, in CARLA-GeAR's billboard frame.
 
     The origin of that frame lies on the face at half height, 0.1 m to the left of the middle. x points into the board,
     y to the viewer's left, z up.
+
+    Args:
+        record: the scene.
+        index: number of the surface in `record.surfaces`.
     """
     world_from_surface = record.world_from_surface(record.surfaces[index])
     rotation: Array = world_from_surface.rotation @ FLU_FROM_SURFACE.T
@@ -108,7 +116,11 @@ def world_from_board(record: SceneRecord, index: int) -> RigidTransform:
 
 
 def world_from_flu_camera(camera: CameraRecord) -> RigidTransform:
-    """The pose of a camera in the world, in a camera frame with x forward, y left and z up."""
+    """The pose of a camera in the world, in a camera frame with x forward, y left and z up.
+
+    Args:
+        camera: the camera with its pose.
+    """
     placed = camera.world_from_camera_transform
     rotation: Array = placed.rotation @ CAMERA_FROM_ACTOR_AXES
     return RigidTransform.from_parts("world", "camera", rotation, placed.translation_m)

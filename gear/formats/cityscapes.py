@@ -98,13 +98,22 @@ def city_name(town: str) -> str:
 
     The official tools split file names at underscores. CARLA-GeAR's loader recognises a Cityscapes folder by one of
     three names of real cities. With this ending, the loader, torchvision and the official tools read the same folder.
+
+    Args:
+        town: name of the town.
     """
     letters = re.sub(r"[^a-z0-9]", "", town.lower())
     return f"gear{letters}aachen"
 
 
 def stem(town: str, sequence: int, frame: int) -> str:
-    """The part `<city>_<sequence>_<frame>` with which the names of all files of one picture begin."""
+    """The part `<city>_<sequence>_<frame>` with which the names of all files of one picture begin.
+
+    Args:
+        town: name of the town, from which the city's name is made.
+        sequence: number of the driving sequence.
+        frame: number of the picture in the sequence.
+    """
     return f"{city_name(town)}_{sequence:06d}_{frame:06d}"
 
 
@@ -144,7 +153,11 @@ def paths(town: str, split: str, sequence: int, frame: int) -> Paths:
 
 
 def colour_map(label_ids: npt.NDArray[np.uint8]) -> UInt8Image:
-    """Colours an (H, W) label map; returns (H, W, 4) uint8 RGBA, opaque."""
+    """Colours an (H, W) label map; returns (H, W, 4) uint8 RGBA, opaque.
+
+    Args:
+        label_ids: (H, W) Cityscapes label ids.
+    """
     # One gather of 32-bit pixels is five times as quick as one of four bytes each.
     packed = COLOURS_RGBA.view(np.uint32)[:, 0]
     return np.take(packed, label_ids).view(np.uint8).reshape(*label_ids.shape, 4)

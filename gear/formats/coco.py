@@ -166,7 +166,11 @@ class DatasetWriter:
         return head + b',"images":[', b'],"categories":' + categories + b"}\n"
 
     def add(self, picture: Picture) -> None:
-        """Appends the next picture and its annotations to the file."""
+        """Appends the next picture and its annotations to the file.
+
+        Args:
+            picture: the picture; its id must follow that of the previous one.
+        """
         self._images.append(dump(_image_entry(picture, self._created)).rstrip(b"\n"))
         entries = _annotation_entries(picture, self._count + 1)
         self._count += len(entries)
@@ -245,7 +249,15 @@ class Detection:
 
 
 def results_json(image_id: int, detections: Sequence[Detection]) -> list[Json]:
-    """The detections of one picture as entries of COCO's results file."""
+    """The detections of one picture as entries of COCO's results file.
+
+    Args:
+        image_id: COCO's id of the picture, from 1.
+        detections: the detections of the picture.
+
+    Returns:
+        One entry per detection, with `image_id`, `category_id`, `bbox` (left, top, width, height) and `score`.
+    """
     return [
         {
             "image_id": image_id,

@@ -98,7 +98,11 @@ class SplitFacts:
 
 
 def title(splits: Sequence[SplitFacts]) -> str:
-    """A readable title of the dataset, with task, town, scene and patch of its first split."""
+    """A readable title of the dataset, with task, town, scene and patch of its first split.
+
+    Args:
+        splits: the metadata of each split; at least one.
+    """
     first = splits[0]
     return f"gear {first.task} {first.town} {first.scene}, patch {first.patch}"
 

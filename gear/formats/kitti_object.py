@@ -50,7 +50,11 @@ class KittiLabel:
 
 
 def dont_care(box_px: BoxPx) -> KittiLabel:
-    """A label line of a `DontCare` region, in which detections are not evaluated."""
+    """A label line of a `DontCare` region, in which detections are not evaluated.
+
+    Args:
+        box_px: left, top, right and bottom in index pixels.
+    """
     return KittiLabel(
         type="DontCare",
         truncated=-1,
@@ -101,6 +105,9 @@ def format_labels(labels: Iterable[KittiLabel]) -> bytes:
 def parse_label(line: str) -> KittiLabel:
     """Parses one line of a KITTI label file or result file.
 
+    Args:
+        line: the line, with or without newline.
+
     Raises:
         ValueError: the line has neither 15 nor 16 fields, an unknown type, or a field that is not a number.
     """
@@ -126,7 +133,11 @@ def parse_label(line: str) -> KittiLabel:
 
 
 def parse_labels(text: str) -> tuple[KittiLabel, ...]:
-    """Parses a KITTI label file: one label per line."""
+    """Parses a KITTI label file: one label per line.
+
+    Args:
+        text: the text of the file; empty lines are skipped.
+    """
     return tuple(parse_label(line) for line in text.splitlines() if line.strip())
 
 
@@ -156,7 +167,12 @@ def from_edge_pixels(box_px: BoxPx, intrinsics: Intrinsics) -> BoxPx:
 
 
 def to_edge_pixels(box_px: BoxPx) -> BoxPx:
-    """Converts a box from index pixels, as in KITTI labels, to edge pixels."""
+    """Converts a box from index pixels, as in KITTI labels, to edge pixels (0 is the left edge of the first
+    pixel).
+
+    Args:
+        box_px: left, top, right and bottom in index pixels.
+    """
     left, top, right, bottom = (side + 0.5 for side in box_px)
     return (left, top, right, bottom)
 
@@ -195,18 +211,23 @@ def occlusion_level(visible_fraction: float) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
-    """The calibration of a rectified stereo pair whose left camera is camera 0.
+    """The calibration of a rectified stereo pair whose left camera is camera 0, or of a single camera.
 
     Attributes:
         intrinsics: intrinsics of both cameras.
-        baseline_m: distance from the left to the right camera, > 0.
+        baseline_m: distance from the left to the right camera; 0 for a single camera.
     """
 
     intrinsics: Intrinsics
     baseline_m: float
 
     def projection(self, camera: int) -> Array:
-        """The (3, 4) projection matrix `P<camera>` in pixels: 0 and 2 are the left camera, 1 and 3 the right camera."""
+        """The (3, 4) projection matrix `P<camera>` in pixels: 0 and 2 are the left camera, 1 and 3 the right
+        camera.
+
+        Args:
+            camera: number of the camera, 0 to 3.
+        """
         matrix = np.zeros((3, 4))
         matrix[:, :3] = self.intrinsics.matrix
         if camera in (1, 3):
@@ -247,6 +268,9 @@ def format_points(points: npt.NDArray[np.float32]) -> bytes:
 def parse_points(data: bytes) -> npt.NDArray[np.float32]:
     """The (N, 4) float32 points of a KITTI laser scan: x forward, y left, z up in metres, and intensity 0..1.
 
+    Args:
+        data: bytes of the file.
+
     Raises:
         ValueError: the number of bytes is not a multiple of 16, the size of a point.
     """
@@ -254,7 +278,11 @@ def parse_points(data: bytes) -> npt.NDArray[np.float32]:
 
 
 def parse_calibration(text: str) -> dict[str, Array]:
-    """Parses a KITTI calibration file to matrices by name: `P0` to `P3` (3, 4), `R0_rect` (3, 3), `Tr_…` (3, 4)."""
+    """Parses a KITTI calibration file to matrices by name: `P0` to `P3` (3, 4), `R0_rect` (3, 3), `Tr_…` (3, 4).
+
+    Args:
+        text: the text of the file.
+    """
     found: dict[str, Array] = {}
     for line in text.splitlines():
         if ":" in line:
@@ -265,13 +293,20 @@ def parse_calibration(text: str) -> dict[str, Array]:
 
 
 def read_baseline_m(matrices: dict[str, Array]) -> float:
-    """The baseline of a stereo pair: the distance in metres from the left to the right camera, from `P2` and `P3`."""
+    """The baseline of a stereo pair: the distance in metres from the left to the right camera, from `P2` and `P3`.
+
+    Args:
+        matrices: the matrices by name, from `parse_calibration`.
+    """
     return float((matrices["P2"][0, 3] - matrices["P3"][0, 3]) / matrices["P2"][0, 0])
 
 
 def label_corners(label: KittiLabel) -> Array:
-    """The (8, 3) corners in metres of a label's 3D box in the frame of camera 0; the bottom face's four corners come
-    first.
+    """The (8, 3) corners in metres of a label's 3D box in the frame of camera 0; the bottom face's four corners
+    come first.
+
+    Args:
+        label: the label or the detection.
     """
     c, s = math.cos(label.rotation_y_rad), math.sin(label.rotation_y_rad)
     along = np.array([1, 1, -1, -1, 1, 1, -1, -1]) * label.length_m / 2
@@ -290,6 +325,10 @@ def split_lists(split: str, ids: Sequence[str]) -> dict[str, bytes]:
     """The lists of sample ids of a split, as bytes by path: `ImageSets/<split>.txt` and `splits/<split>.txt`.
 
     The second file has no final newline, because its reader would take an empty line for an id.
+
+    Args:
+        split: name of the split.
+        ids: ids of the samples, in order.
     """
     return {
         f"ImageSets/{split}.txt": "".join(f"{name}\n" for name in ids).encode(),

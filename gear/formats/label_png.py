@@ -35,7 +35,12 @@ def encode_label_map(labels: Labels) -> bytes:
 
 
 def encode_painted(labels: npt.NDArray[np.uint8], rgba: UInt8Image) -> bytes:
-    """Encodes (H, W) uint8 labels as an RGBA PNG, coloured by `rgba`, a (K, 4) uint8 table by label."""
+    """Encodes (H, W) uint8 labels as an RGBA PNG, coloured by `rgba`, a (K, 4) uint8 table by label.
+
+    Args:
+        labels: (H, W) labels; each must be below K.
+        rgba: (K, 4) colour of each label, 0..255.
+    """
     places, own, before = _changes(labels)
     if len(places) > _BUSY_SHARE * labels.size:
         return encode_labels(rgba[labels])

@@ -148,7 +148,15 @@ def joined_polygons(polygons: Sequence[Sequence[int]]) -> list[int]:
 
 
 def with_polygons(item: coco.Annotation, picture: coco.Picture) -> coco.Annotation:
-    """An annotation of a picture with its mask as polygons; that of a crowd is not changed."""
+    """Replaces the mask of a COCO annotation by polygons that cover the same pixels.
+
+    Args:
+        item: the annotation.
+        picture: the picture to which it belongs, which gives the mask's size.
+
+    Returns:
+        A new annotation; that of a crowd is returned unchanged, because COCO stores crowds as run lengths.
+    """
     if item.is_crowd:
         return item
     left, top, width, height = (round(side) for side in item.box_xywh)

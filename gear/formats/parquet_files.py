@@ -141,7 +141,8 @@ def _file(rows: Sequence[dict[str, Any]], columns: dict[str, str], with_features
 def features(columns: dict[str, str]) -> Json:
     """The description of columns that the package `datasets` reads from a Parquet file: the type of each column.
 
-    `columns` contains the file suffix of each column of files, by the column's name.
+    Args:
+        columns: file suffix of each column that holds files, by the column's name.
     """
     described: dict[str, Json] = {key: {"dtype": "int64", "_type": "Value"} for key in NUMBERS}
     for column, suffix in columns.items():

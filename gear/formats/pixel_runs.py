@@ -47,11 +47,19 @@ class Runs:
         return Runs((height, width), values, starts, np.diff(starts, append=height * width))
 
     def painted(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """An (H, W) picture with the same runs, whose pixels get the new (N,) values."""
+        """An (H, W) picture with the same runs, whose pixels get the new (N,) values.
+
+        Args:
+            values: (N,) new value of each run.
+        """
         return np.repeat(values, self.lengths).reshape(self.shape)
 
     def counts(self, size: int) -> Ints:
-        """A (`size`,) array with the number of pixels of each value; all values must be in 0..`size` - 1."""
+        """A (`size`,) array with the number of pixels of each value; all values must be in 0..`size` - 1.
+
+        Args:
+            size: number of possible values.
+        """
         return np.bincount(self.values, weights=self.lengths, minlength=size).astype(np.int64)
 
     def boxes(self, keys: npt.NDArray[Any]) -> dict[int, tuple[Box, int]]:
@@ -59,6 +67,10 @@ class Runs:
 
         Args:
             keys: (N,) key of each run, such as an object id; runs with key 0 are skipped.
+
+        Returns:
+            By key: the box (first column, first row, one past the last column, one past the last row), and the number
+                of pixels.
         """
         used = np.flatnonzero(keys)
         if not used.size:

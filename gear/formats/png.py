@@ -28,15 +28,22 @@ TIFF_UNCOMPRESSED = [cv2.IMWRITE_TIFF_COMPRESSION, 1]
 
 
 def encode_rgb(rgb: UInt8Image) -> bytes:
-    """Encodes an (H, W, 3) uint8 RGB picture as an 8-bit RGB PNG."""
+    """Encodes an (H, W, 3) uint8 RGB picture as an 8-bit RGB PNG.
+
+    Args:
+        rgb: (H, W, 3) uint8.
+    """
     if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8:
         raise ValueError(f"rgb must have shape (H, W, 3) of uint8, got {rgb.shape} of {rgb.dtype}")
     return bytes(fpng.from_ndarray(np.ascontiguousarray(rgb)))
 
 
 def encode_labels(labels: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> bytes:
-    """Encodes an (H, W) uint8 or uint16 map as a greyscale PNG of 8 or 16 bits, or an (H, W, 4) uint8 picture as an
-    RGBA PNG.
+    """Encodes an (H, W) uint8 or uint16 map as a greyscale PNG of 8 or 16 bits, or an (H, W, 4) uint8 picture as
+    an RGBA PNG.
+
+    Args:
+        labels: the map, or the RGBA picture.
     """
     if labels.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"labels must be uint8 or uint16, got {labels.dtype}")
@@ -45,7 +52,11 @@ def encode_labels(labels: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> byt
 
 
 def encode_tiff(values: FloatImage) -> bytes:
-    """Encodes an (H, W) float32 map as an uncompressed one-channel TIFF, without loss."""
+    """Encodes an (H, W) float32 map as an uncompressed one-channel TIFF, without loss.
+
+    Args:
+        values: (H, W) float32; NaN is kept.
+    """
     if values.ndim != 2 or values.dtype != np.float32:
         raise ValueError(f"values must have shape (H, W) of float32, got {values.shape} of {values.dtype}")
     return _encode(".tiff", values, TIFF_UNCOMPRESSED)
@@ -53,6 +64,9 @@ def encode_tiff(values: FloatImage) -> bytes:
 
 def decode_rgb(data: bytes) -> UInt8Image:
     """Decodes an 8-bit colour PNG to (H, W, 3) uint8 RGB.
+
+    Args:
+        data: bytes of the file.
 
     Raises:
         ValueError: the bytes are not a picture, or the picture is too large.
@@ -67,6 +81,9 @@ def decode_rgb(data: bytes) -> UInt8Image:
 
 def decode_plain(data: bytes) -> npt.NDArray[Any]:
     """Decodes a greyscale PNG or a float TIFF to an (H, W) array with the file's dtype.
+
+    Args:
+        data: bytes of the file.
 
     Raises:
         ValueError: the bytes are not a picture.

@@ -16,6 +16,9 @@ def check_chunks(data: bytes) -> None:
     """Checks that every chunk of a PNG file is complete and intact. Files of other formats are accepted without a
     check.
 
+    Args:
+        data: bytes of the file.
+
     Raises:
         ValueError: a chunk is cut off, its checksum is wrong, or the last chunk is missing.
     """

@@ -31,6 +31,9 @@ def decode_rows(data: bytes) -> npt.NDArray[Any] | None:
     The result is None for damaged files and for files with features that gear's own files do not have. These are
     palettes, alpha, other bit depths, interlacing, chunks that change colours, and filters that use more than one
     neighbour.
+
+    Args:
+        data: bytes of the file.
     """
     chunks = _chunks(data)
     header = chunks.get(b"IHDR", b"")
@@ -58,12 +61,15 @@ def decode_rows(data: bytes) -> npt.NDArray[Any] | None:
 
 
 def encode_deep(values: npt.NDArray[np.uint16]) -> bytes:
-    """Encodes an (H, W) uint16 map whose values seldom repeat as a greyscale PNG of 16 bits. The bytes may depend on
-    the processor.
+    """Encodes an (H, W) uint16 map whose values seldom repeat as a greyscale PNG of 16 bits. The bytes may depend
+    on the processor.
 
     For a predicted depth map, this function takes a seventh of OpenCV's time, and the file is a quarter larger. If the
     bytes of a row can be divided into pixels of three or four bytes, fpng encodes them as colours, because its filter
     and its compression work on bytes. Files that must be the same on every machine are encoded by `gear.formats.png`.
+
+    Args:
+        values: (H, W) uint16, such as a predicted depth map.
     """
     height, width = values.shape
     rows = values.astype(">u2").view(np.uint8).reshape(height, -1)

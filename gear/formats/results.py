@@ -22,14 +22,21 @@ def cityscapes_path(town: str, sequence: int, frame: int) -> str:
 
 
 def kitti_depth_paths(index: int) -> tuple[str, str]:
-    """Paths of the two files of a predicted depth map: a 16-bit picture for KITTI's development kit, and a lossless
-    file in metres.
+    """Paths of the two files of a predicted depth map: a 16-bit picture for KITTI's development kit, and a
+    lossless file in metres.
+
+    Args:
+        index: index of the sample in its split.
     """
     return f"depth/rgb_{index:04d}.png", f"depth_metres/rgb_{index:04d}.tiff"
 
 
 def kitti_object_path(index: int) -> str:
-    """Path of a file with predicted 3D boxes; KITTI's development kit reads `data/%06d.txt`."""
+    """Path of a file with predicted 3D boxes; KITTI's development kit reads `data/%06d.txt`.
+
+    Args:
+        index: index of the sample in its split.
+    """
     return f"data/{index:06d}.txt"
 
 
@@ -37,6 +44,9 @@ def kitti_result_lines(detections: Iterable[KittiLabel]) -> bytes:
     """The bytes of a KITTI result file: one line of 16 fields per predicted box.
 
     Numbers have all digits, so that an independent evaluation gets exactly the same metrics as gear.
+
+    Args:
+        detections: the predicted boxes of one picture, each with a score.
 
     Raises:
         ValueError: a detection has no score.

@@ -87,10 +87,13 @@ def _ends(stems: list[str]) -> list[str]:
 
 
 def column_of(name: str, suffix: str, files: Collection[tuple[str, str]]) -> str:
-    """The column name of a file in a table: its short name. The suffix is appended if files with different suffixes
-    share the name.
+    """The column name of a file in a table: its short name. The suffix is appended if files with different
+    suffixes share the name.
 
-    `files` contains the short name and suffix of every file that occurs.
+    Args:
+        name: short name of the file.
+        suffix: suffix of the file, without a dot.
+        files: short name and suffix of every file of the samples.
     """
     is_shared = sum(other == name for other, _ in files) > 1
     return f"{name}_{suffix.replace('.', '_')}" if is_shared else name

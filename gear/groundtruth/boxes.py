@@ -92,6 +92,10 @@ def box_in_camera(scene_object: SceneObject, camera: CameraRecord) -> Box3d:
     The heading is the direction of the object's front, projected on the camera's x-z plane. It is exact for level
     cameras and upright objects. In other cases it is an approximation, because KITTI has a single angle, about the
     camera's y axis.
+
+    Args:
+        scene_object: the object with its pose and its visible triangles.
+        camera: the camera with its pose.
     """
     camera_from_object = camera.world_from_camera_transform.inverse().matrix @ scene_object.world_from_object.matrix
     centre, (length_m, width_m, height_m) = (

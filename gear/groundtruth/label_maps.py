@@ -55,7 +55,11 @@ def instance_map(geom_id: IdImage, geoms: GeomTable, objects: Mapping[int, Scene
 
 
 def label_map(instances: InstanceImage) -> npt.NDArray[np.uint8]:
-    """The (H, W) uint8 map of Cityscapes label ids for an (H, W) uint16 map of instance ids."""
+    """The (H, W) uint8 map of Cityscapes label ids for an (H, W) uint16 map of instance ids.
+
+    Args:
+        instances: (H, W) uint16 instance ids: label id * 1000 + number for countable labels, otherwise the label id.
+    """
     labels = np.empty(instances.shape, np.uint8)
     for top in range(0, len(instances), STRIP_ROWS):
         strip = instances[top : top + STRIP_ROWS]

@@ -44,6 +44,9 @@ VELODYNE_FROM_CAMERA = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 
 def scan_cameras(reference: CameraRecord) -> tuple[CameraRecord, ...]:
     """The four camera views of a laser scanner at the position of a reference camera: ahead, to the left, behind,
     to the right.
+
+    Args:
+        reference: the camera at whose position the scanner stands; its pose gives the direction ahead.
     """
     pose = reference.world_from_camera_transform
     return tuple(

@@ -26,6 +26,9 @@ class LensWarp:
     def of(camera: CameraRecord) -> LensWarp | None:
         """The warp of a camera's lens; None for a camera without a lens.
 
+        Args:
+            camera: the camera with its lens.
+
         Raises:
             ValueError: the distortion folds the picture over.
         """
@@ -47,6 +50,9 @@ class LensWarp:
     def window(self, window: Window) -> Window:
         """The window of the distorted picture that contains `window`, a window of the pinhole's picture, with a
         margin of one pixel. An empty window stays empty.
+
+        Args:
+            window: first column, first row, one past the last column, and one past the last row.
         """
         x0, y0, x1, y1 = window
         if x0 >= x1 or y0 >= y1:

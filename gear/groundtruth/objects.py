@@ -72,7 +72,12 @@ def observe_objects(
 
 
 def in_camera(scene_object: SceneObject, camera: CameraRecord) -> Array:
-    """The (N, 3) vertices of an object in the camera's frame, metres."""
+    """The (N, 3) vertices of an object in the camera's frame, metres.
+
+    Args:
+        scene_object: the object with its pose and its visible triangles.
+        camera: the camera with its pose.
+    """
     camera_from_object = camera.world_from_camera_transform.inverse().matrix @ scene_object.world_from_object.matrix
     return np.asarray(scene_object.shape.vertices_m @ camera_from_object[:3, :3].T + camera_from_object[:3, 3])
 

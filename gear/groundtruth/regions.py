@@ -13,7 +13,11 @@ from gear.values.ground_truth import BoxPx
 
 
 def part_boxes(mask: npt.NDArray[np.bool_]) -> tuple[BoxPx, ...]:
-    """The tight box, in edge pixels, of each connected part (8 neighbours) of an (H, W) mask."""
+    """The tight box, in edge pixels, of each connected part (8 neighbours) of an (H, W) mask.
+
+    Args:
+        mask: (H, W) bool.
+    """
     count, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     boxes = []
     for left, top, width, height, _ in stats[1:count].tolist():  # the first part is what lies outside the mask

@@ -29,6 +29,13 @@ def clip_near(triangles_m: Array, near_m: float = NEAR_M) -> Array:
     """Clips (T, 3, 3) camera-frame triangles at the near plane, z = `near_m`: the part with smaller z is removed.
 
     A triangle of which one corner is removed becomes two triangles.
+
+    Args:
+        triangles_m: (T, 3, 3) corners in the camera's frame.
+        near_m: z of the plane in metres.
+
+    Returns:
+        (N, 3, 3) corners of the remaining triangles.
     """
     front = triangles_m[..., 2] >= near_m
     count = front.sum(axis=1)
@@ -73,6 +80,12 @@ def project_mesh(vertices_camera_m: Array, faces: npt.NDArray[np.int32], intrins
 def bounds(triangles_px: Array) -> Window:
     """The smallest window that contains the silhouette of (T, 3, 2) triangles in index pixels; without triangles
     an empty window at the origin.
+
+    Args:
+        triangles_px: (T, 3, 2) corners in index pixels.
+
+    Returns:
+        First column, first row, one past the last column, and one past the last row.
     """
     if not len(triangles_px):
         return (0, 0, 0, 0)

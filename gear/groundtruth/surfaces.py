@@ -25,8 +25,15 @@ CURVE_STEPS = 32
 
 
 def observe_surfaces(view: View, geoms: GeomTable, record: SceneRecord) -> tuple[SurfaceTruth, ...]:
-    """Measures each patch surface of a scene in one view: corners, visible pixels, distance and angle; in the
-    order of `record.surfaces`.
+    """Measures each patch surface of a scene in one view: corners, visible pixels, distance and angle.
+
+    Args:
+        view: id buffer and camera.
+        geoms: the surface that each geom shows.
+        record: the scene with its surfaces and the poses of the actors that carry them.
+
+    Returns:
+        One entry for each surface, in the order of `record.surfaces`, also for surfaces that are not visible.
     """
     return tuple(_observe(view, geoms, record, index, surface) for index, surface in enumerate(record.surfaces))
 

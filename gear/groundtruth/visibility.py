@@ -48,6 +48,9 @@ class VisibilityLimits:
     def mentions(self, truth: ObjectTruth) -> bool:
         """Whether the object appears in the ground truth, as a label or as a region to ignore; False if it is left
         out.
+
+        Args:
+            truth: the measured object.
         """
         return truth.visible_px >= self.min_pixels_px
 

@@ -35,6 +35,13 @@ class VisiblePart:
 def gather(table: npt.NDArray[np.generic], geom_id: IdImage) -> npt.NDArray[np.generic]:
     """The table entry of each pixel, `table[geom_id]`. The table's last entry belongs to geom id -1, which marks
     pixels without a geom.
+
+    Args:
+        table: (ngeom + 1,) one entry per geom, and a last entry for no geom.
+        geom_id: (H, W) int32.
+
+    Returns:
+        (H, W) array with the table's dtype.
     """
     return np.take(table, geom_id, mode="wrap")
 
@@ -50,6 +57,9 @@ def visible_parts(
         objects: objects to measure; geoms of other objects and of the ego car are skipped.
         by_label: True makes one part per label of an object (rider and bicycle); False one part per object, with its
             main label.
+
+    Returns:
+        The visible parts by `PartKey`: object id, and label code of the part.
     """
     runs = Runs.of(geom_id)
     keys: dict[PartKey, int] = {}

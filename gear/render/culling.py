@@ -30,6 +30,9 @@ def bounding_spheres(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array,
 def bounding_radii(model: mujoco.MjModel) -> Array:
     """The (ngeom,) radii of the bounding spheres of geoms, metres; infinite for geoms without bounds, such as
     planes.
+
+    Args:
+        model: compiled model.
     """
     return np.asarray(np.where(model.geom_rbound > 0, model.geom_rbound, np.inf))
 

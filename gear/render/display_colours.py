@@ -43,6 +43,9 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
     the copy such textures are not marked. If the model has linear colours, colours of geoms and materials are encoded
     and brightened, and colour textures are brightened. Lights of type `image`, which MuJoCo's OpenGL does not support,
     are off; the headlight gives ambient light only.
+
+    Args:
+        model: the compiled world; it is not changed.
     """
     shown = copy.copy(model)
     shown.tex_colorspace[:] = mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR

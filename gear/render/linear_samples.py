@@ -16,7 +16,11 @@ EDGE_DEPTH_STEP = 0.02
 
 
 def sum_2x2(samples: UInt8Image) -> UInt16Image:
-    """Sums each block of 2 x 2 samples: (2H, 2W, 3) uint8 to (H, W, 3) uint16."""
+    """Sums each block of 2 x 2 samples: (2H, 2W, 3) uint8 to (H, W, 3) uint16.
+
+    Args:
+        samples: the picture with twice the width and height, values 0..255.
+    """
     height, width = samples.shape[0] // 2, samples.shape[1] // 2
     sums = np.empty((height, width, 3), np.uint16)
     # In bands: the intermediate array of a whole frame would be as large as the samples.
@@ -28,8 +32,11 @@ def sum_2x2(samples: UInt8Image) -> UInt16Image:
 
 
 def four_times(samples: UInt8Image) -> UInt16Image:
-    """Multiplies (H, W, 3) uint8 samples by four, to uint16. The full scale then equals that of the sum of four samples
-    (`sum_2x2`).
+    """Multiplies (H, W, 3) uint8 samples by four, to uint16. The full scale then equals that of the sum of four
+    samples (`sum_2x2`).
+
+    Args:
+        samples: the picture, values 0..255.
     """
     return np.left_shift(samples, 2, dtype=np.uint16)
 

@@ -23,6 +23,9 @@ _CHATTER = re.compile(
 def native_output(descriptors: tuple[int, ...] = (1, 2)) -> Iterator[list[str]]:
     """Context in which the output of native code to stdout and stderr is caught, at the level of file descriptors.
 
+    Args:
+        descriptors: file descriptors that are caught; 1 is stdout, 2 is stderr.
+
     Yields:
         A list. When the context ends, it contains the known informational lines; all other lines are written to their
         original stream.

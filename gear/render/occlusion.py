@@ -78,12 +78,14 @@ def openness(depth_m: FloatImage, focal_px: float) -> FloatImage:
 
 
 def shade(linear_rgb: UInt16Image, share: npt.NDArray[np.float32]) -> UInt16Image:
-    """Multiplies an (H, W, 3) uint16 linear frame by (H, W) float32 factors, with rounding; the result is a new
-    array.
+    """Multiplies a linear frame by the share of the light that ambient occlusion leaves, with rounding.
 
     Args:
         linear_rgb: (H, W, 3) uint16 linear light.
-        share: (H, W) share of the light that is left, 0..1.
+        share: (H, W) float32 share of the light that is left, 0..1, from `openness`.
+
+    Returns:
+        (H, W, 3) uint16, a new array.
     """
     shaded = np.empty_like(linear_rgb)
     # In bands, since the shares of a whole picture, once for each colour, take more memory than the picture.

@@ -41,6 +41,9 @@ class Frustum:
     def of(camera: CameraRecord) -> Frustum:
         """The view volume of the pinhole camera in a camera record. Pixel coordinates (0, 0) are the centre of the
         picture's first pixel.
+
+        Args:
+            camera: the camera's record; its lens is ignored.
         """
         world_from_camera, pinhole = camera.world_from_camera_transform, camera.intrinsics
         return Frustum(

@@ -58,6 +58,10 @@ class ProbeResult:
 def probe(name: str, *, quality: Quality = "film") -> ProbeResult:
     """Tests a renderer: starts it, renders the reference frame twice, and measures the times.
 
+    Args:
+        name: name of the renderer: `raster`, `filament` or `classic`.
+        quality: `film` takes several samples per pixel; `fast` takes one and smooths edges.
+
     Raises:
         UnknownNameError: there is no renderer with this name.
         BackendError: the renderer cannot start on this machine; the message says what to install.
@@ -101,8 +105,11 @@ _CAMERA = CameraRecord(
 
 @cache
 def renderer_info(name: str) -> RendererInfo:
-    """Name, driver and device of a renderer, without rendering a frame. The renderer is started to find them, so the
-    result is cached.
+    """Name, driver and device of a renderer, without rendering a frame. The renderer is started to find them, so
+    the result is cached.
+
+    Args:
+        name: name of the renderer: `raster`, `filament` or `classic`.
 
     Raises:
         UnknownNameError: there is no renderer with this name.

@@ -50,6 +50,9 @@ def open_renderer(name: str, model: mujoco.MjModel, *, quality: Quality = "film"
 def describe(name: str) -> str:
     """A one-line description of a renderer.
 
+    Args:
+        name: one of `RENDERERS`.
+
     Raises:
         UnknownNameError: there is no renderer with this name.
     """

@@ -46,8 +46,11 @@ class EgoMotion:
         """The motion through the frames of one sequence, in order of time.
 
         The mean velocity of each interval between two frames is exact. The velocity at a frame is the mean of the two
-        intervals beside it, and its acceleration their difference; the first and the last frame extrapolate. The
-        errors are of second order in the interval. Rotation rates are computed in the same way.
+        intervals beside it, and its acceleration their difference; the first and the last frame extrapolate. The errors
+        are of second order in the interval. Rotation rates are computed in the same way.
+
+        Args:
+            records: scene records of the frames, at least two.
 
         Raises:
             ValueError: there are fewer than two frames, or their times do not increase.
@@ -96,7 +99,11 @@ class EgoMotion:
 
 
 def rotation_vector(rotation: Array) -> Array:
-    """The (3,) rotation vector (axis times angle, radians) of a (3, 3) rotation by less than half a turn."""
+    """The (3,) rotation vector (axis times angle, radians) of a (3, 3) rotation by less than half a turn.
+
+    Args:
+        rotation: (3, 3) rotation matrix.
+    """
     sines = np.array(
         [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
     )
@@ -111,6 +118,12 @@ def poses_from_first(records: Sequence[SceneRecord]) -> list[RigidTransform]:
     """The poses of the reference camera in the frame of its first pose; the first pose is the identity.
 
     Camera axes are x right, y down, z forward, as in KITTI odometry.
+
+    Args:
+        records: scene records of the frames, in order of time.
+
+    Returns:
+        One pose per frame.
     """
     poses = [record.cameras[0].world_from_camera_transform for record in records]
     first_from_world = poses[0].inverse()

@@ -42,7 +42,11 @@ def encode_flow(flow_px: FloatImage, is_valid: npt.NDArray[np.bool_] | None = No
 
 
 def decode_flow(data: bytes) -> FloatImage:
-    """Decodes KITTI's PNG to (H, W, 2) float32 flow to the right and downwards, in pixels; NaN where it is invalid.
+    """Decodes KITTI's PNG to (H, W, 2) float32 flow to the right and downwards, in pixels; NaN where it is
+    invalid.
+
+    Args:
+        data: bytes of the PNG file.
 
     Raises:
         ValueError: the bytes are not such a picture.

@@ -42,7 +42,12 @@ Velocities, accelerations and rates are central differences of the exact poses o
 
 
 def oxts_lines(motion: EgoMotion) -> list[str]:
-    """The line of 30 numbers of each frame, without newlines."""
+    """The lines of KITTI's OXTS files, one line of 30 numbers for each frame, without newlines. Each file has one
+    line.
+
+    Args:
+        motion: the motion of the camera rig through the sequence.
+    """
     angles = motion.roll_pitch_yaw_rad
     force, rates_world = motion.measured_mps2, np.einsum("nij,nj->ni", motion.rotations, motion.rates_radps)
     force_world = np.einsum("nij,nj->ni", motion.rotations, force)
@@ -96,7 +101,14 @@ def timestamps(day: datetime.date, times_s: Array) -> bytes:
 
 
 def calibration_files(calibration: Calibration) -> dict[str, bytes]:
-    """The three calibration files of a day of KITTI's raw data, by name."""
+    """The three calibration files of a day of KITTI's raw data, by name.
+
+    Args:
+        calibration: the calibration of the cameras.
+
+    Returns:
+        Bytes by file name: `calib_cam_to_cam.txt`, `calib_imu_to_velo.txt`, `calib_velo_to_cam.txt`.
+    """
     size = (calibration.intrinsics.width_px, calibration.intrinsics.height_px)
     cameras: list[tuple[str, Array]] = [("corner_dist", np.zeros(1))]
     for camera in range(4):

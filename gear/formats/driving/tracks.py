@@ -24,7 +24,11 @@ MOT_CLASSES = {
 
 
 def truncation_level(truncated: float) -> int:
-    """KITTI tracking's truncation level, 0, 1 or 2, of an object with the share `truncated` outside the picture."""
+    """KITTI tracking's truncation level, 0, 1 or 2, of an object with the share `truncated` outside the picture.
+
+    Args:
+        truncated: the share, 0..1.
+    """
     return int(truncated >= SLIGHTLY_TRUNCATED) + int(truncated >= MOSTLY_TRUNCATED)
 
 
@@ -48,7 +52,11 @@ def kitti_track_line(frame: int, track: int, label: KittiLabel) -> str:
 
 
 def format_tracking_calibration(calibration: Calibration) -> bytes:
-    """The bytes of a calibration file of KITTI tracking, in which three names differ from the object benchmark's."""
+    """The bytes of a calibration file of KITTI tracking, in which three names differ from the object benchmark's.
+
+    Args:
+        calibration: the calibration of the cameras.
+    """
     lines = [
         f"P{camera}: " + " ".join(f"{value + 0.0:.12e}" for value in calibration.projection(camera).reshape(-1))
         for camera in range(4)
@@ -60,7 +68,11 @@ def format_tracking_calibration(calibration: Calibration) -> bytes:
 
 
 def kitti_sequence_map(lengths: Iterable[int]) -> bytes:
-    """The bytes of `evaluate_tracking.seqmap`: for each sequence its name, first frame, and number of frames."""
+    """The bytes of `evaluate_tracking.seqmap`: for each sequence its name, first frame, and number of frames.
+
+    Args:
+        lengths: number of frames of each sequence, in order of the sequences' numbers.
+    """
     return "".join(f"{number:04d} empty 000000 {length:06d}\n" for number, length in enumerate(lengths)).encode()
 
 

@@ -53,6 +53,9 @@ def labels_of(data: bytes) -> bytes:
     MMDetection3D counts the lines that are not `DontCare` and takes that many lines from the top of the file, so
     `DontCare` lines must come last. OpenPCDet fails on an empty file; such a file gets one `DontCare` region of area 0,
     which has no effect on the evaluation.
+
+    Args:
+        data: bytes of a KITTI label file.
     """
     lines = data.decode().splitlines(keepends=True)
     lines.sort(key=lambda line: line.startswith("DontCare"))

@@ -73,6 +73,9 @@ def object_map(actor_id: UInt16Image) -> UInt8Image:
     """(H, W) uint8 numbers of the road users in a picture, in the order of their ids, from 1; 0 is the background.
 
     From the 255th road user on, all have the number 255; the benchmark only tells them from the background.
+
+    Args:
+        actor_id: (H, W) id of the road user at each pixel; 0 for the background.
     """
     ids = np.unique(actor_id[actor_id > 0])
     numbers = np.minimum(np.searchsorted(ids, actor_id) + 1, 255)

@@ -69,6 +69,11 @@ class Layout:
 def check_range(name: str, value: float, low: float, high: float) -> None:
     """Checks that the value of a layout's option lies in its range `low` to `high`.
 
+    Args:
+        name: name of the option.
+        value: its value.
+        low, high: smallest and largest allowed value.
+
     Raises:
         FieldError: the value is out of range; the message names the option, its range and the value.
     """

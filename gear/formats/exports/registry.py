@@ -23,6 +23,9 @@ def layout_names() -> list[str]:
 def find_layout(name: str) -> Layout:
     """Finds the layout of `gear export` with this name, such as `kitti-depth`.
 
+    Args:
+        name: name of the layout, with hyphens.
+
     Raises:
         UnknownNameError: there is no such layout.
     """

@@ -19,6 +19,10 @@ TASKS = ("detect2d", "semseg", "stereo3d", "depth")
 def driving_splits(splits: Sequence[ExportSplit], layout: str) -> list[ExportSplit]:
     """The splits that consist of driving sequences; splits of single pictures are left out.
 
+    Args:
+        splits: the finished splits of the dataset.
+        layout: name of the layout that needs sequences, for the error message.
+
     Raises:
         DatasetError: the dataset has no driving sequence.
     """
@@ -31,13 +35,21 @@ def driving_splits(splits: Sequence[ExportSplit], layout: str) -> list[ExportSpl
 
 
 def sequences_of(split: ExportSplit) -> Iterator[list[Sidecar]]:
-    """The sidecars of each sequence of a split, in order of time."""
+    """The sidecars of each sequence of a split, in order of time.
+
+    Args:
+        split: the split.
+    """
     for _, group in groupby(split.sidecars, key=lambda sidecar: sidecar.record.sequence):
         yield list(group)
 
 
 def records_of(sequence: Sequence[Sidecar]) -> list[SceneRecord]:
-    """The scene records of a sequence, in order of time."""
+    """The scene records of a sequence, in order of time.
+
+    Args:
+        sequence: sidecars (JSON files of the samples) of the sequence.
+    """
     return [sidecar.record for sidecar in sequence]
 
 
@@ -45,6 +57,10 @@ def pictures_of(split: ExportSplit, record: SceneRecord) -> Mapping[str, str]:
     """The paths of the left picture and, in a stereo dataset, of the right picture of a sample, by camera name.
 
     The paths are relative to the root of the dataset; the task of the split is one of `TASKS`.
+
+    Args:
+        split: the split to which the sample belongs.
+        record: scene record of the sample.
     """
     name, index = split.info.split, record.index
     match split.task:
@@ -59,7 +75,11 @@ def pictures_of(split: ExportSplit, record: SceneRecord) -> Mapping[str, str]:
 
 
 def calibration_of(record: SceneRecord) -> Calibration:
-    """The calibration of a sample's cameras; with one camera, the baseline is 0."""
+    """The calibration of a sample's cameras; with one camera, the baseline is 0.
+
+    Args:
+        record: scene record of the sample.
+    """
     left = record.cameras[0]
     right_m = 0.0
     if len(record.cameras) > 1:

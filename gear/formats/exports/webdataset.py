@@ -82,7 +82,11 @@ def _shard(split: str, samples: Sequence[Sequence[Member]], index: list[dict[str
 
 
 def tar_bytes(members: Iterator[Member]) -> bytes:
-    """The bytes of a POSIX tar archive (ustar) with files in the given order: mode 644, time 0, owner 0."""
+    """The bytes of a POSIX tar archive (ustar) with files in the given order: mode 644, time 0, owner 0.
+
+    Args:
+        members: name and bytes of each file, in the order in which they are written.
+    """
     stream = io.BytesIO()
     with tarfile.open(fileobj=stream, mode="w", format=tarfile.USTAR_FORMAT) as archive:
         for name, data in members:

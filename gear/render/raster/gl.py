@@ -80,7 +80,11 @@ class Program:
 
 
 def static_buffer(content: npt.NDArray[Any]) -> int:
-    """Makes an OpenGL buffer with constant content. Returns its OpenGL name."""
+    """Makes an OpenGL buffer with constant content. Returns its OpenGL name.
+
+    Args:
+        content: array of any dtype, whose bytes are copied to the graphics device; it may be empty.
+    """
     buffer = np.zeros(1, np.uint32)
     GL.glCreateBuffers(1, buffer)
     if content.nbytes:
@@ -89,16 +93,25 @@ def static_buffer(content: npt.NDArray[Any]) -> int:
 
 
 class StreamBuffer:
-    """An OpenGL buffer whose content is replaced in each frame."""
+    """An OpenGL buffer for content that changes from frame to frame; `upload` replaces all of it."""
 
     def __init__(self, target: int) -> None:
+        """Makes an empty buffer in the current context.
+
+        Args:
+            target: OpenGL's binding point, such as `GL.GL_ARRAY_BUFFER`.
+        """
         self._target = target
         buffer = np.zeros(1, np.uint32)
         GL.glCreateBuffers(1, buffer)
         self.handle = int(buffer[0])
 
     def upload(self, content: npt.NDArray[Any]) -> None:
-        """Binds the buffer and replaces its content."""
+        """Binds the buffer and replaces its content.
+
+        Args:
+            content: array of any dtype, whose bytes become the content.
+        """
         GL.glBindBuffer(self._target, self.handle)
         GL.glBufferData(self._target, content.nbytes, np.ascontiguousarray(content), GL.GL_STREAM_DRAW)
 
@@ -181,7 +194,11 @@ def upload_texture(content: npt.NDArray[np.uint8], *, is_srgb: bool) -> int:
 
 
 def upload_cubemap(levels: tuple[npt.NDArray[Any], ...]) -> int:
-    """Uploads a cube map from its mip levels, each of (6, n, n, 3) linear floats. Returns its OpenGL name."""
+    """Uploads a cube map from its mip levels, each of (6, n, n, 3) linear floats. Returns its OpenGL name.
+
+    Args:
+        levels: mip levels, finest first; faces in the order +x, -x, +y, -y, +z, -z.
+    """
     texture = _texture(GL.GL_TEXTURE_CUBE_MAP)
     size = levels[0].shape[1]
     GL.glTextureStorage2D(texture, len(levels), GL.GL_RGBA16F, size, size)
@@ -195,8 +212,11 @@ def upload_cubemap(levels: tuple[npt.NDArray[Any], ...]) -> int:
 
 
 def upload_table(content: npt.NDArray[Any]) -> int:
-    """Uploads a lookup table of (H, W, 2) floats, which is filtered bilinearly and clamped at its borders. Returns its
-    OpenGL name.
+    """Uploads a lookup table of (H, W, 2) floats, which is filtered bilinearly and clamped at its borders. Returns
+    its OpenGL name.
+
+    Args:
+        content: (H, W, 2) values.
     """
     height, width = content.shape[:2]
     texture = _texture(GL.GL_TEXTURE_2D)
@@ -213,14 +233,23 @@ def upload_table(content: npt.NDArray[Any]) -> int:
 
 
 class Mask:
-    """A texture with one byte per pixel, whose content is replaced for each frame."""
+    """A texture with one byte per pixel for a mask that changes from frame to frame; `upload` replaces all of it."""
 
     def __init__(self, width: int, height: int) -> None:
+        """Makes the texture in the current context; its content is undefined until `upload`.
+
+        Args:
+            width, height: size in pixels.
+        """
         self._size = (width, height)
         self.handle = _plain_texture(width, height, GL.GL_R8)
 
     def upload(self, content: npt.NDArray[np.uint8]) -> None:
-        """Replaces the content of the texture by (height, width) uint8 values; shaders read them as 0..1."""
+        """Replaces the content of the texture by (height, width) uint8 values; shaders read them as 0..1.
+
+        Args:
+            content: (height, width) uint8, row 0 first.
+        """
         GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
         GL.glTextureSubImage2D(
             self.handle, 0, 0, 0, *self._size, GL.GL_RED, GL.GL_UNSIGNED_BYTE, np.ascontiguousarray(content)
@@ -251,7 +280,11 @@ def shadow_map(width: int, height: int) -> int:
 
 
 def free_textures(textures: list[int]) -> None:
-    """Frees textures, given by their OpenGL names."""
+    """Frees textures, given by their OpenGL names.
+
+    Args:
+        textures: OpenGL names, as the functions that upload textures return them.
+    """
     GL.glDeleteTextures(len(textures), np.array(textures, np.uint32))
 
 

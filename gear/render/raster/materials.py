@@ -46,6 +46,9 @@ def materials_of(model: mujoco.MjModel) -> GeomMaterials:
 
     If a material has no roughness, the roughness is computed from Phong's shininess: (2 / (2 + 128 shininess)) ^ (1/4)
     is the perceptual roughness with an equally wide highlight. Partly transparent geoms are drawn as opaque.
+
+    Args:
+        model: the compiled world.
     """
     material = model.geom_matid
     bare = material < 0

@@ -89,8 +89,14 @@ class RasterRenderer:
         colour: bool = True,
         shapes: Sequence[RawView] | None = None,
     ) -> tuple[RawView, ...]:
-        """Renders one raw view (linear colour, depth, geom ids) per camera. `gear.contracts.rendering.Renderer`
-        documents the arguments.
+        """Renders one raw view (linear colour, depth, geom ids) per camera.
+
+        Args:
+            stage: the posed world.
+            cameras: the cameras of the scene.
+            colour: whether `linear_rgb` is rendered; False leaves it None.
+            shapes: views of the same cameras on a stage that differs only in paint and patches; their depth and ids are
+                reused.
 
         Raises:
             ValueError: the stage belongs to another model, or a patch does not have the size of its texture.

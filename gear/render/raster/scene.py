@@ -79,6 +79,9 @@ class Scene:
     def set_faces(self, stage: Stage) -> None:
         """Uploads the patches of a stage (a posed world), which replace the patches of the previous stage on the
         faces.
+
+        Args:
+            stage: the posed world; `Stage.faces` holds the patches.
         """
         self._face_of_geom = self._textures.faces(stage.faces)
 
@@ -131,20 +134,31 @@ class Scene:
     def spheres(self, stage: Stage) -> tuple[Array, Array]:
         """The bounding spheres of the P pieces of triangles: (P, 3) centres in world coordinates and (P,) radii,
         metres.
+
+        Args:
+            stage: the posed world.
         """
         centres_m, radii_m = self._spheres
         turns = stage.data.geom_xmat.reshape(-1, 3, 3)[self.geom_of_piece]
         return np.einsum("pij,pj->pi", turns, centres_m) + stage.data.geom_xpos[self.geom_of_piece], radii_m
 
     def present(self, stage: Stage) -> Mask:
-        """The pieces of triangles that a stage contains: (P,) bool, True if the geom of the piece is drawn."""
+        """The pieces of triangles that a stage contains: (P,) bool, True if the geom of the piece is drawn.
+
+        Args:
+            stage: the posed world; geoms of actors that a sample does not use are not drawn.
+        """
         if stage.is_absent is None:
             return np.ones(len(self.geom_of_piece), np.bool_)
         return np.asarray(~stage.is_absent[self.geom_of_piece])
 
     def sample_vertices(self, stage: Stage, chosen: Mask) -> Array:
-        """The (N, 3) world positions of a few vertices of each chosen piece of triangles. If no piece is chosen, the
-        only position is the origin.
+        """The (N, 3) world positions of a few vertices of each chosen piece of triangles. If no piece is chosen,
+        the only position is the origin.
+
+        Args:
+            stage: the posed world.
+            chosen: (P,) bool, the chosen pieces.
         """
         marks_m = self._samples_m[chosen]
         geoms = self.geom_of_piece[chosen]

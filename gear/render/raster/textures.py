@@ -38,7 +38,12 @@ class TextureStore:
         self._faces: OrderedDict[bytes, int] = OrderedDict()
 
     def of(self, texture: int) -> int:
-        """The OpenGL name of the texture with this id in the model; 0 for id -1 (no texture) and for cube textures."""
+        """The OpenGL name of the texture with this id in the model; 0 for id -1 (no texture) and for cube
+        textures.
+
+        Args:
+            texture: id of the texture; the store must have been made with it.
+        """
         return self._handles.get(texture, 0)
 
     def faces(self, srgb_of_geom: Mapping[int, UInt8Image]) -> dict[int, int]:
@@ -66,8 +71,14 @@ class TextureStore:
 
 
 def linear_cubes(model: mujoco.MjModel) -> dict[int, Array]:
-    """The linear faces, (6, n, n, 3) float64 in 0..1, of the model's cube textures with three channels, by
-    texture id.
+    """The faces of the model's cube and sky textures with three channels, in linear light.
+
+    Args:
+        model: the compiled world.
+
+    Returns:
+        By texture id: (6, n, n, 3) float64 in 0..1, in MuJoCo's order of faces. A texture with one picture has it on
+            all six faces.
     """
     cubes = {}
     for texture in range(model.ntex):
@@ -81,7 +92,11 @@ def linear_cubes(model: mujoco.MjModel) -> dict[int, Array]:
 
 
 def sky_of(model: mujoco.MjModel) -> int | None:
-    """Id of the model's sky texture; None for a model without a sky."""
+    """Id of the model's sky texture; None for a model without a sky.
+
+    Args:
+        model: the compiled world.
+    """
     skies = np.flatnonzero(model.tex_type == _SKY)
     return int(skies[0]) if len(skies) else None
 
