@@ -16,12 +16,19 @@ MAX_NODES = 100_000
 
 
 def to_yaml(config: Any) -> str:
-    """Converts a config to YAML text, from which the same config can be read."""
+    """Converts a config to YAML text, from which the same config can be read.
+
+    Args:
+        config: a config dataclass.
+    """
     return str(yaml.safe_dump(to_plain(config), sort_keys=False, allow_unicode=True, default_flow_style=None))
 
 
 def node_to_json(node: Node) -> Json:
     """Converts a parsed YAML tree to JSON in which numbers and booleans stay text.
+
+    Args:
+        node: the parsed tree.
 
     Raises:
         ConfigError: the tree is too large once its aliases are expanded.
@@ -50,7 +57,11 @@ def _written_out(node: Node) -> Json:
 
 
 def to_plain(value: Any) -> Json:
-    """Converts a config to JSON values; paths become texts, and values without a declared type stay texts."""
+    """Converts a config to JSON values; paths become texts, and values without a declared type stay texts.
+
+    Args:
+        value: a config dataclass, or any value of its fields.
+    """
     if isinstance(value, (Scalar, Items, Mapping)):
         return node_to_json(value)
     if isinstance(value, Path):

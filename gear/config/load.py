@@ -80,6 +80,9 @@ def load_collection(
 def load_simulation(name: str) -> SimulationConfig:
     """Reads a simulation config by name or path; a Python file of CARLA-GeAR is parsed without running it.
 
+    Args:
+        name: name of a simulation config of gear, such as `default`, or path of a YAML or Python file.
+
     Raises:
         UnknownNameError: there is no such config.
         ConfigError: the file cannot be read.
@@ -92,6 +95,10 @@ def split_of(simulation: SimulationConfig, split: str) -> SplitConfig:
     """The entry of a split in the simulation config, such as `test` for both `test` and `test_night`.
 
     A split without an entry of its own uses the entry of the word before the first `_` of its name.
+
+    Args:
+        simulation: the simulation config.
+        split: name of the split.
 
     Raises:
         UnknownNameError: there is no such entry.

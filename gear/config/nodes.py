@@ -21,8 +21,11 @@ MARKS = "'\"[{&*!|>"
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """The position of a value in a config: path of the file, and line and column from 1; line 0 for a value that
-    is in no file.
+    """The position of a value in a config.
+
+    Attributes:
+        path: path of the file, or a name such as that of a command-line flag.
+        line, column: position in the file, counted from 1; line 0 for a value that is in no file.
     """
 
     path: str
@@ -33,6 +36,10 @@ class Place:
         """A `ConfigError` at this position.
 
         For a value of a command-line flag the key is left out of the message, because the flag already names it.
+
+        Args:
+            key: key of the value, with dots.
+            problem: what is wrong with the value.
         """
         key = "" if self.path == f"--{key}" else key
         return ConfigError(self.path, self.line, self.column, key, problem)
@@ -40,8 +47,12 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """A scalar of a YAML file as text with its position; `is_null` is True for an empty value, and for unquoted
-    `null` or `~`.
+    """A scalar of a YAML file, as text.
+
+    Attributes:
+        text: the text, without quotes.
+        is_null: whether the value is empty, or `null` or `~` without quotes.
+        place: position of the value.
     """
 
     text: str
@@ -51,7 +62,12 @@ class Scalar:
 
 @dataclass(frozen=True, slots=True)
 class Items:
-    """A YAML list of nodes with its position in the file."""
+    """A YAML list.
+
+    Attributes:
+        items: the nodes of the list.
+        place: position of the list.
+    """
 
     items: tuple[Node, ...]
     place: Place
@@ -59,8 +75,11 @@ class Items:
 
 @dataclass(frozen=True, slots=True)
 class Mapping:
-    """A YAML mapping: each key has its own position and a node, in the order of the file; repeated keys are
-    refused on reading.
+    """A YAML mapping. A repeated key is an error when the file is read.
+
+    Attributes:
+        entries: position of the key, and node of the value, by key, in the order of the file.
+        place: position of the mapping.
     """
 
     entries: dict[str, tuple[Place, Node]]
@@ -73,6 +92,9 @@ Node = Scalar | Items | Mapping
 def parse_file(path: Path) -> Node:
     """Reads a YAML file as a tree of texts.
 
+    Args:
+        path: path of the file.
+
     Raises:
         ConfigError: the file is missing, too large, not UTF-8 or not YAML, or repeats a key.
     """
@@ -81,6 +103,9 @@ def parse_file(path: Path) -> Node:
 
 def text_of(path: Path) -> str:
     """Reads a config file as text.
+
+    Args:
+        path: path of the file.
 
     Raises:
         ConfigError: the file is missing, too large or not UTF-8.
@@ -140,7 +165,12 @@ def parse_value(text: str, name: str) -> Node:
 
 
 def in_one_place(node: Node, place: Place) -> Node:
-    """Copies a tree and gives all nodes one position, for text that the user has not written in a file."""
+    """Copies a tree and gives all nodes one position, for text that the user has not written in a file.
+
+    Args:
+        node: the tree; it is not changed.
+        place: the position that all nodes get.
+    """
     done: dict[int, Node] = {}
 
     def moved(node: Node) -> Node:

@@ -42,13 +42,20 @@ TOWNS = {"Town10HD": "town10", "Town10HD_Opt": "town10"}
 
 
 def is_original(node: Node) -> bool:
-    """Whether a parsed YAML file is a collection config of CARLA-GeAR, recognised by its keys."""
+    """Whether a parsed YAML file is a collection config of CARLA-GeAR, recognised by its keys.
+
+    Args:
+        node: the parsed file.
+    """
     return isinstance(node, Mapping) and bool(ORIGINAL_ONLY & node.entries.keys())
 
 
 def from_original(node: Mapping) -> Mapping:
     """Converts a collection config of CARLA-GeAR to gear's keys, without the dataset's folder (see
     `original_root`).
+
+    Args:
+        node: the config of CARLA-GeAR.
 
     Raises:
         ConfigError: a key is unknown, a value cannot be read, or the task is not `ss`, `2dod`, `3dod` or `depth`.
@@ -111,6 +118,9 @@ def simulation_from_python(path: Path) -> Mapping:
 
     Only plain assignments of literals to `SEED_VALUES`, `ITERATION_VALUES`, `MAX_VEHICLE_NPC` and `MAX_WALKER_NPC` are
     read. Everything else in the file is ignored, unless it may change one of these four names.
+
+    Args:
+        path: path of the Python file.
 
     Raises:
         ConfigError: the file is not Python; one of the four names is computed or may be changed elsewhere; or a seed

@@ -63,6 +63,13 @@ def with_value(node: Node, path: tuple[str, ...], value: Node, above: str = "") 
 def merged(base: Node, above: Node) -> Node:
     """Merges two YAML trees: mappings are merged recursively, and any other value of `above` replaces the one of
     `base`.
+
+    Args:
+        base: the tree with lower priority.
+        above: the tree with higher priority.
+
+    Returns:
+        A new tree.
     """
     if not (isinstance(base, Mapping) and isinstance(above, Mapping)):
         return above

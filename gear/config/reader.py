@@ -112,7 +112,12 @@ def _read(kind: Any, node: Node, key: str, default: Any = None) -> Any:
 
 
 def join(key: str, name: str) -> str:
-    """The key path `key.name`; only `name` if `key` is empty."""
+    """The key path `key.name`; only `name` if `key` is empty.
+
+    Args:
+        key: the key of the mapping.
+        name: the key inside the mapping.
+    """
     return f"{key}.{name}" if key else name
 
 

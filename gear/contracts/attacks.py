@@ -31,8 +31,13 @@ class Patch:
 
 
 def surface_of(name: str) -> int:
-    """The number of the surface that a patch belongs to, from the patch's name: 10 for `patch_10`; -1 for a name
-    without number. Patches are sorted by this number.
+    """The number of the surface that a patch belongs to, from the patch's name. Patches are sorted by this number.
+
+    Args:
+        name: name of the patch, such as `patch_10`.
+
+    Returns:
+        The number, such as 10; -1 for a name without number.
     """
     number = name.rpartition("_")[2]
     return int(number) if number.isdecimal() else -1
@@ -179,8 +184,7 @@ class HarmObjective(Protocol):
         ...
 
     def harm(self, model: Model, views: Mapping[str, Tensor], samples: Sequence[Any], indices: Sequence[int]) -> Tensor:
-        """Scalar tensor that grows with the harm of the patch to a batch; the arguments are those of
-        `Objective.terms`.
+        """A scalar tensor that grows with the harm of the patch to a batch.
 
         Args:
             model: the attacked network.
@@ -199,7 +203,11 @@ class WithObjective(Protocol):
     """
 
     def objective(self, sample: Any) -> Objective:
-        """A new objective for the task to which the sample belongs."""
+        """A new objective for the task to which the sample belongs.
+
+        Args:
+            sample: a sample of the task.
+        """
         ...
 
 
@@ -210,6 +218,9 @@ class WithTaskOptions(Protocol):
     def settings(self, sample: Any) -> Any:
         """The options that the attack uses for the task of the sample, as a dataclass; they are written to
         `attack.json`.
+
+        Args:
+            sample: a sample of the task.
         """
         ...
 

@@ -135,5 +135,9 @@ class Controller(Protocol):
         ...
 
     def act(self, observation: Observation) -> Action:
-        """Decides acceleration and steering from one frame. The observation must not be changed."""
+        """Decides acceleration and steering from one frame. The observation must not be changed.
+
+        Args:
+            observation: what the controller receives in this frame.
+        """
         ...

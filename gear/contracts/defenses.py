@@ -33,8 +33,8 @@ class DefenseResult:
 
 
 class Defense(Protocol):
-    """Protects a model against patches. A defense object holds no state between calls: `fit` returns what was
-    learnt, and `apply` receives it.
+    """Protects a model against patches. A defense object holds no state between calls: `fit` returns the
+    calibrated state, and `apply` receives it.
     """
 
     def fit(
@@ -44,7 +44,7 @@ class Defense(Protocol):
         model: Model | None,
         rng: np.random.Generator,
     ) -> Any:
-        """Learns the defense's state from calibration samples.
+        """Calibrates the defense on samples, and returns its state.
 
         Args:
             clean: samples without a patch, (H, W, 3) uint8 pictures by camera name.
@@ -53,7 +53,7 @@ class Defense(Protocol):
             rng: generator of all random choices.
 
         Returns:
-            The state that `apply` receives; None if there is nothing to learn.
+            The state that `apply` receives; None if there is nothing to calibrate.
         """
         ...
 
@@ -73,9 +73,14 @@ class Defense(Protocol):
     def forward(self, views: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """Cleans a batch with torch operations, for attacks that take the defense into account.
 
-        Takes and returns (B, 3, H, W) float pictures in 0..1 by camera name. Values are those of `apply` up to
-        rounding. The gradient is exact if the spec declares `differentiable`, and that of a substitute function if the
-        spec declares `surrogate`.
+        Values are those of `apply` up to rounding. The gradient is exact if the spec declares `differentiable`, and
+        that of a substitute function if the spec declares `surrogate`.
+
+        Args:
+            views: (B, 3, H, W) float pictures in 0..1 by camera name.
+
+        Returns:
+            The cleaned pictures in the same form.
 
         Raises:
             ValueError: the spec declares `none`, or the defense is a `FittedDefense`.
@@ -85,6 +90,9 @@ class Defense(Protocol):
     def wrap(self, model: Model) -> Model:
         """Returns the model to use with the defense. Defenses that need several passes return a model that
         contains the given one; other defenses return the given model.
+
+        Args:
+            model: the protected model.
         """
         ...
 
@@ -142,11 +150,11 @@ class DifferentiableDetector(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitReport:
-    """A summary of what a defense has learnt, measured on its own calibration data.
+    """A summary of the calibration of a defense, measured on its own calibration data.
 
     Attributes:
-        values: numbers by name, such as the loss of the fitted function and that of the best constant.
-        problems: one line for each reason not to trust the fit; shown as prominently as an error.
+        values: numbers by name, such as the loss of the calibrated function and that of the best constant.
+        problems: one line for each reason not to trust the calibration; shown as prominently as an error.
     """
 
     values: Mapping[str, float]
@@ -155,8 +163,8 @@ class FitReport:
 
 @runtime_checkable
 class ReportsFit(Protocol):
-    """A state, returned by a defense's `fit`, that can summarise what was learnt."""
+    """A state, returned by a defense's `fit`, that can summarise its calibration."""
 
     def fit_report(self) -> FitReport:
-        """The summary of what the defense has learnt, measured on its calibration data."""
+        """The summary of the defense's calibration, measured on its calibration data."""
         ...

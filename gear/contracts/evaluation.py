@@ -38,8 +38,15 @@ class KeepsPredictions(Protocol):
     """
 
     def encode_prediction(self, sample: Any, prediction: Any, info: SplitInfo) -> Encoded:
-        """The result files of one sample, by path relative to the folder of predictions, together with JSON data
-        (`facts`) that decoding needs.
+        """Converts the prediction of one sample to result files.
+
+        Args:
+            sample: the sample.
+            prediction: its prediction in the task's form.
+            info: names of the split, town, scene and patch.
+
+        Returns:
+            The files, by path relative to the folder of predictions, with JSON data (`facts`) that decoding needs.
         """
         ...
 
@@ -66,7 +73,7 @@ class KeepsPredictions(Protocol):
 
 @runtime_checkable
 class DrawsPredictions(Protocol):
-    """A task that draws predictions as pictures for people.
+    """A task that draws predictions as pictures to look at.
 
     For a task without this protocol that implements `WithObjects`, gear draws the boxes of objects and detections.
     """
@@ -76,6 +83,10 @@ class DrawsPredictions(Protocol):
 
         A picture has the name and the colours of the picture in `Task.preview` that shows the same for the ground
         truth, so the two can be compared and have the same legend.
+
+        Args:
+            sample: the sample.
+            prediction: its prediction in the task's form.
         """
         ...
 
@@ -104,6 +115,10 @@ class WithObjects(Protocol):
     def picture_objects(self, sample: Any, prediction: Any) -> PictureObjects:
         """The objects of a sample that a detector should find, and the network's detections.
 
+        Args:
+            sample: the sample with its ground truth.
+            prediction: its prediction in the task's form.
+
         Raises:
             ValueError: a detection cannot be evaluated.
         """
@@ -128,11 +143,15 @@ class Resampled(Protocol):
     """
 
     def resampled(self, draws: Draws) -> Spread:
-        """The metrics by name, (R,) each, on R resampled datasets; row r of `draws` lists the samples of dataset
-        r.
+        """The metrics on R resampled datasets, from which confidence intervals are computed.
 
-        Samples are numbered from 0 in the order of the calls of `update`. The value is NaN where a metric is undefined.
-        Metrics that are missing from the result get no interval.
+        Args:
+            draws: (R, N) sample indices; row r lists the samples of dataset r. Samples are numbered from 0 in the order
+                of the calls of `update`.
+
+        Returns:
+            (R,) values by name of the metric; NaN where a metric is undefined. Metrics that are missing get no
+            interval.
         """
         ...
 
@@ -175,7 +194,11 @@ class Ranged(Protocol):
     """An evaluator that states the ranges of its metrics; confidence intervals are cut at the ends of the range."""
 
     def range_of(self, metric: str) -> tuple[float, float]:
-        """Smallest and largest possible value of a metric; infinite on a side without bound."""
+        """Smallest and largest possible value of a metric; infinite on a side without bound.
+
+        Args:
+            metric: name of the metric, as in `result`.
+        """
         ...
 
 
@@ -186,5 +209,7 @@ class Counting(Protocol):
     """
 
     def counted(self) -> frozenset[str]:
-        """The names of these metrics; their range, if stated, is 0 to infinity."""
+        """The names of the metrics that are numbers of events per picture. If `Ranged` states their range, it is 0
+        to infinity.
+        """
         ...

@@ -94,6 +94,9 @@ class RawView:
 def has_own_colour(model: mujoco.MjModel) -> Bools:
     """The (ngeom,) bool mask of the geoms that MuJoCo renders in their own rgba colour, not in the colour of their
     material.
+
+    Args:
+        model: compiled model.
     """
     is_said = (model.geom_rgba != np.array(NO_OWN_RGBA, np.float32)).any(axis=1)
     return np.asarray(is_said | (model.geom_matid < 0), np.bool_)

@@ -47,7 +47,11 @@ class Spec(Generic[ConfigT, ProductT]):
 
 
 def no_notes(_options: Any) -> tuple[str, ...]:
-    """The default of `TaskSpec.notes`: no notes, whatever the options."""
+    """The default of `TaskSpec.notes`: no notes, whatever the options.
+
+    Args:
+        _options: options of the task; not used.
+    """
     return ()
 
 
@@ -62,6 +66,8 @@ class TaskSpec(Spec[ConfigT, Task[Any, Any]]):
         metric: the metric by which training chooses among checkpoints, of the evaluator or of a report
             (`<report>.<metric>`); "" chooses by the loss.
         lower_is_better: whether that metric is an error.
+        notes: function from the options to notes for the user, one line each, which `gear collect` shows; for options
+            whose ground truth is only approximate.
     """
 
     views: tuple[str, ...]

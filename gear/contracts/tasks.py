@@ -113,13 +113,21 @@ class Evaluator(Protocol[SampleT_contra, PredictionT_contra]):
     def update(self, sample: SampleT_contra, prediction: PredictionT_contra) -> Mapping[str, float]:
         """Adds one sample with its prediction.
 
+        Args:
+            sample: the sample with its ground truth.
+            prediction: its prediction in the task's form.
+
         Returns:
             Metrics of this sample alone, by name; empty if the metric is not defined for a single sample.
         """
         ...
 
     def merge(self, other: Any) -> None:
-        """Adds the samples that another evaluator of the same class has gathered."""
+        """Adds the samples that another evaluator of the same class has gathered.
+
+        Args:
+            other: the other evaluator; it is not changed.
+        """
         ...
 
     def result(self) -> Mapping[str, float]:
@@ -148,7 +156,15 @@ class Task(Protocol[SampleT, PredictionT]):
         ...
 
     def encode(self, sample: SampleT, info: SplitInfo) -> Encoded:
-        """Converts one sample to files, without index files that several samples share."""
+        """Converts one sample to files, without index files that several samples share.
+
+        Args:
+            sample: the sample; it is not changed.
+            info: names and seed of the split.
+
+        Returns:
+            The files as bytes by path, with JSON data (`facts`) that `decode` and `finalise` need.
+        """
         ...
 
     def finalise(self, sidecars: Sequence[Sidecar], info: SplitInfo) -> Mapping[str, bytes]:
@@ -171,7 +187,11 @@ class Task(Protocol[SampleT, PredictionT]):
         ...
 
     def as_prediction(self, sample: SampleT) -> PredictionT:
-        """The ground truth of a sample in the form of a perfect prediction, with which evaluators are tested."""
+        """The ground truth of a sample in the form of a perfect prediction, with which evaluators are tested.
+
+        Args:
+            sample: the sample with its ground truth.
+        """
         ...
 
     def evaluator(self) -> Evaluator[SampleT, PredictionT]:
@@ -179,7 +199,11 @@ class Task(Protocol[SampleT, PredictionT]):
         ...
 
     def preview(self, sample: SampleT) -> Mapping[str, UInt8Image]:
-        """Returns pictures of a sample to look at, by name: (H, W, 3) uint8, with labels, boxes or depth drawn in."""
+        """Returns pictures of a sample to look at, by name: (H, W, 3) uint8, with labels, boxes or depth drawn in.
+
+        Args:
+            sample: the sample with its ground truth.
+        """
         ...
 
 

@@ -89,6 +89,8 @@ class Picture:
         file_name: path relative to the folder of the split's pictures.
         height_px, width_px: size of the picture.
         annotations: annotations of its objects.
+        ignored_px: boxes, in edge pixels, of regions in which the evaluation ignores detections that match no object;
+            not written to annotation files.
     """
 
     id: int

@@ -13,21 +13,40 @@ MAX_CORNERS = 8
 
 
 def intersections_px2(boxes: Array, other_boxes: Array) -> Array:
-    """The (N, M) intersection areas, in square pixels, of (N, 4) boxes and (M, 4) boxes (left, top, right, bottom)."""
+    """The intersection areas of all pairs of two lists of 2D boxes.
+
+    Args:
+        boxes, other_boxes: (N, 4) and (M, 4) boxes: left, top, right, bottom in edge pixels.
+
+    Returns:
+        (N, M) areas in square pixels.
+    """
     low = np.maximum(boxes[:, None, :2], other_boxes[None, :, :2])
     high = np.minimum(boxes[:, None, 2:], other_boxes[None, :, 2:])
     return np.asarray(np.prod(np.clip(high - low, 0, None), axis=-1))
 
 
 def iou_2d(boxes: Array, other_boxes: Array) -> Array:
-    """The (N, M) intersection over union of (N, 4) boxes and (M, 4) boxes (left, top, right, bottom)."""
+    """The intersection over union of all pairs of two lists of 2D boxes.
+
+    Args:
+        boxes, other_boxes: (N, 4) and (M, 4) boxes: left, top, right, bottom in edge pixels.
+
+    Returns:
+        (N, M) shares, 0..1.
+    """
     shared = intersections_px2(boxes, other_boxes)
     return _over(shared, _areas(boxes)[:, None] + _areas(other_boxes)[None] - shared)
 
 
 def intersection_over_first(boxes: Array, other_boxes: Array) -> Array:
-    """The (N, M) shares of each box of `boxes` that lie inside each box of `other_boxes`, 0..1; (N, 4) and (M, 4) boxes
-    (left, top, right, bottom).
+    """The share of each box in one list that lies inside each box of another list.
+
+    Args:
+        boxes, other_boxes: (N, 4) and (M, 4) boxes: left, top, right, bottom in edge pixels.
+
+    Returns:
+        (N, M) intersection area over the area of the box of `boxes`, 0..1.
     """
     return _over(
         intersections_px2(boxes, other_boxes), np.broadcast_to(_areas(boxes)[:, None], (len(boxes), len(other_boxes)))
@@ -55,8 +74,14 @@ def iou_ground_and_space(boxes: Array, other_boxes: Array) -> tuple[Array, Array
 
 
 def footprint_intersections_m2(boxes: Array, other_boxes: Array) -> Array:
-    """The (N, M) intersection areas, in square metres, of the footprints of (N, 7) and (M, 7) KITTI boxes (height,
-    width, length, x, y, z, rotation_y).
+    """The intersection areas of the footprints of all pairs of two lists of KITTI's 3D boxes.
+
+    Args:
+        boxes, other_boxes: (N, 7) and (M, 7) boxes: height, width, length, x, y, z of the middle of the bottom face,
+            and rotation_y, in the camera's frame with y down.
+
+    Returns:
+        (N, M) areas in square metres.
     """
     shared = np.zeros((len(boxes), len(other_boxes)))
     reach = (np.hypot(boxes[:, 1], boxes[:, 2])[:, None] + np.hypot(other_boxes[:, 1], other_boxes[:, 2])[None]) / 2
@@ -68,8 +93,14 @@ def footprint_intersections_m2(boxes: Array, other_boxes: Array) -> Array:
 
 
 def footprints(boxes: Array) -> Array:
-    """The (N, 4, 2) footprint corners (x, z) of (N, 7) KITTI boxes (height, width, length, x, y, z, rotation_y),
-    counter-clockwise in (x, z).
+    """The corners of the footprints of KITTI's 3D boxes on the ground.
+
+    Args:
+        boxes: (N, 7) height, width, length, x, y, z of the middle of the bottom face, and rotation_y, in the camera's
+            frame with y down.
+
+    Returns:
+        (N, 4, 2) corners (x, z) in metres, counter-clockwise in (x, z).
     """
     c, s = np.cos(boxes[:, 6]), np.sin(boxes[:, 6])
     along = np.array([0.5, -0.5, -0.5, 0.5]) * boxes[:, 2:3]

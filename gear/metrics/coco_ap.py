@@ -43,6 +43,10 @@ class CocoEvaluator(Generic[SampleT]):
         The metrics are `found_share`, the share of the labels that were detected, and `false_alarms`, the number of
         wrong detections (`gear.metrics.single_picture`). Average precision is not defined for a single picture.
 
+        Args:
+            sample: a sample that `as_picture` can convert.
+            prediction: the detections in its picture, of any score.
+
         Raises:
             ValueError: a detection has an unknown category, a box whose right is left of its left or bottom above its
                 top, or a number that is not finite.
@@ -76,7 +80,11 @@ class CocoEvaluator(Generic[SampleT]):
         )
 
     def merge(self, other: Any) -> None:
-        """Adds the samples that another evaluator of this class has gathered."""
+        """Adds the samples that another evaluator of this class has gathered.
+
+        Args:
+            other: the other evaluator; it is not changed.
+        """
         self.pictures += other.pictures
         self.detections += other.detections
 
@@ -105,6 +113,9 @@ class CocoEvaluator(Generic[SampleT]):
     def resampled(self, draws: Draws) -> Spread:
         """The metrics `ap`, `ap50`, `ap75` and `ap_<category>` of R resampled datasets, (R,) each. Row r of
         `draws` lists the sample indices of dataset r.
+
+        Args:
+            draws: (R, N) indices of samples in the order of the calls of `update`.
         """
         found = matches(self._matched())
         values = resampled(list(found.values()), draws)
@@ -120,6 +131,9 @@ class CocoEvaluator(Generic[SampleT]):
     def range_of(self, metric: str) -> tuple[float, float]:
         """Smallest and largest possible value of a metric: 0 and 1, because every metric of this evaluator is a
         share.
+
+        Args:
+            metric: name of the metric.
         """
         return 0.0, 1.0
 
@@ -152,6 +166,13 @@ class CocoEvaluator(Generic[SampleT]):
 def coco_eval(truth: Json, detections: list[Json]) -> Any:
     """Makes pycocotools' `COCOeval` for 2D boxes over all of COCO's categories, from ground truth and detections
     in COCO's JSON format.
+
+    Args:
+        truth: content of an annotation file.
+        detections: entries of a results file, each with the additional keys `id`, `iscrowd` and `area`.
+
+    Returns:
+        The `COCOeval`, not yet evaluated.
     """
     from pycocotools.coco import COCO
     from pycocotools.cocoeval import COCOeval

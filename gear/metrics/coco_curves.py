@@ -40,6 +40,9 @@ class Matches:
 def matches(evaluation: Any) -> dict[int, Matches]:
     """The matches of an evaluated `COCOeval` by category id, for its first area range. Categories without a label
     that counts are left out.
+
+    Args:
+        evaluation: a `COCOeval` of pycocotools after its `evaluate`.
     """
     parameters = evaluation.params
     pictures, areas = len(parameters.imgIds), len(parameters.areaRng)
@@ -65,8 +68,15 @@ def _gathered(rows: list[tuple[int, Any]], label_counts: npt.NDArray[np.int64], 
 
 
 def average_precision(found: Matches, weights: npt.NDArray[np.int64]) -> Array:
-    """The (T,) average precision at 101 recalls for T IoU thresholds. Picture i counts `weights[i]` times; NaN if
-    no label counts.
+    """The average precision of one category over weighted pictures, as COCO computes it: the mean precision at 101
+    recalls.
+
+    Args:
+        found: the matches of the category in N pictures.
+        weights: (N,) how often each picture counts.
+
+    Returns:
+        (T,) average precision for each IoU threshold, 0..1; NaN if no label counts.
     """
     total = int(weights @ found.label_counts)
     if not total:
@@ -83,8 +93,14 @@ def average_precision(found: Matches, weights: npt.NDArray[np.int64]) -> Array:
 
 
 def resampled(found: Sequence[Matches], draws: Draws) -> Array:
-    """The (R, categories, T) average precision of R resampled datasets; row r of `draws` lists the picture indices
-    of dataset r.
+    """The average precision of several categories on R resampled datasets.
+
+    Args:
+        found: the matches of each category.
+        draws: (R, N) picture indices; row r lists the pictures of dataset r.
+
+    Returns:
+        (R, categories, T) average precision for each of T IoU thresholds; NaN if no label counts.
     """
     values = np.full((len(draws), len(found), len(found[0].hit) if found else 1), np.nan)
     for row, drawn in enumerate(draws):
@@ -94,7 +110,12 @@ def resampled(found: Sequence[Matches], draws: Draws) -> Array:
 
 
 def known_mean(values: Array, axes: tuple[int, ...]) -> Array:
-    """The mean over the given axes of all values that are not NaN; NaN where all values are NaN."""
+    """The mean over the given axes of all values that are not NaN; NaN where all values are NaN.
+
+    Args:
+        values: array of any shape.
+        axes: the axes over which the mean is taken.
+    """
     known = ~np.isnan(values)
     total = np.where(known, values, 0.0).sum(axis=axes)
     return np.asarray(np.where(known.any(axis=axes), total / np.maximum(known.sum(axis=axes), 1), np.nan))

@@ -53,6 +53,9 @@ class TallObjects(CocoEvaluator[SampleT]):
     def resampled(self, draws: Draws) -> Spread:
         """The metrics `ap50` and `ap50_<category>` of R resampled datasets, (R,) each. The categories with at
         least 50 instances in the whole dataset count.
+
+        Args:
+            draws: (R, N) sample indices; row r lists the samples of dataset r.
         """
         found = {name: one for name, one in self._found().items() if int(one.label_counts.sum()) >= MIN_INSTANCES}
         values = resampled(list(found.values()), draws)[:, :, 0]

@@ -70,12 +70,22 @@ class DepthEvaluator:
     _wants_devkit = True
 
     def __init__(self, *, max_depth_m: float = 80.0, crop: Crop = "none") -> None:
+        """Makes an evaluator without pictures.
+
+        Args:
+            max_depth_m: largest true depth that metrics with the prefix `eigen_` count, metres.
+            crop: part of the picture that these metrics count: `none` (all of it), `garg` or `eigen`.
+        """
         self.max_depth_m = max_depth_m
         self.crop = crop
         self.metrics: dict[str, list[float]] = {}
 
     def update(self, sample: DepthTruth, prediction: FloatImage) -> Mapping[str, float]:
         """Adds a predicted (H, W) depth map in metres; returns the metrics of this picture.
+
+        Args:
+            sample: a sample with its true depth.
+            prediction: (H, W) predicted depth.
 
         Raises:
             ValueError: the prediction has another shape than the ground truth, or is not positive and finite where
@@ -114,7 +124,11 @@ class DepthEvaluator:
         return window
 
     def merge(self, other: Any) -> None:
-        """Adds the pictures that another evaluator of this class has gathered."""
+        """Adds the pictures that another evaluator of this class has gathered.
+
+        Args:
+            other: the other evaluator; it is not changed.
+        """
         for name, values in other.metrics.items():
             self.metrics.setdefault(name, []).extend(values)
 
@@ -132,6 +146,9 @@ class DepthEvaluator:
     def resampled(self, draws: Draws) -> Spread:
         """The metrics of R resampled datasets, (R,) each. Row r of `draws` lists the picture indices of dataset r,
         over which the mean is taken.
+
+        Args:
+            draws: (R, N) picture indices in the order of the calls of `update`.
         """
         values = {name: np.array(self.metrics.get(name, []), np.float64) for name in self._names()}
         return {name: _known_means(one[draws]) for name, one in values.items() if len(one)}
@@ -139,6 +156,9 @@ class DepthEvaluator:
     def range_of(self, metric: str) -> tuple[float, float]:
         """Smallest and largest possible value of a metric: 0 and 1 for `d1` to `d3` (shares of pixels), 0 and
         infinity for errors.
+
+        Args:
+            metric: name of the metric, with or without the prefix `eigen_`.
         """
         return 0.0, 1.0 if metric.removeprefix("eigen_") in ("d1", "d2", "d3") else math.inf
 
@@ -177,6 +197,9 @@ class NearDepth(DepthEvaluator):
     def resampled(self, draws: Draws) -> Spread:
         """The metrics of `result` for R resampled datasets, (R,) each. Row r of `draws` lists the picture indices
         of dataset r, over which the mean is taken.
+
+        Args:
+            draws: (R, N) picture indices in the order of the calls of `update`.
         """
         return _renamed(super().resampled(draws))
 

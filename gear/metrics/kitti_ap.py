@@ -66,6 +66,10 @@ class KittiEvaluator(Generic[SampleT]):
         The metrics are `found_share`, the share of the labels that were detected, and `false_alarms`, the number of
         wrong detections (`gear.metrics.single_picture`). Average precision is not defined for a single picture.
 
+        Args:
+            sample: a sample that `labels_of` can convert.
+            prediction: the detections in its left picture, each with a score.
+
         Raises:
             ValueError: a detection has no score, a type that is none of KITTI's, a box whose right is left of its left
                 or bottom above its top, or a number that is not finite.
@@ -85,7 +89,11 @@ class KittiEvaluator(Generic[SampleT]):
         )
 
     def merge(self, other: Any) -> None:
-        """Adds the pictures that another evaluator of this class has gathered."""
+        """Adds the pictures that another evaluator of this class has gathered.
+
+        Args:
+            other: the other evaluator; it is not changed.
+        """
         self.pictures += other.pictures
 
     def result(self) -> Mapping[str, float]:
@@ -105,6 +113,9 @@ class KittiEvaluator(Generic[SampleT]):
     def resampled(self, draws: Draws) -> Spread:
         """The metrics `<class>_<2d|bev|3d>_moderate_r40` and `ap_3d_moderate` of R resampled datasets, (R,) each.
         Row r of `draws` lists the sample indices of dataset r.
+
+        Args:
+            draws: (R, N) sample indices in the order of the calls of `update`.
         """
         moderate = next(difficulty for difficulty in DIFFICULTIES if difficulty.name == "moderate")
         spread: dict[str, Array] = {}
@@ -121,6 +132,9 @@ class KittiEvaluator(Generic[SampleT]):
     def range_of(self, metric: str) -> tuple[float, float]:
         """Smallest and largest possible value of a metric: 0 and 1, because every metric of this evaluator is a
         share.
+
+        Args:
+            metric: name of the metric.
         """
         return 0.0, 1.0
 
@@ -166,6 +180,10 @@ def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:
 
     Row r of the (R, N) draws lists the picture indices of dataset r. Every picture is matched only once, at all
     thresholds that occur in any draw.
+
+    Args:
+        chosen: labels and detections of each picture, sorted for one class and difficulty by `choose`.
+        draws: (R, N) picture indices.
     """
     label_counts = np.array([int((picture.label_state == 0).sum()) for picture in chosen])
     scores = [(score, number) for number, picture in enumerate(chosen) for score in matched_scores(picture)]
@@ -190,7 +208,11 @@ def resampled_r40(chosen: Sequence[Chosen], draws: Draws) -> Array:
 
 
 def curves(chosen: Sequence[Chosen]) -> tuple[Array, Array]:
-    """The (41,) precision and the (41,) orientation similarity at recalls 0, 1/40, …, 1; NaN if no label counts."""
+    """The (41,) precision and the (41,) orientation similarity at recalls 0, 1/40, …, 1; NaN if no label counts.
+
+    Args:
+        chosen: labels and detections of each picture, sorted for one class and difficulty by `choose`.
+    """
     label_count = sum(int((picture.label_state == 0).sum()) for picture in chosen)
     if not label_count:
         return np.full(STEPS + 1, np.nan), np.full(STEPS + 1, np.nan)
@@ -212,6 +234,9 @@ def curves(chosen: Sequence[Chosen]) -> tuple[Array, Array]:
 def perfect_curve(chosen: Iterable[Chosen]) -> Array:
     """The (41,) precision at recalls 0, 1/40, …, 1 that perfect detections would reach; below 1 at the end for
     fewer than 41 labels.
+
+    Args:
+        chosen: labels and detections of each picture, sorted by `choose`; only the labels are used.
     """
     label_count = sum(int((picture.label_state == 0).sum()) for picture in chosen)
     if not label_count:
@@ -220,8 +245,15 @@ def perfect_curve(chosen: Iterable[Chosen]) -> Array:
 
 
 def recall_thresholds(scores: Sequence[float], label_count: int) -> Array:
-    """The scores, in decreasing order, at which the recall reaches each step of 1/40; at most 41. `label_count` is the
-    number of labels that count.
+    """The score thresholds at which KITTI's evaluation measures precision: the scores at which the recall reaches
+    each step of 1/40.
+
+    Args:
+        scores: scores of the detections that match a label.
+        label_count: number of labels that count.
+
+    Returns:
+        At most 41 scores, in decreasing order.
     """
     thresholds = []
     recall = 0.0

@@ -34,8 +34,13 @@ which papers also report.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difficulty:
-    """The limits of a difficulty of KITTI (easy, moderate, hard): labels below the height or above the occlusion
-    or truncation are ignored.
+    """The limits of one of KITTI's difficulties. Labels beyond a limit are ignored.
+
+    Attributes:
+        name: `easy`, `moderate` or `hard`.
+        min_height_px: smallest height of the 2D box.
+        max_occluded: largest occlusion level, 0 (fully visible) to 3.
+        max_truncated: largest share of the object outside the picture, 0..1.
     """
 
     name: str
@@ -96,7 +101,11 @@ def picture_boxes(
 
 
 def picture_detections(detections: Sequence[KittiLabel]) -> tuple[PictureDetection, ...]:
-    """Reduces KITTI's detections to class, 2D box (edge pixels) and score."""
+    """Reduces KITTI's detections to class, 2D box (edge pixels) and score.
+
+    Args:
+        detections: KITTI's detections, with boxes in index pixels.
+    """
     return tuple(
         PictureDetection(label=one.type, box_px=to_edge_pixels(one.box_px), score=one.score or 0.0)
         for one in detections
@@ -106,6 +115,10 @@ def picture_detections(detections: Sequence[KittiLabel]) -> tuple[PictureDetecti
 def is_in_place(labels: Sequence[KittiLabel], detections: Sequence[KittiLabel]) -> Bools:
     """The (N, M) bool mask of the N labels and M detections whose footprints overlap by at least `LOOSE_OVERLAP`
     of the label's class.
+
+    Args:
+        labels: N labels.
+        detections: M detections.
     """
     ground, _ = iou_ground_and_space(_boxes_m(labels), _boxes_m(detections))
     least = np.array([LOOSE_OVERLAP[label.type] for label in labels])
@@ -209,6 +222,9 @@ def choose(
 def matched_scores(chosen: Chosen) -> list[float]:
     """The scores of the detections that match a label when no score threshold is applied. Each label takes the
     detection with the highest score.
+
+    Args:
+        chosen: labels and detections of one picture, sorted by `choose`.
     """
     taken = np.zeros(len(chosen.scores), dtype=np.bool_)
     scores = []
@@ -225,8 +241,13 @@ def matched_scores(chosen: Chosen) -> list[float]:
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class Counts:
-    """Counts at each of T score thresholds, (T,) each: hits, false alarms, misses, and hits weighted by
-    orientation similarity.
+    """Counts at each of T score thresholds; each array is (T,).
+
+    Attributes:
+        tp: detections that match a label that counts (true positives).
+        fp: false alarms.
+        fn: labels that count and match no detection (misses).
+        similarity: sum over the true positives of their orientation similarity, 0..1 each.
     """
 
     tp: Array
@@ -238,6 +259,10 @@ class Counts:
 def count(chosen: Chosen, thresholds: Array) -> Counts:
     """Matches the labels and detections of one picture at every score threshold, and counts the results. Each
     label takes the detection that overlaps it most.
+
+    Args:
+        chosen: labels and detections of one picture, sorted by `choose`.
+        thresholds: (T,) smallest scores of the detections that take part.
     """
     size = len(thresholds)
     kept = (chosen.scores[None] >= thresholds[:, None]) & (chosen.detection_state >= 0)[None]

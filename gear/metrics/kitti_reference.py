@@ -32,6 +32,10 @@ class NearCars(KittiEvaluator[SampleT]):
         `found_share` is the share of the labels that were detected, `false_alarms` the number of wrong detections; for
         moderate difficulty, and detections with a score of at least 0.5.
 
+        Args:
+            sample: a sample that `labels_of` can convert.
+            prediction: the detections in its left picture, each with a score.
+
         Raises:
             ValueError: a detection has no score, a type that is none of KITTI's, a box whose right is left of its left
                 or bottom above its top, or a number that is not finite.
@@ -54,6 +58,9 @@ class NearCars(KittiEvaluator[SampleT]):
     def resampled(self, draws: Draws) -> Spread:
         """The metrics of `result` for R resampled datasets, (R,) each. Row r of `draws` lists the sample indices
         of dataset r.
+
+        Args:
+            draws: (R, N) sample indices in the order of the calls of `update`.
         """
         return {_name(one): resampled_r40(self._chosen(one), draws) for one in _moderate_first()}
 

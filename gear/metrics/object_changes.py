@@ -54,16 +54,27 @@ class ObjectChange:
 
 
 def found_in_twin(patched: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectOutcome, ...]:
-    """The outcomes, in the picture `patched`, of the objects that are found in `twin`, the same picture with another
-    patch.
+    """The outcomes, in the picture `patched`, of the objects that are found in `twin`, the same picture with
+    another patch.
+
+    Args:
+        patched: outcomes in the picture.
+        twin: outcomes in its twin.
+
+    Returns:
+        In the order of the ground truth.
     """
     found = {(thing.object_id, thing.label) for thing in twin.objects if thing.state == "found"}
     return tuple(thing for thing in patched.objects if (thing.object_id, thing.label) in found)
 
 
 def changes(patched: PictureOutcomes, twin: PictureOutcomes) -> tuple[ObjectChange, ...]:
-    """Lists the changes from `twin` (the same picture with another patch) to `patched`: objects in the order of the
-    ground truth, then invented detections by decreasing score.
+    """Lists the changes from `twin` (the same picture with another patch) to `patched`: objects in the order of
+    the ground truth, then invented detections by decreasing score.
+
+    Args:
+        patched: outcomes in the picture.
+        twin: outcomes in its twin.
     """
     lost = [
         ObjectChange(

@@ -48,6 +48,9 @@ def outcomes(picture: PictureObjects, patch: PatchArea) -> PictureOutcomes:
     Args:
         picture: objects and detections of one view.
         patch: visible patches of the same view.
+
+    Returns:
+        One outcome per object, and one per detection with a score of at least 0.5.
     """
     order = np.argsort([-one.score for one in picture.detections], kind="stable")
     sure = [int(index) for index in order if picture.detections[index].score >= SURE]

@@ -41,6 +41,9 @@ class PatchArea:
             box_px: box in edge pixels, which may extend beyond the picture. Its pixels are the pixels of the picture
                 with their centre inside the box, or the nearest pixel if there are none.
             position_m: middle of the object in the camera's frame, if it is known.
+
+        Returns:
+            The distance; both of its numbers are None if no patch is visible.
         """
         if self._distance_px is None:
             return PatchDistance(is_on_patch=False, pixels=None)

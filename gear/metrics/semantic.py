@@ -68,6 +68,10 @@ class SemanticEvaluator:
     def update(self, sample: SegmentedSample, prediction: npt.NDArray[np.uint8]) -> Mapping[str, float]:
         """Adds the predicted (H, W) uint8 label ids of one sample; returns `miou` of this picture.
 
+        Args:
+            sample: a sample with its label ids and instance ids.
+            prediction: (H, W) uint8 Cityscapes label ids.
+
         Raises:
             ValueError: the prediction has another shape than the ground truth, or holds a value that is no label id:
                 not an integer, below 0 or above 33.
@@ -107,7 +111,11 @@ class SemanticEvaluator:
             self.weighted_category_fn[label.id] += (size - near) * weight
 
     def merge(self, other: Any) -> None:
-        """Adds the counts that another evaluator of this class has gathered."""
+        """Adds the counts that another evaluator of this class has gathered.
+
+        Args:
+            other: the other evaluator; it is not changed.
+        """
         self.confusion += other.confusion
         self.weighted_tp += other.weighted_tp
         self.weighted_fn += other.weighted_fn
@@ -123,6 +131,9 @@ class SemanticEvaluator:
     def range_of(self, metric: str) -> tuple[float, float]:
         """Smallest and largest possible value of a metric: 0 and 1, because every metric of this evaluator is a
         share.
+
+        Args:
+            metric: name of the metric.
         """
         return 0.0, 1.0
 
@@ -141,6 +152,12 @@ class SemanticEvaluator:
     def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
         """Computes the metrics of `result` from counts by name. Further leading axes of the counts, such as
         resampled datasets, are kept.
+
+        Args:
+            totals: counts by name, as `totals` gives them.
+
+        Returns:
+            By name of the metric: a scalar, or one value per resampled dataset; NaN where the metric is undefined.
         """
         confusion = totals["confusion"]
         classes = self._classes(confusion)
@@ -168,6 +185,9 @@ class PresentClasses(SemanticEvaluator):
     def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
         """Computes `miou` and `iou_<class>`, 0..1, from counts by name; NaN for classes that do not occur in the
         ground truth.
+
+        Args:
+            totals: counts by name, as `totals` gives them.
         """
         classes = self._classes(totals["confusion"])
         return {"miou": _mean(classes)} | {f"iou_{name.replace(' ', '_')}": iou for name, iou in classes.items()}

@@ -33,7 +33,11 @@ class Boxes:
 
 
 def boxes(rows: Sequence[tuple[Sequence[float], int, float]]) -> Boxes:
-    """Makes a `Boxes` object from tuples of box (left, top, right, bottom), class number and weight."""
+    """Makes a `Boxes` object from tuples of box (left, top, right, bottom), class number and weight.
+
+    Args:
+        rows: one tuple per box; class numbers only need to be equal for equal classes.
+    """
     return Boxes(
         box_px=np.array([box for box, _, _ in rows], dtype=np.float64).reshape(-1, 4),
         kind=np.array([kind for _, kind, _ in rows], dtype=np.int64),

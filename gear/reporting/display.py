@@ -65,11 +65,19 @@ class Display:
         )
 
     def write(self, line: str) -> None:
-        """Prints a line without damaging a progress bar."""
+        """Prints a line without damaging a progress bar.
+
+        Args:
+            line: the line, without a newline.
+        """
         self._backend.write(line)
 
     def detail(self, text: str) -> None:
-        """Shows a short text beside the progress, such as the current loss."""
+        """Shows a short text beside the progress, such as the current loss.
+
+        Args:
+            text: the text, which replaces the previous one.
+        """
         self._backend.detail(text)
 
     def begin(self, title: str, unit: str = "sample") -> None:

@@ -39,7 +39,11 @@ def html_table(titles: Sequence[str], rows: Iterable[tuple[bool, Sequence[Cell]]
 
 
 def safe(text: str) -> str:
-    """Returns a text escaped for HTML, also inside attributes."""
+    """Returns a text escaped for HTML, also inside attributes.
+
+    Args:
+        text: any text.
+    """
     return html.escape(text, quote=True)
 
 

@@ -18,6 +18,10 @@ BAR_PX = (10, 360)
 def draw_legend(legend: Legend, width_px: int) -> UInt8Image:
     """Draws a legend as a dark strip, in the style of the captions of a contact sheet.
 
+    Args:
+        legend: names and colours, or a colour bar.
+        width_px: width of the strip.
+
     Returns:
         (H, width_px, 3) uint8 RGB; H grows with the number of lines that the names need.
     """

@@ -41,6 +41,9 @@ class Pace:
     def rate(self, now_s: float) -> float:
         """Returns the items per second of this run; 0 before the first item. The slow first items are excluded as
         soon as later ones exist.
+
+        Args:
+            now_s: time in seconds, of the same clock as in `report`.
         """
         is_warm = self.warm_s is not None and self.done > self.warm_done
         begun, begun_s = (self.warm_done, self.warm_s or 0.0) if is_warm else (self.first_done, self.first_s)
@@ -48,6 +51,10 @@ class Pace:
         return (self.done - begun) / elapsed_s if elapsed_s > 0 else 0.0
 
     def left_s(self, now_s: float) -> float | None:
-        """Returns the estimated seconds until all items are done; None if the rate or the total is unknown."""
+        """Returns the estimated seconds until all items are done; None if the rate or the total is unknown.
+
+        Args:
+            now_s: time in seconds, of the same clock as in `report`.
+        """
         rate = self.rate(now_s)
         return (self.total - self.done) / rate if rate and self.total else None

@@ -15,7 +15,16 @@ CAPTION_PX = 22
 
 
 def captioned(picture: UInt8Image, caption: str, width_px: int) -> UInt8Image:
-    """Resizes a (H, W, 3) uint8 RGB picture to a width and puts a caption above it; a long caption is cut."""
+    """Resizes a picture to a width and puts a caption above it; a long caption is cut.
+
+    Args:
+        picture: (H, W, 3) uint8 RGB.
+        caption: one line of text.
+        width_px: width of the result.
+
+    Returns:
+        (h, width_px, 3) uint8 RGB; the ratio of the picture's sides is kept.
+    """
     height_px = max(1, round(picture.shape[0] * width_px / picture.shape[1]))
     way = cv2.INTER_AREA if picture.shape[1] >= width_px else cv2.INTER_LINEAR
     small = np.asarray(cv2.resize(picture, (width_px, height_px), interpolation=way), dtype=np.uint8)
@@ -25,13 +34,21 @@ def captioned(picture: UInt8Image, caption: str, width_px: int) -> UInt8Image:
 
 
 def side_by_side(cells: Sequence[UInt8Image]) -> UInt8Image:
-    """Joins pictures from left to right; lower ones are filled up at the bottom."""
+    """Joins pictures from left to right; lower ones are filled up at the bottom.
+
+    Args:
+        cells: (H, W, 3) uint8 RGB pictures, at least one.
+    """
     height = max(cell.shape[0] for cell in cells)
     return np.concatenate([_grown(cell, height, cell.shape[1]) for cell in cells], axis=1)
 
 
 def stacked(rows: Sequence[UInt8Image]) -> UInt8Image:
-    """Joins pictures from top to bottom; narrower ones are filled up on the right."""
+    """Joins pictures from top to bottom; narrower ones are filled up on the right.
+
+    Args:
+        rows: (H, W, 3) uint8 RGB pictures, at least one.
+    """
     width = max(row.shape[1] for row in rows)
     return np.concatenate([_grown(row, row.shape[0], width) for row in rows])
 

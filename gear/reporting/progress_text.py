@@ -22,7 +22,11 @@ def progress_line(pace: Pace, now_s: float) -> str:
 
 
 def rate_text(per_second: float) -> str:
-    """Returns a rate as text, such as `3.1 per second`; slow rates are given per minute or per hour."""
+    """Returns a rate as text, such as `3.1 per second`; slow rates are given per minute or per hour.
+
+    Args:
+        per_second: the rate.
+    """
     for name, seconds in (("second", 1), ("minute", 60), ("hour", 3600)):
         if per_second * seconds >= 1 or name == "hour":
             return f"{per_second * seconds:.3g} per {name}"
@@ -30,7 +34,11 @@ def rate_text(per_second: float) -> str:
 
 
 def duration_text(seconds: float) -> str:
-    """Returns a duration as text, such as `40 seconds`, `12 minutes`, `3.5 hours` or `2.1 days`."""
+    """Returns a duration as text, such as `40 seconds`, `12 minutes`, `3.5 hours` or `2.1 days`.
+
+    Args:
+        seconds: the duration.
+    """
     if seconds < 99.5:
         return f"{max(seconds, 1):.0f} {plural('second', round(max(seconds, 1)))}"
     if seconds < 99.5 * 60:
@@ -41,7 +49,13 @@ def duration_text(seconds: float) -> str:
 
 
 def plural(unit: str, count: int) -> str:
-    """Returns the unit in the singular if `count` is 1, otherwise in the plural; the number itself is not included."""
+    """Returns the unit in the singular if `count` is 1, otherwise in the plural; the number itself is not
+    included.
+
+    Args:
+        unit: the unit in the singular.
+        count: the number.
+    """
     if count == 1:
         return unit
     return unit[:-1] + "ies" if unit.endswith("y") else unit + "s"

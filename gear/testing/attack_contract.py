@@ -33,19 +33,38 @@ ROOM = Thing(parts=(box_part("building", 2.0, 60.0, 14.0),), position_m=(40.0, 0
 
 
 class Counted:
-    """A wrapper of a model that counts the forward passes."""
+    """A wrapper of a model that counts the forward passes.
+
+    Attributes:
+        network: the wrapped model.
+        passes: number of calls of `predict` and `forward`.
+    """
 
     def __init__(self, model: Any) -> None:
+        """Wraps a model.
+
+        Args:
+            model: a torch module with the protocol `Model`.
+        """
         self.network = model
         self.passes = 0
 
     def predict(self, views: Mapping[str, Any]) -> Any:
-        """The model's prediction for one sample; the call counts as one pass."""
+        """The model's prediction for one sample; the call counts as one pass.
+
+        Args:
+            views: pictures of the sample by camera name.
+        """
         self.passes += 1
         return self.network.predict(views)
 
     def forward(self, views: Mapping[str, Tensor], targets: Any | None = None) -> Mapping[str, Tensor]:
-        """The model's outputs, or losses if `targets` are given, for a batch; the call counts as one pass."""
+        """The model's outputs, or losses if `targets` are given, for a batch; the call counts as one pass.
+
+        Args:
+            views: (B, 3, H, W) pictures in 0..1 by camera name.
+            targets: the batch's samples; None for outputs.
+        """
         self.passes += 1
         outputs: Mapping[str, Tensor] = self.network(views, targets)
         return outputs
@@ -57,9 +76,20 @@ class Counted:
 
 
 class RecordingMonitor:
-    """A `Monitor` that records the number and the state of every step, and can start an attack from a saved state."""
+    """A `Monitor` that records the number and the state of every step, and can start an attack from a saved state.
+
+    Attributes:
+        start: state that `resume` returns.
+        steps_done: number of steps done, at each call of `step`.
+        states: state of the attack at each call of `step`.
+    """
 
     def __init__(self, start: State | None = None) -> None:
+        """Makes a monitor without recorded steps.
+
+        Args:
+            start: state from which the attack starts; None for a new run.
+        """
         self.start = start
         self.steps_done: list[int] = []
         self.states: list[State] = []
@@ -78,6 +108,12 @@ class RecordingMonitor:
         """Records the number of the step and the state, and checks the types of values and patches.
 
         It returns False, so it never ends the attack.
+
+        Args:
+            done: number of steps done.
+            values: numbers by name, such as losses.
+            patches: function that returns the current patches.
+            state: function that returns the state of the attack.
         """
         self.steps_done.append(done)
         self.states.append(state())
@@ -114,7 +150,11 @@ class AttackContract:
         return Counted(TINY[self.task].build(TinyConfig()))
 
     def dataset(self, boards: int = 1) -> list[Any]:
-        """Makes two read-only samples of a synthetic street with the given number of billboards."""
+        """Makes two read-only samples of a synthetic street with the given number of billboards.
+
+        Args:
+            boards: number of billboards, each with one surface.
+        """
         found = catalogue().get("task", self.task).spec
         assert isinstance(found, TaskSpec)
         task = found.build(found.config(**self.task_options))
@@ -125,7 +165,11 @@ class AttackContract:
         return [freeze(task.ground_truth(*frame)) for frame in frames]
 
     def budget(self, steps: int) -> Budget:
-        """A budget of some steps; for attacks without gradients also of `passes_per_step` queries per step."""
+        """A budget of some steps; for attacks without gradients also of `passes_per_step` queries per step.
+
+        Args:
+            steps: number of steps.
+        """
         return Budget(steps=steps, queries=None if self.spec.needs_gradients else steps * self.passes_per_step)
 
     def attack(

@@ -59,7 +59,11 @@ def share_apart(a: Any, b: Any, tolerance: float) -> float:
 
 
 def freeze(value: Any) -> Any:
-    """Makes all arrays inside a value read-only, in place, and returns the value."""
+    """Makes all arrays inside a value read-only, in place, and returns the value.
+
+    Args:
+        value: dataclass, mapping, sequence, array or plain value.
+    """
     if isinstance(value, np.ndarray):
         value.setflags(write=False)
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):

@@ -78,7 +78,11 @@ def straight_road(
 
 
 def obstacles_of(things: Sequence[Thing]) -> tuple[Obstacle, ...]:
-    """The standing obstacles of a controller with truth, from objects of a synthetic street."""
+    """The standing obstacles of a controller with truth, from objects of a synthetic street.
+
+    Args:
+        things: objects of the street. Those without an id, and countable objects of the town, are left out.
+    """
     return tuple(
         Obstacle(
             id=thing.object_id,
@@ -113,7 +117,11 @@ class ControllerContract:
         return self.spec.build(self.spec.config(**self.options))
 
     def observations(self, task: str | None) -> list[Observation]:
-        """The frames of a short drive, all arrays read-only; `task` is None for a controller without a network."""
+        """The frames of a short drive, all arrays read-only; `task` is None for a controller without a network.
+
+        Args:
+            task: name of the task whose perfect predictions the observations contain.
+        """
         rig, builder = CAMERA, None
         if task is not None:
             found = catalogue().get("task", task).spec

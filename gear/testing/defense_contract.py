@@ -48,7 +48,15 @@ def street_picture(width_px: int, height_px: int, seed: int) -> UInt8Image:
 
 
 def noisy_patch(picture: UInt8Image, seed: int) -> tuple[UInt8Image, np.ndarray]:
-    """The picture with a rectangle of strong noise, and the (H, W) bool mask of that rectangle."""
+    """Covers a fixed rectangle of a picture with strong noise.
+
+    Args:
+        picture: (H, W, 3) uint8; it is not changed.
+        seed: seed of the noise.
+
+    Returns:
+        The new picture, and the (H, W) bool mask of the rectangle.
+    """
     height, width = picture.shape[:2]
     area = np.zeros((height, width), np.bool_)
     area[height // 4 : height // 2, width // 3 : width * 3 // 4] = True
@@ -90,7 +98,11 @@ class DefenseContract:
         return {name: noisy_patch(p, seed)[0] for name, p in plain.items()} if is_patched else plain
 
     def state(self, defense: Defense) -> Any:
-        """The state that `fit` returns for four clean and four patched samples."""
+        """The state that `fit` returns for four clean and four patched samples.
+
+        Args:
+            defense: the defense.
+        """
         clean = [self.pictures(i, is_patched=False) for i in range(4)]
         patched = [self.pictures(i) for i in range(4)]
         return defense.fit(clean, patched, self.model(), derive_rng(SEED, "fit"))

@@ -48,6 +48,10 @@ class MetricContract:
         """A clearly worse prediction of the same type, made from a good prediction.
 
         Label maps are shifted by 20 pixels, depth is doubled, and lists of detections or stereo boxes become empty.
+
+        Args:
+            task: name of the task.
+            prediction: a prediction in the task's form; it is not changed.
         """
         if task == "semseg":
             return np.roll(prediction, 20, axis=1)
@@ -62,7 +66,11 @@ class MetricContract:
         return self.spec.build(self.spec.config(**self.options))
 
     def task(self, name: str) -> Task[Any, Any]:
-        """Builds a task by its name, with `task_options`."""
+        """Builds a task by its name, with `task_options`.
+
+        Args:
+            name: name of the task.
+        """
         found = catalogue().get("task", name).spec
         assert isinstance(found, TaskSpec)
         return found.build(found.config(**self.task_options))
@@ -172,7 +180,11 @@ class MetricContract:
             check_metrics(self.gathered([(builder.without(sample, masks), prediction)]).result(), "result")
 
     def gathered(self, pairs: Sequence[tuple[Any, Any]]) -> Any:
-        """A new evaluator to which these pairs of sample and prediction were added."""
+        """A new evaluator to which these pairs of sample and prediction were added.
+
+        Args:
+            pairs: sample and prediction of each picture.
+        """
         evaluator = self.make()
         for sample, prediction in pairs:
             evaluator.update(sample, prediction)

@@ -49,20 +49,31 @@ class ModelContract:
         return self.spec.build(self.spec.config(**self.options))
 
     def samples(self, task: str) -> list[Any]:
-        """Two samples of a synthetic street with the task's ground truth."""
+        """Two samples of a synthetic street with the task's ground truth.
+
+        Args:
+            task: name of the task.
+        """
         found = catalogue().get("task", task).spec
         assert isinstance(found, TaskSpec)
         builder = found.build(found.config(**self.task_options))
         return [builder.ground_truth(*synthetic_frame(builder.rig(), index=i, seed=5)) for i in range(2)]
 
     def views(self, sample: Any) -> dict[str, UInt8Image]:
-        """The (H, W, 3) uint8 pictures of a sample that the model takes, by camera name."""
+        """The (H, W, 3) uint8 pictures of a sample that the model takes, by camera name.
+
+        Args:
+            sample: a sample of one of the model's tasks.
+        """
         return {name: sample.images[name] for name in self.spec.views}
 
     def batch(self, samples: Sequence[Any]) -> dict[str, Tensor]:
         """The pictures of several samples as (B, 3, H, W) tensors by camera name.
 
         They require gradients if the model declares gradients.
+
+        Args:
+            samples: B samples of one task.
         """
         tensors = as_batch([self.views(sample) for sample in samples])
         return {name: tensor.requires_grad_(self.spec.has_gradients) for name, tensor in tensors.items()}
@@ -73,7 +84,9 @@ class ModelContract:
         assert self.spec.tasks and self.spec.views
 
     def test_the_tasks_show_what_it_looks_at(self) -> None:
-        """The model's tasks are installed, and their samples have pictures of the model's cameras."""
+        """The model's tasks are installed, and their samples have pictures of the cameras that the model's spec
+        names.
+        """
         for task in self.spec.tasks:
             assert set(self.spec.views) <= set(self.samples(task)[0].images)
 

@@ -11,7 +11,11 @@ from gear.plugins.attacks.optimisation.frozen_model import networks_of
 
 
 def state_of(model: Any) -> dict[str, str]:
-    """A snapshot of a model: hashes of parameters, gradients and buffers, `requires_grad`, and modes, by name."""
+    """A snapshot of a model: hashes of parameters, gradients and buffers, `requires_grad`, and modes, by name.
+
+    Args:
+        model: a torch module, or a model whose attributes and taps are torch modules.
+    """
     state: dict[str, str] = {}
     for root, network in networks_of(model):
         for name, module in network.named_modules():

@@ -17,6 +17,11 @@ def check_spec(kind: Kind, spec: AnySpec, options: Mapping[str, Any]) -> None:
 
     The config is tested with default options and with the options in the arguments.
 
+    Args:
+        kind: kind of plugin, such as `attack`.
+        spec: the spec.
+        options: options of the config, by name.
+
     Raises:
         AssertionError: the spec or its config fails a check.
     """

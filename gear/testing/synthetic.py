@@ -72,6 +72,10 @@ def synthetic_frame(
 def behind_lens(frame: Frame, lens: Lens) -> Frame:
     """Distorts a frame of pinhole cameras by a lens; the lens is added to the cameras of the result.
 
+    Args:
+        frame: the frame; it is not changed.
+        lens: radial distortion of the lens.
+
     Raises:
         ValueError: the distortion folds a picture over.
     """

@@ -59,7 +59,11 @@ class TaskContract:
     repeats: ClassVar[int] = 2
 
     def spoil(self, prediction: Any) -> Any:
-        """A prediction that is clearly worse, made from a good prediction; subclasses define it."""
+        """A prediction that is clearly worse, made from a good prediction; subclasses define it.
+
+        Args:
+            prediction: a prediction in the task's form; it must not be changed.
+        """
         raise NotImplementedError("say how to spoil a prediction of this task")
 
     def task(self) -> Task[Any, Any]:
@@ -67,15 +71,28 @@ class TaskContract:
         return self.spec.build(self.spec.config(**self.options))
 
     def frame(self, index: int = 0) -> tuple[Frame, SceneRecord]:
-        """A synthetic street, rendered for the task's camera rig, with its record."""
+        """A synthetic street, rendered for the task's camera rig, with its record.
+
+        Args:
+            index: index of the sample; it changes the positions of objects.
+        """
         return synthetic_frame(self.task().rig(), index=index, seed=5, world_from_ego=WORLD_FROM_EGO)
 
     def sample(self, index: int = 0) -> Any:
-        """The task's sample, with ground truth, of a synthetic frame."""
+        """The task's sample, with ground truth, of a synthetic frame.
+
+        Args:
+            index: index of the sample; it changes the positions of objects.
+        """
         return self.task().ground_truth(*self.frame(index))
 
     def sidecar(self, sample: Sample, encoded: Encoded) -> Sidecar:
-        """The metadata of a sample (sidecar) after a round trip through JSON."""
+        """The metadata of a sample (sidecar) after a round trip through JSON.
+
+        Args:
+            sample: the sample.
+            encoded: the result of the task's `encode` for it.
+        """
         text = json.dumps([to_json(sample.record), to_json(sample.surfaces), encoded.facts], allow_nan=False)
         record, surfaces, facts = json.loads(text)
         truths = tuple(from_json(type(old), new) for old, new in zip(sample.surfaces, surfaces, strict=True))

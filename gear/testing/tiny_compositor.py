@@ -22,6 +22,11 @@ class TinyCompositor:
     """A compositor for tests; implements `gear.contracts.attacks.Compositor` for the samples of a task."""
 
     def __init__(self, dataset: Sequence[Sample]) -> None:
+        """Stores the samples.
+
+        Args:
+            dataset: samples with equal surfaces, at least one; `compose` counts their indices from 0.
+        """
         self._dataset = dataset
         self.calls = 0
         """Number of calls of `compose`."""

@@ -41,7 +41,12 @@ class TinyConfig:
 
 
 def as_batch(views: Sequence[Mapping[str, UInt8Image]]) -> dict[str, Tensor]:
-    """The pictures of several samples as the input of `Model.forward`: (B, 3, H, W) float32 in 0..1 by camera name."""
+    """The pictures of several samples as the input of `Model.forward`: (B, 3, H, W) float32 in 0..1 by camera
+    name.
+
+    Args:
+        views: (H, W, 3) uint8 pictures of each sample by camera name, of equal size.
+    """
     stacked = {name: np.stack([sample[name] for sample in views]).transpose(0, 3, 1, 2) for name in views[0]}
     return {name: torch.from_numpy(np.ascontiguousarray(one)).float() / 255 for name, one in stacked.items()}
 
@@ -53,6 +58,12 @@ class TinyNetwork(nn.Module, ABC):
     """
 
     def __init__(self, config: TinyConfig, channels: int) -> None:
+        """Draws random weights and sets the network to evaluation mode.
+
+        Args:
+            config: the options.
+            channels: number of channels of the head's map.
+        """
         super().__init__()
         self.stem = nn.Conv2d(3, config.width, 3, padding=1)
         self.trunk = nn.Conv2d(config.width, config.width, 3, stride=2, padding=1)
@@ -68,7 +79,12 @@ class TinyNetwork(nn.Module, ABC):
         self.eval()
 
     def forward(self, views: Mapping[str, Tensor], targets: Sequence[Any] | None = None) -> Mapping[str, Tensor]:
-        """The outputs of a batch by name, or its `loss` if `targets` (the batch's samples) are given."""
+        """The outputs of a batch by name, or its `loss` if `targets` (the batch's samples) are given.
+
+        Args:
+            views: (B, 3, H, W) pictures in 0..1 by camera name.
+            targets: the batch's samples; None for outputs.
+        """
         pictures = views[VIEW]
         hidden = functional.relu(self.stem((pictures - 0.5) * 4))
         hidden = functional.relu(self.norm(self.trunk(hidden)))
@@ -85,13 +101,21 @@ class TinyNetwork(nn.Module, ABC):
         return {"stem": self.stem, "trunk": self.trunk}
 
     def predict(self, views: Mapping[str, UInt8Image]) -> Any:
-        """The prediction for the pictures of one sample, in the form of the network's task."""
+        """The prediction for the pictures of one sample, in the form of the network's task.
+
+        Args:
+            views: (H, W, 3) uint8 pictures by camera name.
+        """
         with torch.no_grad():
             return self.answer(self(as_batch([{VIEW: views[VIEW]}])))
 
     @abstractmethod
     def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
-        """Converts the head's (B, C, H, W) map to the network's outputs by name."""
+        """Converts the head's (B, C, H, W) map to the network's outputs by name.
+
+        Args:
+            raw: (B, C, H, W) output of the head.
+        """
 
     @abstractmethod
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
@@ -104,17 +128,30 @@ class TinyNetwork(nn.Module, ABC):
 
     @abstractmethod
     def answer(self, outputs: Mapping[str, Tensor]) -> Any:
-        """Converts the outputs of a batch of one sample to the task's prediction."""
+        """Converts the outputs of a batch of one sample to the task's prediction.
+
+        Args:
+            outputs: the outputs by name, with B = 1.
+        """
 
 
 class TinySegmenter(TinyNetwork):
     """A tiny semantic segmentation network with the output `logits`, (B, 34, H, W) over Cityscapes label ids."""
 
     def __init__(self, config: TinyConfig) -> None:
+        """Makes the network with 34 channels.
+
+        Args:
+            config: the options.
+        """
         super().__init__(config, LABEL_COUNT)
 
     def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
-        """The output `logits`: the head's (B, 34, H, W) map."""
+        """The output `logits`: the head's (B, 34, H, W) map.
+
+        Args:
+            raw: (B, 34, H, W) output of the head.
+        """
         return {"logits": raw}
 
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
@@ -128,7 +165,11 @@ class TinySegmenter(TinyNetwork):
         return functional.cross_entropy(raw, labels)
 
     def answer(self, outputs: Mapping[str, Tensor]) -> npt.NDArray[np.uint8]:
-        """The prediction for one sample: (H, W) uint8 label ids."""
+        """The prediction for one sample: (H, W) uint8 label ids.
+
+        Args:
+            outputs: the outputs by name, with B = 1.
+        """
         labels: npt.NDArray[np.uint8] = outputs["logits"][0].argmax(0).to(torch.uint8).numpy()
         return labels
 
@@ -139,10 +180,19 @@ class TinyDepth(TinyNetwork):
     LEAST_M: ClassVar[float] = 0.1
 
     def __init__(self, config: TinyConfig) -> None:
+        """Makes the network with one channel.
+
+        Args:
+            config: the options.
+        """
         super().__init__(config, 1)
 
     def outputs(self, raw: Tensor) -> Mapping[str, Tensor]:
-        """The output `depth_m`: (B, H, W) in metres, above 0.1 m."""
+        """The output `depth_m`: (B, H, W) in metres, above 0.1 m.
+
+        Args:
+            raw: (B, 1, H, W) output of the head.
+        """
         return {"depth_m": 10 * functional.softplus(raw[:, 0]) + self.LEAST_M}
 
     def loss(self, raw: Tensor, targets: Sequence[Any]) -> Tensor:
@@ -159,7 +209,11 @@ class TinyDepth(TinyNetwork):
         return (error * is_known).sum() / is_known.sum().clamp_min(1)
 
     def answer(self, outputs: Mapping[str, Tensor]) -> FloatImage:
-        """The prediction for one sample: (H, W) float32 depth in metres."""
+        """The prediction for one sample: (H, W) float32 depth in metres.
+
+        Args:
+            outputs: the outputs by name, with B = 1.
+        """
         depth_m: FloatImage = outputs["depth_m"][0].numpy()
         return depth_m
 

@@ -37,11 +37,20 @@ def tiny_scenes() -> SceneLibrary:
 
 
 def build_tiny_world(scene: str = "board", weather: Weather = CLEAR) -> World:
-    """Compiles a new world of the tiny town, with one of its scenes."""
+    """Compiles a new world of the tiny town, with one of its scenes.
+
+    Args:
+        scene: `board`, `double` (two boards), `truck` or `no_billboard`.
+        weather: the weather.
+    """
     return World.build(town=TINY_TOWN, scene_name=scene, scene=tiny_scenes().scenes[scene], weather=weather)
 
 
 @cache
 def tiny_world(scene: str = "board") -> World:
-    """A world of the tiny town that tests share: compiled once per process, changed by every call of its `place`."""
+    """A world of the tiny town that tests share: compiled once per process, changed by every call of its `place`.
+
+    Args:
+        scene: `board`, `double` (two boards), `truck` or `no_billboard`.
+    """
     return build_tiny_world(scene)

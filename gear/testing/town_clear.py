@@ -38,7 +38,11 @@ DETOUR_M, STEP_UP_M = 1.0, 0.1
 
 
 def blocked_lanes(town: TownUnderTest) -> list[str]:
-    """One line for each lane with an obstacle within the width and height of the vehicles that use the lane."""
+    """One line for each lane with an obstacle within the width and height of the vehicles that use the lane.
+
+    Args:
+        town: the town under test.
+    """
     problems = []
     for lane in town.graph.lanes.values():
         side_m = max(0.0, min(CAR_SIDE_M, lane.width_m / 2 - LANE_EDGE_M))
@@ -52,7 +56,11 @@ def blocked_lanes(town: TownUnderTest) -> list[str]:
 
 
 def blocked_walks(town: TownUnderTest) -> list[str]:
-    """One line for each walk with an obstacle that a person can neither pass nor go around."""
+    """One line for each walk with an obstacle that a person can neither pass nor go around.
+
+    Args:
+        town: the town under test.
+    """
     problems = []
     for walk in town.graph.walks.values():
         for start_m, end_m in pairwise(walk.line.points_m):

@@ -32,7 +32,13 @@ RAY_START_M = 0.6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rays:
-    """Casts rays at the geoms of some geom groups of a MuJoCo model."""
+    """Casts rays at the geoms of some geom groups of a MuJoCo model.
+
+    Attributes:
+        model: the compiled model.
+        data: MuJoCo data of the model with kinematics up to date.
+        groups: the geom groups, 0 to 5, that rays can hit.
+    """
 
     model: mujoco.MjModel
     data: mujoco.MjData
@@ -51,13 +57,23 @@ class Rays:
         return (float(distance), int(hit[0])) if distance >= 0 else (np.inf, -1)
 
     def height_m(self, point_m: npt.ArrayLike, above_m: float) -> float:
-        """Height of the first geom below a point, with a ray that starts `above_m` above the point; NaN for no hit."""
+        """Height of the first geom below a point, with a ray that starts `above_m` above the point; NaN for no
+        hit.
+
+        Args:
+            point_m: (3,) point in the world.
+            above_m: height above the point at which the ray starts, metres.
+        """
         start_m = np.asarray(point_m, dtype=np.float64) - above_m * DOWN
         distance_m, geom = self.first_hit(start_m, DOWN)
         return float(start_m[2] - distance_m) if geom >= 0 else float("nan")
 
     def name(self, geom: int) -> str:
-        """The name of a geom in messages; for unnamed geoms its number and its body."""
+        """The name of a geom in messages; for unnamed geoms its number and its body.
+
+        Args:
+            geom: id of the geom.
+        """
         return (
             self.model.geom(geom).name or f"number {geom} of body {self.model.body(self.model.geom_bodyid[geom]).name}"
         )
@@ -65,7 +81,12 @@ class Rays:
 
 @dataclass(frozen=True, eq=False)
 class TownUnderTest:
-    """A town and its scenes with everything that the town contract checks; slow parts are computed at first use."""
+    """A town and its scenes with everything that the town contract checks; slow parts are computed at first use.
+
+    Attributes:
+        library: the town's MJCF file and the folders of its assets.
+        scenes: the town's scene library.
+    """
 
     library: AssetLibrary
     scenes: SceneLibrary
@@ -126,6 +147,9 @@ class TownUnderTest:
 
     def world(self, scene: str) -> World:
         """Composes and compiles the world of a scene.
+
+        Args:
+            scene: name of the scene.
 
         Raises:
             UnknownNameError: there is no scene with this name.

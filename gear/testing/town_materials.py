@@ -24,7 +24,11 @@ LARGEST_PX = 8192
 
 
 def transparent(model: mujoco.MjModel) -> list[str]:
-    """One line for each visible geom with an alpha below 1."""
+    """One line for each visible geom with an alpha below 1.
+
+    Args:
+        model: the compiled model.
+    """
     alpha = effective_rgba(model)[:, 3]
     return [
         f"geom {model.geom(geom).name!r} has an alpha of {alpha[geom]:g}"

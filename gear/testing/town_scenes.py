@@ -48,7 +48,11 @@ BOARD_LOOK_M = 1.2
 
 
 def misplaced(town: TownUnderTest) -> list[str]:
-    """One line for a scene library of another town, and for each board that is out of bounds or off the ground."""
+    """One line for a scene library of another town, and for each board that is out of bounds or off the ground.
+
+    Args:
+        town: the town under test.
+    """
     problems = []
     if town.scenes.town != town.library.town_name:
         problems.append(f"the scene library is for {town.scenes.town!r}, the town is {town.library.town_name!r}")
@@ -97,6 +101,10 @@ def cracks(town: TownUnderTest, samples: int) -> list[str]:
 
     Cracks are pixels of sky below the horizon that ground surrounds, and the single pixels of `pinholes`. Pinholes are
     reported only if there are more than `PINHOLES_A_MILLION` in a million pixels.
+
+    Args:
+        town: the town under test.
+        samples: number of samples that are rendered.
     """
     world, _ = town.first_world
     planner = _planner(world, samples)

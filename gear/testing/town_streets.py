@@ -53,7 +53,12 @@ def dead_ends(graph: LaneGraph, open_ends: frozenset[str], join_m: float) -> lis
 
 
 def kinks(graph: LaneGraph, most_deg: float) -> list[str]:
-    """One line for each point at which the heading jumps by more than `most_deg`, inside or at the end of a lane."""
+    """One line for each point at which the heading jumps by more than `most_deg`, inside or at the end of a lane.
+
+    Args:
+        graph: lanes of the town.
+        most_deg: largest allowed turn at one point, degrees.
+    """
     problems = []
     for lane in graph.lanes.values():
         turns_deg = np.degrees(np.abs([wrap_angle_rad(float(t)) for t in np.diff(_headings(lane.line))]))
@@ -89,7 +94,11 @@ def odd_sizes(graph: LaneGraph, width_m: tuple[float, float], speed_mps: tuple[f
 
 
 def lost_neighbours(graph: LaneGraph) -> list[str]:
-    """One line for each lane whose `left` or `right` neighbour is not on that side or has another direction."""
+    """One line for each lane whose `left` or `right` neighbour is not on that side or has another direction.
+
+    Args:
+        graph: lanes of the town.
+    """
     problems = []
     for lane in graph.lanes.values():
         middle_m, heading_rad = lane.line.at(lane.line.length_m / 2)
@@ -143,7 +152,12 @@ def _wheels_off(town: TownUnderTest, lane: Lane, tolerance_m: float, wheel_m: fl
 
 
 def walks_off_the_ground(town: TownUnderTest, tolerance_m: float) -> list[str]:
-    """One line for each sidewalk or crosswalk that is more than `tolerance_m` above or below its ground."""
+    """One line for each sidewalk or crosswalk that is more than `tolerance_m` above or below its ground.
+
+    Args:
+        town: the town under test.
+        tolerance_m: largest allowed difference of heights.
+    """
     problems = []
     for walk in town.graph.walks.values():
         for point_m, place in _along(walk.line):
@@ -154,7 +168,11 @@ def walks_off_the_ground(town: TownUnderTest, tolerance_m: float) -> list[str]:
 
 
 def idle_crosswalks(graph: LaneGraph) -> list[str]:
-    """One line for each crosswalk that crosses no lane, and for each end of a crosswalk far from any sidewalk."""
+    """One line for each crosswalk that crosses no lane, and for each end of a crosswalk far from any sidewalk.
+
+    Args:
+        graph: lanes and walks of the town.
+    """
     lanes = np.concatenate([np.array([p for p, _ in _along(lane.line)]) for lane in graph.lanes.values()])[:, :2]
     pavements = [walk for walk in graph.walks.values() if not walk.is_crossing]
     problems = []
@@ -199,7 +217,11 @@ def bad_bays(town: TownUnderTest, tolerance_m: float) -> list[str]:
 
 
 def out_of_bounds(graph: LaneGraph) -> list[str]:
-    """One line for each lane, walk and parking bay that leaves `town.bounds`."""
+    """One line for each lane, walk and parking bay that leaves `town.bounds`.
+
+    Args:
+        graph: lanes, walks, parking bays and bounds of the town.
+    """
     xmin, ymin, xmax, ymax = graph.bounds_m
     lines = [(lane.name, lane.line.points_m) for lane in graph.lanes.values()]
     lines += [(walk.name, walk.line.points_m) for walk in graph.walks.values()]

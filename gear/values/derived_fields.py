@@ -32,8 +32,12 @@ class DerivedField:
 
 
 def attribute_lines(kind: type[Any], *, without: Iterable[str] = ()) -> str:
-    """The lines below `Attributes:` in the docstring of the class `kind`, without the attributes that `without`
-    names.
+    """The lines below `Attributes:` in the docstring of a class, for the docstring of a class with the same
+    fields.
+
+    Args:
+        kind: the class.
+        without: names of attributes that are left out.
     """
     _, _, section = (textwrap.dedent("    " + (kind.__doc__ or ""))).partition(f"{HEADING}\n")
     left_out = tuple(f"    {name}:" for name in without)

@@ -28,6 +28,9 @@ def installed_entry_points(group: str) -> tuple[list[EntryPoint], list[DamagedDi
     """The entry points of a group, and the distributions whose entry points cannot be read, sorted by name.
 
     If a distribution is on the path several times, the first one counts, as for `import`.
+
+    Args:
+        group: name of the group, such as `gear.plugins`.
     """
     found: list[EntryPoint] = []
     damaged: list[DamagedDistribution] = []
@@ -53,6 +56,9 @@ def installed_entry_points(group: str) -> tuple[list[EntryPoint], list[DamagedDi
 def identity(distribution: importlib.metadata.Distribution) -> tuple[str, str]:
     """Name and version of a distribution; if its metadata are damaged, name and version are taken from the name of
     its folder.
+
+    Args:
+        distribution: the installed distribution.
     """
     try:
         name, version = str(distribution.name or ""), str(distribution.version or "")

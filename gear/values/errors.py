@@ -21,6 +21,11 @@ class FieldError(ValueError):
     """
 
     def __init__(self, field: str, problem: str) -> None:
+        """Makes the error.
+
+        Args:
+            field, problem: as the attributes.
+        """
         super().__init__(field, problem)
         self.field = field
         self.problem = problem
@@ -33,6 +38,14 @@ class ConfigError(GearError):
     """A config that cannot be read; its text is `path:line:column: key: problem`."""
 
     def __init__(self, path: Path | str, line: int, column: int, key: str, problem: str) -> None:
+        """Makes the error.
+
+        Args:
+            path: path of the file, or the name that messages show instead.
+            line, column: position counted from 1; line 0 if the value is in no file.
+            key: key of the value, with dots; "" if the error belongs to no key.
+            problem: what is wrong.
+        """
         super().__init__(str(path), line, column, key, problem)
         self.path, self.line, self.column, self.key, self.problem = str(path), line, column, key, problem
 
@@ -45,6 +58,14 @@ class UnknownNameError(GearError):
     """A name that is unknown. The error's text suggests the known name with the most similar spelling."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str] = (), hint: str = "") -> None:
+        """Makes the error.
+
+        Args:
+            kind: what the name should name, such as `town`.
+            name: the unknown name.
+            known: the names that exist.
+            hint: further sentence at the end of the text.
+        """
         names = tuple(sorted(known))
         super().__init__(kind, name, names, hint)
         self.kind, self.name, self.known, self.hint = kind, name, names, hint
@@ -64,6 +85,13 @@ class DuplicateNameError(GearError):
     """A plugin name that several packages use, given without the name of the package."""
 
     def __init__(self, kind: str, name: str, choices: Iterable[str]) -> None:
+        """Makes the error.
+
+        Args:
+            kind: kind of plugin, such as `attack`.
+            name: the name.
+            choices: the full names, with the package, among which the user must choose.
+        """
         listed = tuple(choices)
         super().__init__(kind, name, listed)
         self.kind, self.name, self.choices = kind, name, listed
@@ -76,6 +104,13 @@ class PluginError(GearError):
     """A plugin that failed; the text states which plugin, at which stage, and the cause."""
 
     def __init__(self, plugin: str, stage: str, problem: str) -> None:
+        """Makes the error.
+
+        Args:
+            plugin: name of the plugin.
+            stage: what gear was doing, such as the hook or method that it called.
+            problem: the cause in one line.
+        """
         super().__init__(plugin, stage, problem)
         self.plugin, self.stage, self.problem = plugin, stage, problem
 
@@ -89,6 +124,13 @@ class BackendError(GearError):
     """
 
     def __init__(self, backend: str, problem: str, remedy: str) -> None:
+        """Makes the error.
+
+        Args:
+            backend: name of the renderer.
+            problem: why it cannot start.
+            remedy: what to install, or which renderer to use instead.
+        """
         super().__init__(backend, problem, remedy)
         self.backend, self.problem, self.remedy = backend, problem, remedy
 
@@ -104,6 +146,12 @@ class PatchError(GearError):
     """A patch file or folder that cannot be read or does not fit the dataset."""
 
     def __init__(self, path: Path | str, problem: str) -> None:
+        """Makes the error.
+
+        Args:
+            path: path of the patch.
+            problem: what is wrong with it.
+        """
         super().__init__(str(path), problem)
         self.path, self.problem = str(path), problem
 
@@ -115,6 +163,12 @@ class DatasetError(GearError):
     """A dataset on disk that cannot be read, extended or written."""
 
     def __init__(self, path: Path | str, problem: str) -> None:
+        """Makes the error.
+
+        Args:
+            path: path of the dataset, or of the file in it.
+            problem: what is wrong with it.
+        """
         super().__init__(str(path), problem)
         self.path, self.problem = str(path), problem
 
@@ -132,6 +186,13 @@ class ReplaceableError(DatasetError):
     """Existing output that was made with other settings, or is damaged; the option `--force` replaces it."""
 
     def __init__(self, path: Path | str, problem: str, *, split: str = "") -> None:
+        """Makes the error.
+
+        Args:
+            path: path of the output.
+            problem: what is wrong with it.
+            split: name of the split that `--force` would replace; "" if it would replace the whole output.
+        """
         super().__init__(path, problem)
         self.split = split
 
@@ -148,6 +209,12 @@ class TownError(GearError):
     """A town, actor or surface whose MJCF does not follow gear's conventions."""
 
     def __init__(self, path: Path | str, problem: str) -> None:
+        """Makes the error.
+
+        Args:
+            path: path of the MJCF file.
+            problem: what is wrong with it.
+        """
         super().__init__(str(path), problem)
         self.path, self.problem = str(path), problem
 
@@ -159,6 +226,12 @@ class PlacementError(GearError):
     """A scene whose actors or cameras cannot be placed."""
 
     def __init__(self, scene: str, problem: str) -> None:
+        """Makes the error.
+
+        Args:
+            scene: name of the scene.
+            problem: what cannot be placed, and which limit to change.
+        """
         super().__init__(scene, problem)
         self.scene, self.problem = scene, problem
 

@@ -39,7 +39,11 @@ def frozen(array: npt.ArrayLike, shape: tuple[int, ...] | None = None) -> Array:
 
 
 def wrap_angle_rad(angle_rad: float) -> float:
-    """The equivalent angle in [-pi, pi), in radians."""
+    """The equivalent angle in [-pi, pi), in radians.
+
+    Args:
+        angle_rad: any angle.
+    """
     return (angle_rad + math.pi) % (2 * math.pi) - math.pi
 
 
@@ -76,8 +80,13 @@ class RigidTransform:
 
     @staticmethod
     def from_yaw(dst: str, src: str, position_m: npt.ArrayLike, yaw_rad: float) -> RigidTransform:
-        """Makes a transform for a frame `src` that is rotated about z by `yaw_rad` (counter-clockwise seen from
-        above) and whose origin is at `position_m` in `dst`.
+        """Makes a transform for a frame that is rotated about z, such as that of a car on level ground.
+
+        Args:
+            dst: name of the target frame.
+            src: name of the source frame.
+            position_m: (3,) origin of `src` in `dst`, metres.
+            yaw_rad: rotation, counter-clockwise seen from above.
         """
         c, s = math.cos(yaw_rad), math.sin(yaw_rad)
         return RigidTransform.from_parts(dst, src, [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], position_m)
@@ -111,7 +120,11 @@ class RigidTransform:
         return RigidTransform(self.dst, other.src, self.matrix @ other.matrix)
 
     def apply(self, points_m: npt.ArrayLike) -> Array:
-        """Converts (..., 3) points in frame `src` to (..., 3) points in frame `dst`, metres."""
+        """Converts (..., 3) points in frame `src` to (..., 3) points in frame `dst`, metres.
+
+        Args:
+            points_m: (..., 3) points in frame `src`.
+        """
         return np.asarray(points_m, dtype=np.float64) @ self.rotation.T + self.translation_m
 
 
@@ -194,13 +207,22 @@ class Intrinsics:
         return frozen([[self.fx_px, 0.0, self.cx_px], [0.0, self.fy_px, self.cy_px], [0.0, 0.0, 1.0]])
 
     def project(self, points_camera_m: npt.ArrayLike) -> Array:
-        """Projects (..., 3) points in the camera frame, with z > 0, to (..., 2) index pixels."""
+        """Projects (..., 3) points in the camera frame, with z > 0, to (..., 2) index pixels.
+
+        Args:
+            points_camera_m: (..., 3) points: x right, y down, z forward, metres.
+        """
         points = np.asarray(points_camera_m, dtype=np.float64)
         scaled = points[..., :2] / points[..., 2:3] * (self.fx_px, self.fy_px)
         return np.asarray(scaled + np.array([self.cx_px, self.cy_px]))
 
     def unproject(self, pixels: npt.ArrayLike, depth_m: npt.ArrayLike) -> Array:
-        """Converts (..., 2) index pixels and (...) planar depths in metres to (..., 3) points in the camera frame."""
+        """Converts (..., 2) index pixels and (...) planar depths in metres to (..., 3) points in the camera frame.
+
+        Args:
+            pixels: (..., 2) column and row, index pixels.
+            depth_m: (...) distance along the optical axis.
+        """
         uv = np.asarray(pixels, dtype=np.float64)
         z = np.asarray(depth_m, dtype=np.float64)[..., None]
         return np.concatenate([(uv - (self.cx_px, self.cy_px)) / (self.fx_px, self.fy_px) * z, z], axis=-1)

@@ -64,7 +64,11 @@ class Callbacks:
         )
 
     def and_also(self, others: Callbacks) -> Callbacks:
-        """Callbacks that call first those of this object, then those of `others`."""
+        """Callbacks that call first those of this object, then those of `others`.
+
+        Args:
+            others: the callbacks that are called afterwards.
+        """
 
         def both_progress(done: int, total: int) -> None:
             self.on_progress(done, total)

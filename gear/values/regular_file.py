@@ -23,12 +23,21 @@ class NotAFileError(OSError):
     """Error for an existing path that is no regular file. Code that handles `OSError` handles it as well."""
 
     def __init__(self, path: Path, kind: str) -> None:
+        """Makes the error.
+
+        Args:
+            path: the path.
+            kind: what it is: `folder`, `device`, ….
+        """
         number = errno.EISDIR if kind == "folder" else errno.EINVAL
         super().__init__(number, f"is a {kind}; a file was asked for", str(path))
 
 
 def check_regular(path: str | Path) -> Path:
     """Checks that a path is a regular file, or a link to a regular file, and returns the path.
+
+    Args:
+        path: the path.
 
     Raises:
         NotAFileError: the path is a folder, a device, a FIFO or a socket.

@@ -104,7 +104,14 @@ class Rig:
             raise FieldError("cameras", f"two cameras share a name: {', '.join(names)}")
 
     def place(self, world_from_ego: RigidTransform) -> tuple[CameraRecord, ...]:
-        """The records of all cameras, with their poses in the world, for a pose of the ego car."""
+        """The records of all cameras, with their poses in the world, for a pose of the ego car.
+
+        Args:
+            world_from_ego: pose of the ego car. If `follows_road` is False, only its position and yaw are used.
+
+        Returns:
+            One record per camera, in the order of `cameras`.
+        """
         base = world_from_ego
         if not self.follows_road:
             base = RigidTransform.from_yaw("world", "ego", world_from_ego.translation_m, world_from_ego.yaw_rad)

@@ -15,6 +15,9 @@ from gear.values.errors import GearError
 def check_seed(seed: int) -> None:
     """Checks that a seed is not negative.
 
+    Args:
+        seed: the seed.
+
     Raises:
         GearError: the seed is negative.
     """

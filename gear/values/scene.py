@@ -38,13 +38,22 @@ class Pose:
 
     @staticmethod
     def from_transform(transform: RigidTransform) -> Pose:
-        """The pose that equals a transform, rounded to the precision of records."""
+        """The pose that equals a transform, rounded to the precision of records.
+
+        Args:
+            transform: the transform; its frame names are not stored.
+        """
         position = tuple(round(float(v), POSE_DIGITS) + 0.0 for v in transform.translation_m)
         quat = tuple(round(float(v), 9) + 0.0 for v in _quat_from_rotation(transform.rotation))
         return Pose(position_m=(position[0], position[1], position[2]), quat_wxyz=(quat[0], quat[1], quat[2], quat[3]))
 
     def transform(self, dst: str, src: str) -> RigidTransform:
-        """The pose as a rigid transform `dst_from_src`, with the given frame names."""
+        """The pose as a rigid transform `dst_from_src`, with the given frame names.
+
+        Args:
+            dst: name of the target frame.
+            src: name of the source frame.
+        """
         w, x, y, z = np.asarray(self.quat_wxyz) / np.linalg.norm(self.quat_wxyz)
         rotation = [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -171,6 +180,10 @@ WEATHER_PARAMETERS: dict[str, dataclasses.Field[Any]] = {
 
 def check_weather(name: str, value: float) -> None:
     """Checks that a weather parameter lies in its range.
+
+    Args:
+        name: name of the parameter, as in `Weather`.
+        value: its value.
 
     Raises:
         FieldError: the value is out of range; the error names the parameter, its range and the value.
@@ -314,6 +327,9 @@ class SceneRecord:
     def actor(self, actor_id: int) -> ActorRecord:
         """The record of the actor with the id `actor_id`.
 
+        Args:
+            actor_id: id of the actor.
+
         Raises:
             KeyError: no actor has this id.
         """
@@ -325,6 +341,9 @@ class SceneRecord:
     def camera(self, name: str) -> CameraRecord:
         """The record of the camera with the name `name`.
 
+        Args:
+            name: name of the camera, such as `left`.
+
         Raises:
             KeyError: no camera has this name.
         """
@@ -334,7 +353,11 @@ class SceneRecord:
         raise KeyError(name)
 
     def world_from_surface(self, surface: SurfaceRecord) -> RigidTransform:
-        """The pose of a surface in the world, computed from its pose on its board or on its actor."""
+        """The pose of a surface in the world, computed from its pose on its board or on its actor.
+
+        Args:
+            surface: one of `surfaces`.
+        """
         if surface.actor_id is None:
             return surface.parent_from_surface.transform("world", surface.name)
         world_from_actor = self.actor(surface.actor_id).world_from_actor.transform("world", "actor")

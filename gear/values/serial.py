@@ -26,6 +26,9 @@ SHOWN = 60
 def to_json(value: Any) -> Json:
     """Converts a value to JSON: dataclasses become dicts, tuples become lists.
 
+    Args:
+        value: a dataclass, tuple, list, mapping or plain value.
+
     Raises:
         TypeError: a value has no JSON form.
     """
