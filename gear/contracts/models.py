@@ -69,6 +69,9 @@ class BatchPredictor(Protocol):
     def predict_many(self, samples: Sequence[Mapping[str, UInt8Image]]) -> list[Any]:
         """The prediction for each sample, in order; each equals the result of `Model.predict`. Pictures may differ
         in size.
+
+        Args:
+            samples: for each sample, (H, W, 3) uint8 sRGB pictures by camera name.
         """
         ...
 

@@ -121,7 +121,13 @@ def stem(town: str, sequence: int, frame: int) -> str:
 class Paths:
     """Paths of the six files that belong to one picture in the Cityscapes layout, relative to the dataset's root.
 
-    The files are the picture, label ids, instance ids, label colours, polygons and camera.
+    Attributes:
+        image: the picture, `leftImg8bit/...png`.
+        label_ids: the label id of each pixel.
+        instance_ids: the instance id of each pixel.
+        colour: the colour of each pixel's label.
+        polygons: outlines of the labels as JSON.
+        camera: intrinsics and pose of the camera as JSON.
     """
 
     image: str

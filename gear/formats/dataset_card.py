@@ -108,7 +108,11 @@ def title(splits: Sequence[SplitFacts]) -> str:
 
 
 def size_category(samples: int) -> str:
-    """The Hugging Face hub's size category for a number of samples, such as `n<1K`."""
+    """The Hugging Face hub's size category for a number of samples, such as `n<1K`.
+
+    Args:
+        samples: number of samples of all splits.
+    """
     return next((name for most, name in SIZES if samples < most), "n>1M")
 
 

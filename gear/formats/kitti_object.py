@@ -74,6 +74,9 @@ def format_label(label: KittiLabel) -> str:
 
     It has 15 fields (16 with a score), separated by one space. Numbers have two decimals, except the fixed numbers of a
     `DontCare` line.
+
+    Args:
+        label: the label or the detection.
     """
     if label.type == "DontCare":
         box = " ".join(f"{v:.2f}" for v in label.box_px)
@@ -98,7 +101,11 @@ def _two(value: float) -> str:
 
 
 def format_labels(labels: Iterable[KittiLabel]) -> bytes:
-    """The bytes of a KITTI label file, one line per object; empty for a picture without objects."""
+    """The bytes of a KITTI label file, one line per object; empty for a picture without objects.
+
+    Args:
+        labels: the labels of one picture.
+    """
     return "".join(format_label(label) + "\n" for label in labels).encode()
 
 
@@ -242,7 +249,11 @@ the same point.
 
 
 def format_calibration(calibration: Calibration) -> bytes:
-    """The bytes of a KITTI calibration file: KITTI's seven lines in their usual order."""
+    """The bytes of a KITTI calibration file: KITTI's seven lines in their usual order.
+
+    Args:
+        calibration: the calibration of the cameras.
+    """
     identity = np.eye(3, 4)
     rows: list[tuple[str, Array]] = [(f"P{i}", calibration.projection(i)) for i in range(4)]
     rows += [
@@ -259,8 +270,10 @@ SCAN = "scan/velodyne"
 
 
 def format_points(points: npt.NDArray[np.float32]) -> bytes:
-    """The bytes of a KITTI laser scan as little-endian float32, from (N, 4) points: x forward, y left, z up in metres,
-    and intensity 0..1.
+    """The bytes of a KITTI laser scan: little-endian float32.
+
+    Args:
+        points: (N, 4): x forward, y left, z up in metres, and intensity 0..1.
     """
     return np.ascontiguousarray(points, dtype="<f4").tobytes()
 

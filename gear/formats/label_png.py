@@ -25,7 +25,11 @@ _BUSY_SHARE = 0.2
 
 
 def encode_label_map(labels: Labels) -> bytes:
-    """Encodes an (H, W) uint8 or uint16 label map as a greyscale PNG of 8 or 16 bits."""
+    """Encodes an (H, W) uint8 or uint16 label map as a greyscale PNG of 8 or 16 bits.
+
+    Args:
+        labels: (H, W) uint8 or uint16.
+    """
     if labels.ndim != 2 or labels.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"labels must have shape (H, W) of uint8 or uint16, got {labels.shape} of {labels.dtype}")
     places, own, before = _changes(labels)

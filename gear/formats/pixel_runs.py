@@ -34,7 +34,11 @@ class Runs:
 
     @staticmethod
     def of(picture: npt.NDArray[Any]) -> Runs:
-        """Finds the runs of equal pixels of an (H, W) picture."""
+        """Finds the runs of equal pixels of an (H, W) picture.
+
+        Args:
+            picture: (H, W) map of labels or ids.
+        """
         height, width = picture.shape
         found = []
         begins = np.ones((min(STRIP_ROWS, height), width), np.bool_)

@@ -39,7 +39,11 @@ def encode_crop(mask: Mask, left: int, top: int, height_px: int, width_px: int) 
 
 
 def encode(mask: Mask) -> str:
-    """Encodes an (H, W) bool mask as an RLE string."""
+    """Encodes an (H, W) bool mask as an RLE string.
+
+    Args:
+        mask: (H, W) bool.
+    """
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not rows.size:
         return encode_crop(np.zeros((0, 0), np.bool_), 0, 0, *mask.shape)

@@ -145,6 +145,13 @@ def _in_front(corners_m: Array) -> Array:
 
 
 def box_of(sides: Array) -> BoxPx:
-    """The box with the given left, top, right and bottom side, a (4,) array in pixels."""
+    """The box with the given left, top, right and bottom side, a (4,) array in pixels.
+
+    Args:
+        sides: (4,) left, top, right, bottom.
+
+    Returns:
+        The same numbers as floats.
+    """
     left, top, right, bottom = (float(side) for side in sides)
     return (left, top, right, bottom)

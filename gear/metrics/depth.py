@@ -177,6 +177,7 @@ class NearDepth(DepthEvaluator):
     _wants_devkit = False
 
     def __init__(self) -> None:
+        """Makes an evaluator without pictures; the options of `DepthEvaluator` are fixed."""
         super().__init__(max_depth_m=80.0, crop="none")
 
     def update(self, sample: DepthTruth, prediction: FloatImage) -> Mapping[str, float]:

@@ -59,6 +59,7 @@ class SemanticEvaluator:
     """
 
     def __init__(self) -> None:
+        """Makes an evaluator without samples: all counts are 0."""
         self.confusion = np.zeros((COUNT, COUNT), dtype=np.int64)
         self.weighted_tp = np.zeros(COUNT)
         self.weighted_fn = np.zeros(COUNT)

@@ -28,7 +28,11 @@ Patches are not brightened.
 
 
 def has_linear_colours(model: mujoco.MjModel) -> bool:
-    """Whether the model declares its colours (`rgba`) as linear albedo; MuJoCo's default is sRGB."""
+    """Whether the model declares its colours (`rgba`) as linear albedo; MuJoCo's default is sRGB.
+
+    Args:
+        model: the compiled world.
+    """
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, "filament.material.base_color_type")
     if index < 0:
         return False

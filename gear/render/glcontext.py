@@ -125,7 +125,11 @@ def driver_and_device() -> tuple[str, str]:
 
 
 def is_software(device: str) -> bool:
-    """Whether the name of a device belongs to a driver of Mesa that renders on the CPU."""
+    """Whether the name of a device belongs to a driver of Mesa that renders on the CPU.
+
+    Args:
+        device: name that OpenGL reports (`GL_RENDERER`).
+    """
     return any(word in device.casefold() for word in ("llvmpipe", "softpipe", "swrast", "software"))
 
 

@@ -37,10 +37,15 @@ def difference(a: Any, b: Any, where: str = "value") -> str:
 
 
 def share_apart(a: Any, b: Any, tolerance: float) -> float:
-    """The share, 0..1, of the numbers in `a` that differ from `b` by more than a relative tolerance; NaN equals NaN.
+    """The share, 0..1, of the numbers in `a` that differ from `b` by more than a relative tolerance; NaN equals
+    NaN.
 
     The tolerance is a fraction of the largest number of the array in `b`. For containers the result is the largest
     share among their items; it is 1 if shapes, types, names or counts differ.
+
+    Args:
+        a, b: dataclasses, mappings, sequences, arrays or plain values.
+        tolerance: largest difference that counts as equal, as a fraction.
     """
     if dataclasses.is_dataclass(a) and type(a) is type(b):
         names = [field.name for field in dataclasses.fields(a)]

@@ -105,7 +105,9 @@ def board(distance_m: float, left_m: float = 0.0, *, surface: int = 0, bottom_m:
 def street(seed: int = 0, index: int = 0) -> tuple[Thing, ...]:
     """A street ahead of the origin: billboard, building, cars, van, truck, people, cyclist, traffic light.
 
-    The positions of vehicles and people are drawn from the seed and the index.
+    Args:
+        seed, index: seed of the street and number of the sample, from which the positions of vehicles and people are
+            drawn.
     """
     rng = derive_rng(seed, "synthetic", index)
     things = [

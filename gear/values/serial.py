@@ -47,6 +47,9 @@ def to_json(value: Any) -> Json:
 def is_places_field(field: dataclasses.Field[Any]) -> bool:
     """Whether a field stores the positions (file, line, column) of the other fields' values in a config file; such
     a field is no key of the config (`PLACES`).
+
+    Args:
+        field: the field of a dataclass.
     """
     return PLACES.items() <= field.metadata.items()
 

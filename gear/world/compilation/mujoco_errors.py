@@ -16,7 +16,11 @@ _LINE = re.compile(r",? line \d+\b")
 
 
 def without_breaks(error: BaseException) -> str:
-    """The message of an error as one line, without line breaks."""
+    """The message of an error as one line, without line breaks.
+
+    Args:
+        error: the error.
+    """
     return " ".join(str(error).split())
 
 

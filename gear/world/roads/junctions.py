@@ -24,8 +24,14 @@ class Junctions:
         self._points: dict[str, Array] = {}
 
     def crossings(self, route: Route) -> list[tuple[str, float, float]]:
-        """The junction lanes of a route, each as (name, start, end). Start and end are arc lengths on the route in
-        metres.
+        """The junction lanes of a route, in the order in which the route uses them.
+
+        Args:
+            route: the route.
+
+        Returns:
+            For each junction lane its name, and the arc lengths on the route, in metres, at which the lane starts and
+            ends.
         """
         ends_m = (*route.starts_m[1:], route.line.length_m)
         return [

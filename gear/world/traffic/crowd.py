@@ -73,7 +73,11 @@ class RoadUsers:
         self.free.release(spawn.actor_type.facts.name, body)
 
     def count(self, *, people: bool) -> int:
-        """The number of people (`people` true) or of vehicles, without the ego car and the carrier of the patch."""
+        """The number of people or of vehicles, without the ego car and the carrier of the patch.
+
+        Args:
+            people: True counts people, False counts vehicles.
+        """
         return sum(
             (spawn.walk is not None) == people for body, spawn in self.spawns.items() if body not in self.protected
         )

@@ -248,7 +248,11 @@ def _irradiance(radiance: Floats, directions: Floats, solid_angle: Floats, norma
 
 
 def encode_srgb(light: Floats) -> UInt8Image:
-    """Converts linear light, in which 1.0 is full scale, to sRGB bytes 0..255, elementwise."""
+    """Converts linear light, in which 1.0 is full scale, to sRGB bytes 0..255, elementwise.
+
+    Args:
+        light: values of any shape; values outside 0..1 are clipped.
+    """
     steps = (np.clip(light, 0.0, 1.0) * (len(_SRGB_BYTES) - 1) + 0.5).astype(np.uint16)
     return _SRGB_BYTES[steps]
 
