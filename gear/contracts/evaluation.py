@@ -22,8 +22,8 @@ Masks = Mapping[str, npt.NDArray[np.bool_]]
 """Masks of pixels by camera name: (H, W) bool."""
 
 Draws = npt.NDArray[np.int64]
-"""The samples of R resampled datasets: (R, N) indices of gathered samples. Each row draws N samples, possibly with
-repetition.
+"""The samples of R resampled datasets: (R, N) indices of gathered samples, from 0. Row r lists the N samples of dataset
+r, for example all samples except those of one street (jackknife). A sample may occur several times in a row.
 """
 
 Spread = Mapping[str, npt.NDArray[np.float64]]

@@ -143,6 +143,9 @@ def features(columns: dict[str, str]) -> Json:
 
     Args:
         columns: file suffix of each column that holds files, by the column's name.
+
+    Returns:
+        The JSON value for `info.features` in the metadata `huggingface` of the Parquet file.
     """
     described: dict[str, Json] = {key: {"dtype": "int64", "_type": "Value"} for key in NUMBERS}
     for column, suffix in columns.items():

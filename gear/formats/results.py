@@ -72,5 +72,9 @@ def _result_line(label: KittiLabel) -> str:
 
 
 def coco_path(split: str) -> str:
-    """Path of the file with the detections of a split, in COCO's results format."""
+    """Path of the file with the detections of a split, in COCO's results format.
+
+    Args:
+        split: name of the split.
+    """
     return f"coco_results_{split}.json"

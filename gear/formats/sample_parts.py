@@ -29,12 +29,12 @@ class Part:
 
 
 def parts_of(sidecar: Sidecar, split: str) -> list[Part]:
-    """The files of a sample with their short names, sorted by name and suffix. Auxiliary files, such as probes, are
-    left out.
+    """The files of a sample with their short names, sorted by name and suffix. Auxiliary files, such as probes,
+    are left out.
 
     Args:
-        sidecar: metadata of the sample.
-        split: name of the split.
+        sidecar: metadata of the sample (its JSON file), which lists its files.
+        split: name of the split; the folder with this name is left out of the short names.
     """
     auxiliary = {file.path for file in sidecar.auxiliary.values()}
     return parts([path for path in sidecar.files if path not in auxiliary], split)

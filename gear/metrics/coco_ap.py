@@ -111,11 +111,14 @@ class CocoEvaluator(Generic[SampleT]):
         return metrics
 
     def resampled(self, draws: Draws) -> Spread:
-        """The metrics `ap`, `ap50`, `ap75` and `ap_<category>` of R resampled datasets, (R,) each. Row r of
-        `draws` lists the sample indices of dataset r.
+        """The metrics `ap`, `ap50`, `ap75` and `ap_<category>` of R resampled datasets, from which confidence
+        intervals are computed.
 
         Args:
-            draws: (R, N) indices of samples in the order of the calls of `update`.
+            draws: (R, N) sample indices in the order of the calls of `update`; row r lists the samples of dataset r.
+
+        Returns:
+            (R,) values by name of the metric; NaN where a metric is undefined.
         """
         found = matches(self._matched())
         values = resampled(list(found.values()), draws)

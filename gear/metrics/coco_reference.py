@@ -51,11 +51,14 @@ class TallObjects(CocoEvaluator[SampleT]):
         return {"ap50": total, **{f"ap50_{name}": value for name, value in values.items()}, **instances}
 
     def resampled(self, draws: Draws) -> Spread:
-        """The metrics `ap50` and `ap50_<category>` of R resampled datasets, (R,) each. The categories with at
-        least 50 instances in the whole dataset count.
+        """The metrics `ap50` and `ap50_<category>` of R resampled datasets, from which confidence intervals are
+        computed. The categories with at least 50 instances in the whole dataset count.
 
         Args:
-            draws: (R, N) sample indices; row r lists the samples of dataset r.
+            draws: (R, N) sample indices in the order of the calls of `update`; row r lists the samples of dataset r.
+
+        Returns:
+            (R,) values by name of the metric.
         """
         found = {name: one for name, one in self._found().items() if int(one.label_counts.sum()) >= MIN_INSTANCES}
         values = resampled(list(found.values()), draws)[:, :, 0]

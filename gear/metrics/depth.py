@@ -144,11 +144,14 @@ class DepthEvaluator:
         return {name: float(np.mean(np.sort(values))) if values else float("nan") for name, values in known.items()}
 
     def resampled(self, draws: Draws) -> Spread:
-        """The metrics of R resampled datasets, (R,) each. Row r of `draws` lists the picture indices of dataset r,
-        over which the mean is taken.
+        """The metrics of `result` for R resampled datasets, from which confidence intervals are computed.
 
         Args:
-            draws: (R, N) picture indices in the order of the calls of `update`.
+            draws: (R, N) picture indices in the order of the calls of `update`; row r lists the pictures of dataset r,
+                over which the mean is taken.
+
+        Returns:
+            (R,) values by name of the metric; NaN where no picture has ground truth.
         """
         values = {name: np.array(self.metrics.get(name, []), np.float64) for name in self._names()}
         return {name: _known_means(one[draws]) for name, one in values.items() if len(one)}
@@ -196,11 +199,14 @@ class NearDepth(DepthEvaluator):
         return _renamed(super().result())
 
     def resampled(self, draws: Draws) -> Spread:
-        """The metrics of `result` for R resampled datasets, (R,) each. Row r of `draws` lists the picture indices
-        of dataset r, over which the mean is taken.
+        """The metrics of `result` for R resampled datasets, from which confidence intervals are computed.
 
         Args:
-            draws: (R, N) picture indices in the order of the calls of `update`.
+            draws: (R, N) picture indices in the order of the calls of `update`; row r lists the pictures of dataset r,
+                over which the mean is taken.
+
+        Returns:
+            (R,) values by name of the metric; NaN where no picture has ground truth.
         """
         return _renamed(super().resampled(draws))
 

@@ -111,11 +111,14 @@ class KittiEvaluator(Generic[SampleT]):
         return {"ap_3d_moderate": float(np.mean(known)) if known else float("nan"), **metrics}
 
     def resampled(self, draws: Draws) -> Spread:
-        """The metrics `<class>_<2d|bev|3d>_moderate_r40` and `ap_3d_moderate` of R resampled datasets, (R,) each.
-        Row r of `draws` lists the sample indices of dataset r.
+        """The metrics `<class>_<2d|bev|3d>_moderate_r40` and `ap_3d_moderate` of R resampled datasets, from which
+        confidence intervals are computed.
 
         Args:
-            draws: (R, N) sample indices in the order of the calls of `update`.
+            draws: (R, N) sample indices in the order of the calls of `update`; row r lists the samples of dataset r.
+
+        Returns:
+            (R,) values by name of the metric; NaN where no label counts.
         """
         moderate = next(difficulty for difficulty in DIFFICULTIES if difficulty.name == "moderate")
         spread: dict[str, Array] = {}

@@ -56,11 +56,13 @@ class NearCars(KittiEvaluator[SampleT]):
         return metrics
 
     def resampled(self, draws: Draws) -> Spread:
-        """The metrics of `result` for R resampled datasets, (R,) each. Row r of `draws` lists the sample indices
-        of dataset r.
+        """The metrics of `result` for R resampled datasets, from which confidence intervals are computed.
 
         Args:
-            draws: (R, N) sample indices in the order of the calls of `update`.
+            draws: (R, N) sample indices in the order of the calls of `update`; row r lists the samples of dataset r.
+
+        Returns:
+            (R,) values by name of the metric; NaN where no label counts.
         """
         return {_name(one): resampled_r40(self._chosen(one), draws) for one in _moderate_first()}
 

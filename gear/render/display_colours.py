@@ -72,8 +72,11 @@ def displayed_model(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def displayed_colour(albedo: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Converts linear albedo 0..1 to the display values 0..1 of a surface in full light, elementwise: sRGB-encoded and
-    brightened.
+    """Converts linear albedo 0..1 to the display values 0..1 of a surface in full light, elementwise: sRGB-encoded
+    and brightened.
+
+    Args:
+        albedo: values of any shape.
     """
     return _lifted(encode_srgb(albedo))
 

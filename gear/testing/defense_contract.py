@@ -108,7 +108,7 @@ class DefenseContract:
         return defense.fit(clean, patched, self.model(), derive_rng(SEED, "fit"))
 
     def result(self, pictures: Mapping[str, UInt8Image], seed: int = SEED) -> DefenseResult:
-        """The result of a new, fitted defense for one sample.
+        """The result of a new, calibrated defense for one sample.
 
         Args:
             pictures: (H, W, 3) uint8 pictures by camera name.

@@ -21,10 +21,13 @@ def format_poses(poses: Iterable[RigidTransform]) -> bytes:
 
 
 def parse_poses(text: str) -> Array:
-    """Parses a pose file to (N, 3, 4) matrices.
+    """Parses a pose file of KITTI's odometry benchmark.
 
     Args:
-        text: the text of the file.
+        text: the text of the file: one line of 12 numbers per frame; empty lines are skipped.
+
+    Returns:
+        (N, 3, 4) matrices: rotation, and translation in metres, from each frame's camera to the first frame's camera.
 
     Raises:
         ValueError: a line does not have 12 numbers.

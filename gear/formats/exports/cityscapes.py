@@ -29,6 +29,7 @@ def cityscapes_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptio
     Args:
         splits: the finished splits of the dataset.
         read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        _options: not used; the layout has no options.
     """
     for split in splits:
         info = split.info

@@ -26,6 +26,7 @@ def kitti_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -
     Args:
         splits: the finished splits of the dataset.
         read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        _options: not used; the layout has no options.
     """
     lists: dict[str, list[str]] = {name: [] for name in LISTS}
     numbers = {"training": 0, "testing": 0}

@@ -29,6 +29,7 @@ def kitti_depth_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOpti
     Args:
         splits: the finished splits of the dataset.
         read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        _options: not used; the layout has no options.
     """
     drives: dict[tuple[str, int], int] = {}
     for split in splits:

@@ -25,13 +25,14 @@ def kitti_flow_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptio
     Two neighbouring frames are a pair, with one number: `image_2/<number>_10.png`, `image_2/<number>_11.png`,
     `flow_occ/<number>_10.png` (all points), `flow_noc/<number>_10.png` (only points that the second picture shows),
     `obj_map/<number>_10.png` (0 for the background, 1, 2, ... for the road users) and `calib_cam_to_cam/<number>.txt`;
-    stereo datasets have `image_3`, too. Splits whose first word is `test` are written
-    to the folder `testing`, all other splits to `training`; in each of the two folders, pairs count from 0. The
-    benchmark keeps the flow of `testing` secret; the export has it.
+    stereo datasets have `image_3`, too. Splits whose first word is `test` are written to the folder `testing`, all
+    other splits to `training`; in each of the two folders, pairs count from 0. The benchmark keeps the flow of
+    `testing` secret; the export has it.
 
     Args:
         splits: the finished splits of the dataset.
         read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        _options: not used; the layout has no options.
 
     Raises:
         DatasetError: the dataset has no driving sequence, or was collected without flow.

@@ -30,6 +30,7 @@ def kitti_odometry_tree(splits: Sequence[ExportSplit], read: Read, _options: NoO
     Args:
         splits: the finished splits of the dataset.
         read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        _options: not used; the layout has no options.
 
     Raises:
         DatasetError: the dataset has no driving sequence.

@@ -23,7 +23,8 @@ FOLDERS = {"left": "image_02", "right": "image_03"}
 
 
 def kitti_raw_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
-    """The files of the driving sequences of a dataset in the layout of KITTI's raw data (synchronised and rectified).
+    """The files of the driving sequences of a dataset in the layout of KITTI's raw data (synchronised and
+    rectified).
 
     A sequence is a drive `<date>/<date>_drive_<number>_sync` with `image_02`, `image_03` (of a stereo dataset),
     `velodyne_points` (if the dataset has laser scans) and `oxts`. Each split has a date of its own, with its three
@@ -32,6 +33,7 @@ def kitti_raw_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOption
     Args:
         splits: the finished splits of the dataset.
         read: function that returns the bytes of a file of the dataset, by path relative to its root.
+        _options: not used; the layout has no options.
 
     Raises:
         DatasetError: the dataset has no driving sequence.

@@ -18,7 +18,11 @@ class Junctions:
     """
 
     def __init__(self, graph: LaneGraph) -> None:
-        """Stores the lane graph of the town; no pair of lanes is measured yet."""
+        """Stores the lane graph of the town; no pair of lanes is measured yet.
+
+        Args:
+            graph: the lanes of the town.
+        """
         self._graph = graph
         self._conflicts: dict[tuple[str, str], bool] = {}
         self._points: dict[str, Array] = {}

@@ -136,12 +136,14 @@ class EgoSampler:
         return None
 
     def judge(self, road_users: RoadUsers, rig: Rig | None = None) -> Verdict:
-        """Tests whether the faces are well visible to the reference camera of the ego car: `seen`, or the first limit
-        that a face breaks.
+        """Tests whether the faces are well visible to the reference camera of the ego car.
 
         Args:
             road_users: contains the ego car, and the carrier if there is one.
             rig: cameras that replace the sampler's rig in this test; None for the sampler's rig.
+
+        Returns:
+            `seen`, or the first limit that a face breaks: `out of the picture`, `too oblique` or `hidden`.
         """
         ego = next(iter(road_users.spawns))
         mount, camera = reference_camera(

@@ -165,6 +165,9 @@ def find_windows(model: mujoco.MjModel, data: mujoco.MjData, rng: np.random.Gene
         model: compiled model; its meshes must not have been released.
         data: MuJoCo data of the model with kinematics up to date.
         rng: random generator for the lit panes, their brightness and their colour.
+
+    Returns:
+        The lit panes, with their brightness and colour, in the form that the camera pipeline draws.
     """
     panes: list[Array] = []
     geoms: list[npt.NDArray[np.int32]] = []
