@@ -1,8 +1,10 @@
-"""Optical flow from one frame of a driving sequence to the next: exact, from depth, camera poses and objects' poses.
+"""Optical flow from one frame of a driving sequence to the next: exact, from depth, camera poses and objects'
+poses.
 
-Every body in gear's worlds is rigid, people who walk included, so the flow of a pixel follows from the point that the
-pixel shows: the point moves with its object, and the next camera sees it elsewhere. The sky is infinitely far away, so
-only the camera's rotation moves it. Shadows, reflections and rain are no points and have no flow of their own.
+Every body in gear's worlds is rigid, people who walk included. The flow of a pixel therefore follows from the point
+that the pixel shows: this point moves with its object, and the next camera sees it at another position. The sky is
+infinitely far away, so only the camera's rotation moves it. Shadows, reflections and rain are not points of a surface
+and have no flow of their own.
 """
 
 from __future__ import annotations

@@ -117,11 +117,14 @@ def _from_cache(cache_dir: Path, plan: WorldPlan) -> CompiledWorld:
 
 
 def world_key(plan: WorldPlan) -> dict[str, Json]:
-    """The key of a compiled world in the cache, as JSON: town, scene and weather of `plan`, a hash of its assets,
-    a hash of gear's code, and the versions of MuJoCo and dm_control.
+    """The key of a compiled world in the cache, as JSON.
 
     Args:
         plan: the contents of the world.
+
+    Returns:
+        Town, scene and weather of the plan, a hash of its assets, a hash of gear's code, and the versions of MuJoCo and
+        dm_control. A world is compiled again if any of them changes.
     """
     return {
         "town": str(plan.town.resolve()),
