@@ -171,7 +171,7 @@ class DatasetWriter:
         """Appends the next picture and its annotations to the file.
 
         Args:
-            picture: the picture; its id must follow that of the previous one.
+            picture: the picture; pictures must be added in order of their ids.
         """
         self._images.append(dump(_image_entry(picture, self._created)).rstrip(b"\n"))
         entries = _annotation_entries(picture, self._count + 1)

@@ -67,6 +67,8 @@ class LensWarp:
         """Warps a silhouette from the pinhole's to the distorted picture by nearest neighbour, in the same way as
         depth and ids.
 
+        A window is (first column, first row, one past the last column, one past the last row).
+
         Args:
             mask: (h, w) bool silhouette of the pinhole camera.
             window: position of the mask in the pinhole's picture, inside this picture.

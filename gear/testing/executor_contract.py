@@ -18,6 +18,8 @@ from gear.values.errors import GearError
 def write_items(folder: str, failing: tuple[int, ...], indices: Iterator[int], report: Report) -> None:
     """Work for tests: writes one file per item and reports the item; items in `failing` are reported as failed.
 
+    The files let a test count how often each item was made.
+
     Args:
         folder: folder of the written files.
         failing: items that are reported as failed.

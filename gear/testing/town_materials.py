@@ -24,7 +24,8 @@ LARGEST_PX = 8192
 
 
 def transparent(model: mujoco.MjModel) -> list[str]:
-    """One line for each visible geom with an alpha below 1.
+    """One line for each visible geom with an alpha below 1. Such geoms are not allowed, because ids and depth hold
+    one geom for each pixel.
 
     Args:
         model: the compiled model.

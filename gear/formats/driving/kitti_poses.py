@@ -50,6 +50,9 @@ def format_odometry_calibration(calibration: Calibration) -> bytes:
 
     Args:
         calibration: the calibration of the cameras.
+
+    Returns:
+        Lines `P0` to `P3` and `Tr`, each with the 12 numbers of a (3, 4) matrix, row by row.
     """
     rows = [(f"P{camera}", calibration.projection(camera)) for camera in range(4)]
     rows.append(("Tr", np.array(VELODYNE_TO_CAMERA)))

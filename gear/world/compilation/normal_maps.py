@@ -59,7 +59,8 @@ def align_normal_maps(model: mujoco.MjModel) -> None:
 
 
 def tangents(normals: Array) -> tuple[Array, Array]:
-    """The directions in which the red and the green channel of a normal map tilt a normal, as Filament computes them.
+    """The directions in which the red and the green channel of a normal map tilt a normal, as Filament computes
+    them. gear turns the frames of meshes until these directions agree with the texture.
 
     Args:
         normals: (..., 3) unit vectors in a mesh's frame.
