@@ -196,6 +196,20 @@ def remove_tree(root: Path, relative: str) -> None:
         shutil.rmtree(name, dir_fd=folder)
 
 
+def empty_tree(root: Path, relative: str) -> None:
+    """Deletes everything in a folder below the root; links in the folder are deleted and not followed.
+
+    Raises:
+        DatasetError: a component of the path is a link, or a file cannot be deleted.
+    """
+    with explained(root / relative), opened_parent(root, f"{relative}/x") as (folder, _):
+        for name in os.listdir(folder):  # noqa: PTH208 (a folder descriptor)
+            if stat.S_ISDIR(os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode):
+                shutil.rmtree(name, dir_fd=folder)
+            else:
+                os.unlink(name, dir_fd=folder)
+
+
 def remove_empty_folders(root: Path, relative: str) -> None:
     """Deletes the folder `root/relative` and all folders in it, as far as they are empty; innermost folders first.
 

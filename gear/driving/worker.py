@@ -101,8 +101,10 @@ class _Workshop:
         cast = self.drives.casts[run.driver]
         key = (f"{cast.task} {cast.driver.options}" if cast.task else "", run.town, run.scene)
         if key != self.place_key:
+            self.place_key, self.place = None, None  # if opening fails, no later drive gets a closed place
             self.open_places.close()
-            self.place_key, self.place = key, self._opened(run, cast)
+            self.place = self._opened(run, cast)
+            self.place_key = key
         assert self.place is not None
         return self.place
 
@@ -256,7 +258,7 @@ def _write(root: Path, folder: str, files: Mapping[str, bytes]) -> None:
         remove_tree(root, folder)
     with explained(target):
         target.parent.mkdir(parents=True, exist_ok=True)
-    with whole_tree(target, "drive") as unfinished:
+    with whole_tree(target, "drive", is_continued=False) as unfinished:
         for name, data in files.items():
             write_alone(unfinished / name, data)
 

@@ -55,3 +55,36 @@ def test_a_link_in_the_hidden_folder_is_refused(tmp_path: Path) -> None:
         with pytest.raises(DatasetError, match="link: is a link"):
             unfinished_place(tmp_path / "new", "export")
         (hidden / name).unlink()
+
+
+def test_a_command_that_does_not_continue_begins_with_an_empty_folder(tmp_path: Path) -> None:
+    target, hidden = tmp_path / "new", tmp_path / ".new.gear-import"
+    (tmp_path / "victim").mkdir()
+    (tmp_path / "victim/mine").write_text("mine")
+    (hidden / "inner/.deeper").mkdir(parents=True)
+    for name in ("setup.py", "inner/a"):
+        (hidden / name).write_text("of a killed run")
+    for name in ("link", "inner/.deeper/link"):
+        (hidden / name).symlink_to(tmp_path / "victim")
+    with whole_tree(target, "import", is_continued=False) as folder:
+        assert folder == hidden and not list(folder.iterdir())
+        (folder / "b").write_text("b")
+    assert [path.name for path in target.iterdir()] == ["b"]
+    assert (tmp_path / "victim/mine").read_text() == "mine"
+
+
+def test_a_command_that_continues_keeps_the_files(tmp_path: Path) -> None:
+    (tmp_path / ".new.gear-merge").mkdir()
+    (tmp_path / ".new.gear-merge/a").write_text("a")
+    with whole_tree(tmp_path / "new", "merge"):
+        pass
+    assert (tmp_path / "new/a").read_text() == "a"
+
+
+def test_a_hidden_folder_that_is_a_link_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "victim").mkdir()
+    (tmp_path / "victim/mine").write_text("mine")
+    (tmp_path / ".new.gear-import").symlink_to(tmp_path / "victim")
+    with pytest.raises(DatasetError, match="is a link"), whole_tree(tmp_path / "new", "import", is_continued=False):
+        pass
+    assert (tmp_path / "victim/mine").read_text() == "mine"

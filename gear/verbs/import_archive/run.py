@@ -13,6 +13,7 @@ from gear.dataset.files import write_whole
 from gear.dataset.free_space import check_free_space
 from gear.dataset.guarded_paths import remove_empty_folders, remove_files
 from gear.dataset.layout import GEAR
+from gear.dataset.scratch import clear_scratch
 from gear.dataset.verification import check_split, splits_in
 from gear.dataset.whole_tree import check_target, whole_tree
 from gear.reporting.display import displayed
@@ -81,7 +82,7 @@ def import_archive(
         wanted = [member for member in opened.members if PurePosixPath(member.path).is_relative_to(root)]
         size = sum(member.size for member in wanted)
         check_free_space(target, size, what="the dataset needs", advice="give --out on another disk")
-        with whole_tree(target, "import") as unfinished:
+        with whole_tree(target, "import", is_continued=False) as unfinished:
             for done, (member, data) in enumerate(opened.files(), start=1):
                 if PurePosixPath(member.path).is_relative_to(root):
                     write_whole(unfinished, PurePosixPath(member.path).relative_to(root).as_posix(), data)
@@ -92,6 +93,7 @@ def import_archive(
             remove_files(unfinished, surplus)
             for folder in sorted({PurePosixPath(one).parts[0] for one in surplus if "/" in one}):
                 remove_empty_folders(unfinished, folder)
+            clear_scratch(unfinished)
     outside = [member.path for member in opened.members if member not in wanted]
     return ImportReport(root=Path(out), splits=splits, files=len(inner) - len(surplus), left_out=(*surplus, *outside))
 

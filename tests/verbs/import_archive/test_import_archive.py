@@ -92,6 +92,15 @@ def test_strangers_files_are_left_out(root: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "new/hooks").exists()
 
 
+def test_files_of_a_killed_run_do_not_come_in(root: Path, tmp_path: Path) -> None:
+    hidden = tmp_path / ".new.gear-import"
+    (hidden / "gear/scratch").mkdir(parents=True)
+    (hidden / "setup.py").write_text("of a killed run")
+    report = import_archive(packed(root, tmp_path / "a.tar"), out=tmp_path / "new")
+    assert not (tmp_path / "new/setup.py").exists() and not (tmp_path / "new/gear/scratch").exists()
+    assert report.files == len(tree(tmp_path / "new"))
+
+
 @pytest.mark.parametrize(
     ("add", "problem"),
     [
