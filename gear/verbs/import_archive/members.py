@@ -12,33 +12,41 @@ import gzip
 import io
 import lzma
 import stat
+import struct
 import tarfile
 import zipfile
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import IO, Any, cast
 
 from gear.dataset.guarded_paths import parts_of
+from gear.plugins.text import printable
 from gear.values.errors import DatasetError
 from gear.values.regular_file import check_regular
 
 LARGEST_RATIO, ALWAYS_BYTES = 100, 100_000_000
-"""An archive may unpack to `ALWAYS_BYTES`, or to this many times its own size if that is more. Pictures hardly
-compress, and the JSON files of a dataset compress to about a tenth.
+"""An archive may unpack to `ALWAYS_BYTES`, or to this many times its own size if that is more; headers count, too.
+Pictures hardly compress, and the JSON files of a dataset compress to about a tenth.
 """
 
 LARGEST_FILE_BYTES = 2_000_000_000
 """Largest size of one file; a file is unpacked in memory."""
 
 MOST_MEMBERS = 20_000_000
+"""Largest number of members: files, folders and others."""
 
 LARGEST_READ_BYTES = 64_000_000
 """Largest number of bytes that the reader of headers may request at once; longer headers are an attack on memory."""
 
-BROKEN = (tarfile.TarError, zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, OSError, RuntimeError)
-"""Errors of Python's readers on damaged archives. RuntimeError: an encrypted zip."""
+BROKEN = (
+    tarfile.TarError, zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, OSError, RuntimeError, ValueError,
+    OverflowError, struct.error,
+)  # fmt: skip
+"""Errors of Python's readers on damaged archives. RuntimeError: an encrypted zip. ValueError: also a name that is not
+Unicode.
+"""
 
 MAGIC: dict[bytes, Any] = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xfd7zXZ\x00": lzma.open}
 """Functions that open a compressed file, by the file's first bytes."""
@@ -77,11 +85,12 @@ class Archive:
         try:
             with _explained(path):
                 check_regular(path)
+                self._limit = max(ALWAYS_BYTES, LARGEST_RATIO * path.stat().st_size)
                 if zipfile.is_zipfile(path):
                     self._zip = self._open.enter_context(zipfile.ZipFile(path))
                 else:
                     source = self._open.enter_context(_decompressed(path))
-                    opened = tarfile.open(fileobj=cast("IO[bytes]", _Bounded(source)), mode="r:")  # noqa: SIM115
+                    opened = tarfile.open(fileobj=cast("IO[bytes]", _Bounded(source, self._limit)), mode="r:")  # noqa: SIM115
                     self._tar = self._open.enter_context(opened)
                 self.members = self._checked()
         except BaseException:
@@ -108,7 +117,7 @@ class Archive:
             with _explained(self.path):
                 data = self._read(member)
             if len(data) != member.size:
-                raise DatasetError(self.path, f"is damaged: {member.path} is shorter than announced")
+                raise DatasetError(self.path, f"is damaged: {member.path!r} is shorter than announced")
             yield member, data
 
     def _read(self, member: Member) -> bytes:
@@ -131,10 +140,12 @@ class Archive:
         Raises:
             DatasetError: a member is a link or a device, leads outside, occurs twice, or unpacks to too much.
         """
-        limit = max(ALWAYS_BYTES, LARGEST_RATIO * self.path.stat().st_size)
+        limit = self._limit
         found: dict[str, Member] = {}
         total = 0
-        for path, size, kind, info in self._entries():
+        for number, (path, size, kind, info) in enumerate(self._entries()):
+            if number >= MOST_MEMBERS:
+                raise DatasetError(self.path, f"holds more than {MOST_MEMBERS} members; no dataset of gear does")
             if kind == "folder" and path in ("", "."):
                 continue
             parts_of(self.path, path)
@@ -145,7 +156,7 @@ class Archive:
             if path in found:
                 raise DatasetError(self.path, f"holds {path!r} twice")
             total += size
-            if size > LARGEST_FILE_BYTES or total > limit or len(found) >= MOST_MEMBERS:
+            if size > LARGEST_FILE_BYTES or total > limit:
                 problem = f"unpacks to more than {limit / 1e6:.0f} MB, or to a file of more than 2 GB"
                 raise DatasetError(self.path, f"{problem}; no dataset of gear does")
             found[path], self._infos[path] = Member(path, size), info
@@ -158,7 +169,7 @@ class Archive:
                 mode = entry.external_attr >> 16
                 kind = "folder" if entry.is_dir() else "a link" if stat.S_ISLNK(mode) else "file"
                 kind = "an encrypted file" if entry.flag_bits & 1 else kind
-                yield entry.filename.removeprefix("./"), entry.file_size, kind, entry
+                yield _normal(entry.filename), entry.file_size, kind, entry
             return
         assert self._tar is not None
         for member in self._tar:
@@ -166,23 +177,44 @@ class Archive:
             kind = "a link" if is_link else "folder" if member.isdir() else "file"
             if not is_link and not member.isdir() and (not member.isreg() or member.issparse()):
                 kind = "a device, a pipe or a sparse file"
-            yield member.name.removeprefix("./") or ".", max(member.size, 0), kind, member
+            yield _normal(member.name), max(member.size, 0), kind, member
+
+
+def _normal(path: str) -> str:
+    """A path without empty components and without `.`, so that each file has one path; `.` for the root."""
+    return str(PurePosixPath(path))
 
 
 class _Bounded(io.RawIOBase):
-    """A stream whose reads are limited, so that a header cannot demand all of the memory."""
+    """A stream whose reads are limited, so that a header cannot demand all of the memory, and whose length is limited,
+    so that headers without files (folders, comments) cannot demand hours.
+    """
 
-    def __init__(self, stream: IO[bytes]) -> None:
+    def __init__(self, stream: IO[bytes], limit: int) -> None:
+        """Limits a stream.
+
+        Args:
+            stream: the decompressed archive.
+            limit: position in bytes beyond which nothing is read.
+        """
         super().__init__()
         self._stream = stream
+        self._limit = limit
 
     def read(self, size: int = -1, /) -> bytes:
         if not 0 <= size <= LARGEST_READ_BYTES:
             raise tarfile.ReadError("a header is too long")
+        self._check(self._stream.tell() + size)
         return self._stream.read(size)
 
     def seek(self, offset: int, whence: int = 0, /) -> int:
+        if whence == 0:
+            self._check(offset)
         return self._stream.seek(offset, whence)
+
+    def _check(self, position: int) -> None:
+        if position > self._limit:
+            raise tarfile.ReadError(f"it has more than {self._limit / 1e6:.0f} MB when decompressed")
 
     def tell(self) -> int:
         return self._stream.tell()
@@ -208,4 +240,4 @@ def _explained(path: Path) -> Iterator[None]:
         yield
     except BROKEN as error:
         text = getattr(error, "strerror", None) or str(error) or type(error).__name__
-        raise DatasetError(path, f"cannot be unpacked: {text}") from error
+        raise DatasetError(path, f"cannot be unpacked: {printable(text)}") from error

@@ -16,6 +16,7 @@ from gear.dataset.layout import GEAR
 from gear.dataset.scratch import clear_scratch
 from gear.dataset.verification import check_split, splits_in
 from gear.dataset.whole_tree import check_target, whole_tree
+from gear.plugins.text import printable
 from gear.reporting.display import displayed
 from gear.values.counted import counted
 from gear.values.errors import DatasetError
@@ -41,9 +42,11 @@ class ImportReport:
 
     def summary(self) -> str:
         """Returns the result as text; a second line names files that were left out."""
-        text = f"{self.root}: {', '.join(self.splits)}; {counted(self.files, 'file')}, all as they were written"
+        splits = printable(", ".join(self.splits))
+        text = f"{self.root}: {splits}; {counted(self.files, 'file')}, all as they were written"
         if self.left_out:
-            text += f"\n{counted(len(self.left_out), 'file')} not of the dataset left out; first, {self.left_out[0]}"
+            first = printable(self.left_out[0])
+            text += f"\n{counted(len(self.left_out), 'file')} not of the dataset left out; first, {first}"
         return text
 
 
@@ -80,11 +83,13 @@ def import_archive(
     ):
         root = _root_in(path, opened.members)
         wanted = [member for member in opened.members if PurePosixPath(member.path).is_relative_to(root)]
+        chosen = {member.path for member in wanted}
+        outside = [member.path for member in opened.members if member.path not in chosen]
         size = sum(member.size for member in wanted)
         check_free_space(target, size, what="the dataset needs", advice="give --out on another disk")
         with whole_tree(target, "import", is_continued=False) as unfinished:
             for done, (member, data) in enumerate(opened.files(), start=1):
-                if PurePosixPath(member.path).is_relative_to(root):
+                if member.path in chosen:
                     write_whole(unfinished, PurePosixPath(member.path).relative_to(root).as_posix(), data)
                 shown.on_progress(done, len(opened.members))
             known, splits = _checked(path, unfinished)
@@ -94,7 +99,6 @@ def import_archive(
             for folder in sorted({PurePosixPath(one).parts[0] for one in surplus if "/" in one}):
                 remove_empty_folders(unfinished, folder)
             clear_scratch(unfinished)
-    outside = [member.path for member in opened.members if member not in wanted]
     return ImportReport(root=Path(out), splits=splits, files=len(inner) - len(surplus), left_out=(*surplus, *outside))
 
 
@@ -111,7 +115,7 @@ def _root_in(archive: Path, members: Sequence[Member]) -> PurePosixPath:
         raise DatasetError(archive, f"holds no dataset of gear (no {GEAR}/<split>/plan.json)")
     if len(roots) > 1:
         listed = ", ".join(str(root) for root in roots[:5])
-        raise DatasetError(archive, f"holds {len(roots)} datasets ({listed}); make one archive of each")
+        raise DatasetError(archive, f"holds {len(roots)} datasets ({printable(listed)}); make one archive of each")
     return roots[0]
 
 
@@ -131,5 +135,7 @@ def _checked(archive: Path, root: Path) -> tuple[set[str], tuple[str, ...]]:
     if findings:
         (first, problem), more = findings[0], len(findings) - 1
         further = f", and {more} more" if more else ""
-        raise DatasetError(archive, f"holds a damaged dataset: {first} is {problem}{further}; nothing was written")
+        raise DatasetError(
+            archive, f"holds a damaged dataset: {printable(first)} is {problem}{further}; nothing was written"
+        )
     return {path for check in checks for path in check.known} | set(own_cards(root)), tuple(names)

@@ -18,7 +18,7 @@ import gear
 from gear.cli.main import main
 from gear.values.errors import DatasetError
 from gear.verbs.import_archive import members
-from gear.verbs.import_archive.run import import_archive
+from gear.verbs.import_archive.run import ImportReport, import_archive
 
 
 @pytest.fixture
@@ -112,6 +112,8 @@ def test_files_of_a_killed_run_do_not_come_in(root: Path, tmp_path: Path) -> Non
         (member("data/pipe", b"", type=tarfile.FIFOTYPE), "a device, a pipe"),
         (member("data/tty", b"", type=tarfile.CHRTYPE), "a device, a pipe"),
         (member("data/README.md"), "twice"),
+        (member("data//README.md"), "twice"),
+        (member("./data/./README.md"), "twice"),
         (member("data2/gear/test/plan.json", b"{}"), "holds 2 datasets"),
     ],
 )
@@ -141,6 +143,40 @@ def test_archives_that_unpack_to_too_much(root: Path, tmp_path: Path, monkeypatc
     with pytest.raises(DatasetError, match="unpacks to more than"):
         import_archive(archive, out=tmp_path / "new")
     assert nothing_left(tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["pax comments", "folders", "zip folders"])
+def test_headers_without_files_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    monkeypatch.setattr(members, "ALWAYS_BYTES", 100_000)
+    monkeypatch.setattr(members, "LARGEST_RATIO", 2)
+    monkeypatch.setattr(members, "MOST_MEMBERS", 20_000_000 if kind == "pax comments" else 50)
+    path = tmp_path / "a.tgz"
+    if kind == "zip folders":
+        with zipfile.ZipFile(path, "w") as archive:
+            for number in range(60):
+                archive.writestr(f"{number}/", b"")
+    else:
+        header = {"comment": "x" * 10_000} if kind == "pax comments" else {}
+        with tarfile.open(path, "w:gz", format=tarfile.PAX_FORMAT) as tar:
+            for number in range(60):
+                member(str(number), b"", type=tarfile.DIRTYPE, pax_headers=header)(tar)
+    with pytest.raises(DatasetError, match=r"more than 0 MB when decompressed|more than 50 members"):
+        import_archive(path, out=tmp_path / "new")
+
+
+def test_a_name_that_is_no_text_is_one_line(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("éa", b"")  # its name is stored in UTF-8
+    data = (tmp_path / "a.zip").read_bytes().replace("é".encode(), b"\xff\xfe")
+    (tmp_path / "a.zip").write_bytes(data)
+    with pytest.raises(DatasetError, match="cannot be unpacked") as caught:
+        import_archive(tmp_path / "a.zip", out=tmp_path / "new")
+    assert "\n" not in str(caught.value)
+
+
+def test_the_summary_is_safe_to_print() -> None:
+    report = ImportReport(root=Path("new"), splits=("a\x1b[2J",), files=1, left_out=("b\n\x1b[2J",))
+    assert report.summary().count("\n") == 1 and "\x1b" not in report.summary()
 
 
 def test_a_header_that_demands_the_memory(tmp_path: Path) -> None:
