@@ -8,10 +8,14 @@ from dataclasses import dataclass, field
 from gear.config.collection import MOST_CROWDED, WeatherConfig
 from gear.config.nodes import Mapping, Node, Place
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
+from gear.driving.scenario import SPEEDS_KMH
 from gear.values.errors import FieldError
 from gear.values.serial import PLACES
 
 LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+NAMES = re.compile(r"\{(town|scene|model)\}")
+"""Names in braces that a patch may contain; they stand for town, scene and network."""
+
 PATCH = "patch"
 """Name of the twin that shows the patch of the driver."""
 
@@ -60,6 +64,8 @@ class Driver:
             raise FieldError("defense", "protects a network, and the driver has none; name one with `model`")
         if self.patch and not (self.model or self.task):
             raise FieldError("patch", "is seen by nobody: the driver has no network and no cameras (`model`, `task`)")
+        if set("{}") & set(NAMES.sub("", self.patch)):
+            raise FieldError("patch", f"may contain {{town}}, {{scene}} and {{model}}, no other braces: {self.patch!r}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +114,11 @@ class DriveConfig:
         for town, scenes in self.towns.items():
             if not scenes:
                 raise FieldError("towns", f"{town} names no scene")
+        low, high = SPEEDS_KMH
+        for name, speeds_kmh in self.scenarios.items():
+            for speed_kmh in speeds_kmh:
+                if not low <= speed_kmh <= high:
+                    raise FieldError(f"scenarios.{name}", f"must be {low:g} to {high:g} km/h, got {speed_kmh:g}")
         for twin in self.twins:
             if twin not in TWINS:
                 raise FieldError("twins", f"must be among {', '.join(TWINS)}, got {twin!r}")

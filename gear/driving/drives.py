@@ -19,16 +19,20 @@ from gear.config.reader import located_errors, read_node
 from gear.contracts.specs import ControllerSpec, ModelSpec
 from gear.contracts.tasks import NO_PATCH
 from gear.dataset.json_text import dump_json
-from gear.driving.config import PATCH, DriveConfig, Driver
+from gear.driving.config import NAMES, PATCH, DriveConfig, Driver
 from gear.driving.scenario import Scenario, ScenarioLibrary, load_scenarios
 from gear.driving.video import check_video
 from gear.measuring.plugin_selection import Chosen, check_defense, check_optics
 from gear.plugins.build import find
+from gear.plugins.text import printable
 from gear.values.errors import GearError, UnknownNameError
 from gear.values.serial import Json, to_json
 
 NO_CAMERA_TASK = "semseg"
 """Task whose name completes the collection config of drivers without cameras; it decides nothing."""
+
+LONGEST_TITLE = 400
+"""Largest number of characters of a drive's title."""
 
 RUNS = "drives"
 """Name of the folder of all drives."""
@@ -62,10 +66,11 @@ class DriveRun:
 
     @property
     def title(self) -> str:
-        """The drive in one line."""
-        return (
+        """The drive in one line that is safe to print."""
+        return printable(
             f"{self.driver}: {self.scenario} at {self.speed_kmh:g} km/h in {Path(self.town).stem}/{self.scene}, seed"
-            f" {self.seed}, {self.twin}"
+            f" {self.seed}, {self.twin}",
+            LONGEST_TITLE,
         )
 
 
@@ -171,7 +176,8 @@ class Drives:
         wanted = run.twin
         if run.twin == PATCH:
             model = "" if cast.model is None else cast.model.found.spec.name
-            wanted = cast.driver.patch.format(town=run.town, scene=run.scene, model=model)
+            names = {"town": run.town, "scene": run.scene, "model": model}
+            wanted = NAMES.sub(lambda found: names[found[1]], cast.driver.patch)
         return resolve_patch(wanted, surfaces=surfaces, seed=self.config.seed)
 
     def identity(self, run: DriveRun, patch: PatchSet) -> Json:

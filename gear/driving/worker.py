@@ -17,8 +17,8 @@ from gear.contracts.specs import TaskSpec
 from gear.dataset.claims import Claims
 from gear.dataset.files import explained, read_bytes, write_alone
 from gear.dataset.guarded_paths import owned, remove_tree
-from gear.dataset.json_text import parse_json
-from gear.dataset.sealed_json import load_sealed, sealed_json
+from gear.dataset.json_text import dump_json, parse_json
+from gear.dataset.sealed_json import DamagedError, load_sealed, sealed_json
 from gear.dataset.whole_tree import whole_tree
 from gear.driving.drives import Cast, DriveRun, Drives
 from gear.driving.log import log_bytes, log_hash
@@ -43,6 +43,10 @@ LEAST_POOL = 4
 
 RESULT, LOG, VIDEO = "result.json", "log.jsonl", "video.mp4"
 """Names of the files in the folder of a drive."""
+
+DAMAGED = "is damaged; delete its folder and drive again"
+UNREADABLE = (LookupError, TypeError, ValueError, RecursionError)
+"""Errors of reading JSON that gear did not write."""
 
 CLAIMS = "drives"
 """Name under which workers claim drives."""
@@ -213,7 +217,8 @@ def _made(shop: _Workshop, run: DriveRun) -> bool:
     place = shop.place_of(run)
     patch = drives.patch(run, 0 if place.session is None else len(place.session.world.faces))
     folder = drives.folder(run, patch)
-    if read_result(drives.root, folder, with_video=drives.has_video(run)) is not None:
+    identity = drives.identity(run, patch)
+    if read_result(drives.root, folder, identity, with_video=drives.has_video(run)) is not None:
         return False
     model, sight = shop.model_of(cast), None
     if place.session is not None and place.job is not None:
@@ -236,7 +241,7 @@ def _made(shop: _Workshop, run: DriveRun) -> bool:
         open_loop={} if sight is None or sight.evaluator is None else known_json(sight.evaluator.result()),
         open_loop_metric=_main_metric(place.session),
     )
-    content = sealed_json({"identity": drives.identity(run, patch), "result": to_json(result)})
+    content = sealed_json({"identity": identity, "result": to_json(result)})
     shown = {} if video is None else {VIDEO: video.mp4()}
     _write(drives.root, folder, {LOG: data, **shown, RESULT: content})
     return True
@@ -263,12 +268,14 @@ def _write(root: Path, folder: str, files: Mapping[str, bytes]) -> None:
             write_alone(unfinished / name, data)
 
 
-def read_result(root: Path, folder: str, *, with_video: bool = False) -> DriveResult | None:
-    """The result of a drive; None if it is not there, or its log does not have the hash that the result names.
+def read_result(root: Path, folder: str, identity: Json, *, with_video: bool = False) -> DriveResult | None:
+    """The result of a drive; None if it is not there, is of another drive, or its log does not have the hash that the
+    result names.
 
     Args:
         root: folder of the study.
         folder: folder of the drive, relative to the root.
+        identity: everything that decides the drive (`Drives.identity`).
         with_video: whether a drive without a video counts as missing.
 
     Raises:
@@ -277,10 +284,14 @@ def read_result(root: Path, folder: str, *, with_video: bool = False) -> DriveRe
     path = root / folder / RESULT
     if not path.is_file() or (with_video and not (root / folder / VIDEO).is_file()):
         return None
-    content: Json = load_sealed(path)
-    result = from_json(DriveResult, content["result"], str(path))
+    try:
+        content: Json = load_sealed(path)
+        is_same = dump_json(content["identity"]) == dump_json(identity)
+        result = from_json(DriveResult, content["result"], "result")
+    except (DamagedError, *UNREADABLE) as error:
+        raise DatasetError(path, DAMAGED) from error
     log = root / folder / LOG
-    if not log.is_file() or log_hash(log.read_bytes()) != result.log_sha256:
+    if not is_same or not log.is_file() or log_hash(read_bytes(log)) != result.log_sha256:
         return None
     return result
 
@@ -296,9 +307,16 @@ def read_log(root: Path, folder: str) -> list[Json]:
         The lines of the log: the head, one entry per frame, and the end.
 
     Raises:
-        DatasetError: the file cannot be read.
+        DatasetError: the file is damaged, or cannot be read.
     """
-    return [parse_json(line) for line in read_bytes(root / folder / LOG).splitlines()]
+    path = root / folder / LOG
+    try:
+        lines = [parse_json(line) for line in read_bytes(path).splitlines()]
+    except UNREADABLE as error:
+        raise DatasetError(path, DAMAGED) from error
+    if len(lines) < 3 or not all(isinstance(line, dict) for line in lines):
+        raise DatasetError(path, DAMAGED)
+    return lines
 
 
 @contextlib.contextmanager

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,18 @@ def test_pictures_have_the_options_of_the_driver() -> None:
     assert drives.patch(drives.runs[0], 1).label == NO_PATCH
 
 
+def test_names_in_braces_in_the_patch(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr("gear.driving.drives.resolve_patch", lambda wanted, **_: asked.append(wanted))
+    planned(TEXT.replace("patch: random", "patch: 'a/{scene}/{town}/{model}.png'"))
+    assert f"a/board/{TINY_TOWN}/.png" in asked
+
+
+def test_a_title_is_safe_to_print() -> None:
+    run = replace(planned().runs[0], scenario="a\x1b[2J\nb")
+    assert run.title.isprintable() and "a\\x1b[2J\\nb" in run.title
+
+
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
@@ -70,6 +83,12 @@ def test_pictures_have_the_options_of_the_driver() -> None:
         ("repeats: 2", "repeats: 0", "must be 1 to 10000"),
         ("board]", "bord]", "did you mean board"),
         ("patch: random", "patch: nowhere.png", "is not there"),
+        ("patch: random", "patch: '{town.__class__}.png'", "drive.yml:4:90: drivers.eyes.patch: may contain {town}"),
+        ("patch: random", "patch: '{}.png'", "no other braces"),
+        ("patch: random", "patch: '{town:>999999999}.png'", "no other braces"),
+        ("[20, 40]", "[-5]", "drive.yml:6:27: scenarios.stopped_lead: must be 5 to 130 km/h, got -5"),
+        ("[20, 40]", "[0]", "must be 5 to 130"),
+        ("[20, 40]", "[1e9]", "must be 5 to 130"),
         ("patch: random", "model: ddrnet23_slim", "does semseg, not depth"),
     ],
 )

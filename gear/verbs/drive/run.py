@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from gear.collecting.job import versions
+from gear.collecting.patch_sources import PatchSet
 from gear.collecting.workers import Workers, fitting_workers
 from gear.config.dump import to_plain, to_yaml
 from gear.config.load import find_config
@@ -26,11 +27,11 @@ from gear.dataset.json_text import dump_json
 from gear.dataset.layout import split_folder
 from gear.dataset.store import check_output
 from gear.driving.config import DriveConfig
-from gear.driving.drives import Drives, patches_of, plan_drives
-from gear.driving.worker import CLAIMS, DriveResult, drive_all, read_log, read_result
+from gear.driving.drives import RUNS, DriveRun, Drives, patches_of, plan_drives
+from gear.driving.worker import CLAIMS, UNREADABLE, DriveResult, drive_all, read_log, read_result
 from gear.reporting.display import displayed
 from gear.values.counted import counted
-from gear.values.errors import GearError
+from gear.values.errors import DatasetError, GearError
 from gear.values.progress import Callbacks, Progress, Warn
 from gear.verbs.drive.chart import chart
 from gear.verbs.drive.page import page
@@ -129,10 +130,10 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
     drives = prepared(request)
     executor = _executor(request)
     write_whole(drives.root, CONFIG, to_yaml(drives.config).encode())
-    failures = _made(drives, executor, callbacks)
+    outcomes = _made(drives, executor, callbacks)
     clear_claims(drives.root, CLAIMS)
     remove_empty_folders(drives.root, split_folder(CLAIMS))
-    results, failed = _gathered(drives, failures)
+    results, failed = _gathered(drives, outcomes)
     if not results:
         raise GearError(f"{drives.root}: no drive could be made ({failed[0][1] if failed else 'there are none'})")
     report = DriveReport(
@@ -150,7 +151,7 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
     ):
         write_whole(drives.root, name, data)
     clear_scratch(drives.root)
-    broken = [outcome for outcome in failures.values() if not outcome.is_final]
+    broken = [one for one in outcomes.values() if one.kind == "failed" and not one.is_final]
     if broken:
         first = broken[0]
         raise GearError(
@@ -170,41 +171,53 @@ def _executor(request: DriveRequest) -> Executor:
 
 
 def _made(drives: Drives, executor: Executor, callbacks: Callbacks) -> dict[int, Outcome]:
-    """Makes the missing drives; returns the outcomes of those that failed."""
-    folders = [
-        drives.folder(run, patch) for run, patch in zip(drives.runs, patches_of(drives, drives.runs), strict=True)
-    ]
+    """Makes the missing drives; returns the outcomes by index of the drive, without those of drives never begun."""
     missing = [
         index
-        for index, (run, folder) in enumerate(zip(drives.runs, folders, strict=True))
-        if read_result(drives.root, folder, with_video=drives.has_video(run)) is None
+        for index, (run, patch) in enumerate(zip(drives.runs, patches_of(drives, drives.runs), strict=True))
+        if _stored(drives, run, patch, with_video=drives.has_video(run)) is None
     ]
-    done, failures = len(folders) - len(missing), {}
-    callbacks.on_progress(done, len(folders))
+    total = len(drives.runs)
+    done, outcomes = total - len(missing), {}
+    callbacks.on_progress(done, total)
 
     def report(outcome: Outcome) -> None:
         nonlocal done
         done += 1
+        outcomes[outcome.index] = outcome
         if outcome.kind == "failed":
-            failures[outcome.index] = outcome
             callbacks.on_warning(f"{drives.runs[outcome.index].title}: {outcome.error}")
-        callbacks.on_progress(done, len(folders))
+        callbacks.on_progress(done, total)
 
     if missing:
         executor.run(partial(drive_all, drives), missing, report)
-    return failures
+    return outcomes
 
 
-def _gathered(drives: Drives, failures: dict[int, Outcome]) -> tuple[list[DriveResult], list[tuple[str, str]]]:
+def _stored(drives: Drives, run: DriveRun, patch: PatchSet, *, with_video: bool = False) -> DriveResult | None:
+    return read_result(drives.root, drives.folder(run, patch), drives.identity(run, patch), with_video=with_video)
+
+
+def _gathered(drives: Drives, outcomes: dict[int, Outcome]) -> tuple[list[DriveResult], list[tuple[str, str]]]:
     results, failed = [], []
     for index, (run, patch) in enumerate(zip(drives.runs, patches_of(drives, drives.runs), strict=True)):
-        result = read_result(drives.root, drives.folder(run, patch))
+        result = _stored(drives, run, patch)
         if result is not None:
             results.append(result)
         else:
-            problem = failures[index].error if index in failures else "another run is making it; run the command again"
-            failed.append((run.title, problem))
+            failed.append((run.title, _problem(outcomes.get(index))))
     return results, failed
+
+
+def _problem(outcome: Outcome | None) -> str:
+    """Why a drive has no result.
+
+    Args:
+        outcome: the outcome of the drive; None if no worker has begun it.
+    """
+    if outcome is None:
+        return "not begun, because too many drives in a row had failed; run the command again"
+    return outcome.error or "another run is making it; run the command again"
 
 
 def _figures(drives: Drives, results: list[DriveResult]) -> list[tuple[str, bytes]]:
@@ -222,7 +235,14 @@ def _figures(drives: Drives, results: list[DriveResult]) -> list[tuple[str, byte
             one.run.twin: read_log(drives.root, drives.folder(one.run, patch))
             for one, patch in zip(group, patches, strict=True)
         }
-        figures.append((run.title.rsplit(",", 1)[0], chart(logs)))
+        try:
+            drawn = chart(logs)
+        except UNREADABLE as error:  # a log that has the right hash, and that gear did not write
+            raise DatasetError(
+                drives.root / RUNS,
+                f"holds a damaged log of {run.title}; delete the folder of the drive and drive again",
+            ) from error
+        figures.append((run.title.rsplit(",", 1)[0], drawn))
     return figures
 
 

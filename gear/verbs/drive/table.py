@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gear.measuring.text_table import number_table
+from gear.plugins.text import printable
 from gear.verbs.drive.report import DriveReport, Paired, Rate, Row
 
 TITLES = [
@@ -65,7 +66,7 @@ def _cells(row: Row) -> list[str]:
     none = against.get("none")
     return [
         row.driver,
-        row.scenario,
+        printable(row.scenario),
         row.twin,
         str(row.crashes.total),
         rate(row.crashes),

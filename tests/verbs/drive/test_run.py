@@ -5,16 +5,21 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import gear
 from gear.cli.main import main
+from gear.contracts.executors import Outcome
 from gear.dataset.guarded_paths import remove_tree
+from gear.driving import worker
+from gear.driving.drives import DriveRun
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError
 from gear.verbs.drive.report import DriveReport
 from gear.verbs.drive.request import DriveRequest
+from gear.verbs.drive.run import _problem
 
 TEXT = f"""
 drivers:
@@ -120,6 +125,34 @@ def test_scenarios_without_a_place_are_listed_and_do_not_fail_the_study(config: 
     assert "neighbouring lane" in found.failed[0][1] and len(warned) == 1
     with pytest.raises(GearError, match="no drive could be made"):
         gear.drive(config, out=tmp_path / "none", settings=[*settings, "scenarios={cut_in: [40]}"])
+
+
+def test_drives_that_no_worker_has_begun_are_told_from_those_of_another_run() -> None:
+    assert _problem(None).startswith("not begun")
+    assert _problem(Outcome(index=0, kind="elsewhere")).startswith("another run is making it")
+    assert _problem(Outcome(index=0, kind="failed", error="broken")) == "broken"
+
+
+def test_the_drives_after_many_failures_are_not_begun(
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[int] = []
+
+    def made(shop: object, run: DriveRun) -> bool:
+        calls.append(run.seed)
+        if len(calls) == 1:
+            return real(shop, run)
+        raise RuntimeError("broken")
+
+    real: Any = worker._made
+    monkeypatch.setattr(worker, "_made", made)
+    settings = ["scenarios={free_road: [30]}", "drivers={blind: {controller: blind}}", "repeats=8"]
+    with pytest.raises(GearError, match="5 of 8 drives could not be made"):
+        gear.drive(config, out=tmp_path, settings=settings)
+    assert len(calls) == 6
+    problems = [one["problem"] for one in json.loads((tmp_path / "drive.json").read_text())["failed"]]
+    assert problems[:5] == ["RuntimeError: broken"] * 5
+    assert len(problems) == 7 and all(one.startswith("not begun") for one in problems[5:])
 
 
 def test_an_absurd_number_of_workers_is_refused() -> None:
