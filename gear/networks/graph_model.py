@@ -22,7 +22,7 @@ SUFFIX = ".json"
 
 LARGEST_GRAPH_BYTES = 16 << 20
 LARGEST_WEIGHTS_BYTES = 1 << 30
-"""Largest sizes of the graph's file and of its files of numbers that are read."""
+"""Largest sizes of the graph's file, and of all of its files of numbers together."""
 
 CONVOLUTIONS = ("Conv2D", "DepthwiseConv2dNative")
 ADDITIONS = ("Add", "AddV2", "BiasAdd")
@@ -51,7 +51,7 @@ def read_graph_model(path: Path) -> dict[str, Tensor]:
         nodes = {str(node["name"]): node for node in graph["modelTopology"]["node"]}
         numbers = _numbers(path, graph["weightsManifest"])
         return _convolutions(nodes, numbers)
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError, OverflowError) as error:
         reason = f"{type(error).__name__}: {error}".splitlines()[0]
         raise GearError(f"{path}: not a graph model of TensorFlow.js that can be read ({reason})") from error
 
@@ -59,8 +59,13 @@ def read_graph_model(path: Path) -> dict[str, Tensor]:
 def _numbers(path: Path, manifest: Any) -> dict[str, np.ndarray[Any, np.dtype[Any]]]:
     """The constants by name, decompressed."""
     numbers: dict[str, np.ndarray[Any, np.dtype[Any]]] = {}
+    left = LARGEST_WEIGHTS_BYTES
     for group in manifest:
-        data = b"".join(_read(_beside(path, name), LARGEST_WEIGHTS_BYTES) for name in group["paths"])
+        pieces: list[bytes] = []
+        for name in group["paths"]:
+            pieces.append(_read(_beside(path, name), left))
+            left -= len(pieces[-1])
+        data = b"".join(pieces)
         offset = 0
         for entry in group["weights"]:
             shape = [int(side) for side in entry["shape"]]
@@ -84,6 +89,7 @@ def _numbers(path: Path, manifest: Any) -> dict[str, np.ndarray[Any, np.dtype[An
 def _convolutions(nodes: Mapping[str, Any], numbers: Mapping[str, np.ndarray[Any, np.dtype[Any]]]) -> dict[str, Tensor]:
     """Weights and biases of the convolutions in the layout of torch."""
     weights: dict[str, Tensor] = {}
+    origins: dict[str, str] = {}
     for name, node in nodes.items():
         if node["op"] in CONVOLUTIONS:
             kernel = numbers[_source(node["input"][1])]
@@ -91,7 +97,7 @@ def _convolutions(nodes: Mapping[str, Any], numbers: Mapping[str, np.ndarray[Any
             order = (3, 2, 0, 1) if node["op"] == CONVOLUTIONS[0] else (2, 3, 0, 1)
             weights[f"{name}.weight"] = torch.from_numpy(np.array(kernel.transpose(order), np.float32, order="C"))
         elif node["op"] in ADDITIONS:
-            first, second = (_origin(nodes, _source(each)) for each in node["input"][:2])
+            first, second = (_origin(nodes, _source(each), origins) for each in node["input"][:2])
             for layer, constant in ((first, second), (second, first)):
                 if layer in nodes and nodes[layer]["op"] in CONVOLUTIONS and constant in numbers:
                     bias = numbers[constant].reshape(-1)
@@ -101,14 +107,24 @@ def _convolutions(nodes: Mapping[str, Any], numbers: Mapping[str, np.ndarray[Any
     return weights
 
 
-def _origin(nodes: Mapping[str, Any], name: str) -> str:
-    """The node whose values a node passes on unchanged."""
-    for _ in range(len(nodes)):
+def _origin(nodes: Mapping[str, Any], name: str, origins: dict[str, str]) -> str:
+    """The node whose values a node passes on unchanged; a node of the cycle if the nodes form one.
+
+    Args:
+        nodes: the nodes by name.
+        name: name of the node.
+        origins: known origins by name, to which those of all visited nodes are added.
+    """
+    visited: dict[str, None] = {}
+    while name not in origins and name not in visited:
         node = nodes.get(name)
         if node is None or node["op"] not in PASSING:
             break
+        visited[name] = None
         name = _source(node["input"][0])
-    return name
+    origin = origins.get(name, name)
+    origins.update(dict.fromkeys(visited, origin))
+    return origin
 
 
 def _source(text: str) -> str:
@@ -131,5 +147,5 @@ def _read(path: Path, limit: int) -> bytes:
     if not path.is_file():
         raise ValueError(f"there is no file {path.name}")
     if path.stat().st_size > limit:
-        raise ValueError(f"{path.name} is larger than {limit >> 20} MiB")
+        raise ValueError(f"{path.name} is larger than the {limit >> 20} MiB that may still be read")
     return read_bytes(path)

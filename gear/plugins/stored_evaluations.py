@@ -21,7 +21,9 @@ from gear.dataset.disk_errors import explained
 from gear.dataset.files import inside, read_bytes, sha256
 from gear.dataset.json_text import load_json
 from gear.dataset.reading import Dataset
+from gear.formats.picture_size import check_size
 from gear.metrics.object_changes import ObjectChange
+from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, FieldError
 from gear.values.frames import UInt8Image
 from gear.values.serial import Json, from_json
@@ -155,6 +157,8 @@ def _parts(root: Path, found: dict[str, Any]) -> tuple[StoredResults, ...]:
         for change in one.get("objects", {}).get("changes", []):
             entry = from_json(ObjectChange, {key: change[key] for key in change if key != "sample"}, "changes")
             against.setdefault(from_json(int, change["sample"], "sample"), []).append(entry)
+    if not found["rows"]:
+        raise FieldError("rows", "names no dataset")
     parts = []
     for row in found["rows"]:
         name = from_json(str, row["name"], "name")
@@ -225,12 +229,21 @@ def read_defended(folder: Path, stored: Mapping[str, Any]) -> dict[str, UInt8Ima
     Raises:
         DatasetError: a picture is missing or damaged.
     """
-    hashes = from_json(dict[str, str], stored.get(DEFENDED, {}), DEFENDED)
+    try:
+        hashes = from_json(dict[str, str], stored.get(DEFENDED, {}), DEFENDED)
+    except FieldError as error:
+        raise DatasetError(folder, f"holds a damaged result of a sample ({error})") from error
     check_files(folder, hashes)
     pictures = {}
     for name in hashes:
-        decoded = cv2.imdecode(np.frombuffer(read_bytes(inside(folder, name)), np.uint8), cv2.IMREAD_COLOR)
+        path = inside(folder, name)
+        data = read_bytes(path)
+        try:
+            check_size(data)
+            decoded = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+        except (ValueError, cv2.error) as error:
+            raise DatasetError(path, f"cannot be read as a picture ({one_line(error)})") from error
         if decoded is None:
-            raise DatasetError(inside(folder, name), "is no picture")
+            raise DatasetError(path, "is no picture")
         pictures[unquote(Path(name).stem.partition("_")[2])] = np.ascontiguousarray(decoded[..., ::-1]).astype(np.uint8)
     return pictures

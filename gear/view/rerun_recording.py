@@ -5,14 +5,16 @@ Needs the package rerun-sdk (extra `mujoco-gear[rerun]`).
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gear.contracts.tasks import Sample
-from gear.dataset.files import refuse_folder
+from gear.dataset.files import explained, refuse_folder
 from gear.dataset.reading import Dataset
+from gear.dataset.scratch import unique_name
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import GearError
 from gear.values.scene import CameraRecord, SceneRecord
@@ -56,15 +58,32 @@ def to_rerun(
     recording = rerun.RecordingStream(f"gear {opened.root.resolve().name}")
     if out is None:
         recording.spawn()
-    else:
-        refuse_folder(Path(out))
-        recording.save(str(out))
+        _log(rerun, recording, opened, samples)
+        return recording
+    target = Path(out)
+    refuse_folder(target)
+    unfinished = target.with_name(f".{unique_name()}-{target.name}")
+    with explained(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            recording.save(str(unfinished))
+            _log(rerun, recording, opened, samples)
+            with unfinished.open("rb") as written:
+                os.fsync(written.fileno())
+            unfinished.replace(target)
+        except BaseException:  # Ctrl-C, too
+            unfinished.unlink(missing_ok=True)
+            raise
+    return recording
+
+
+def _log(rerun: Any, recording: Any, opened: Dataset[Any], samples: int | None) -> None:
+    """Logs the first `samples` samples of a dataset, or all of them, and waits until they are written."""
     recording.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for index in range(len(opened) if samples is None else min(samples, len(opened))):
         recording.set_time(TIMELINE, sequence=index)
         _log_sample(rerun, recording, opened, opened[index])
     recording.flush()
-    return recording
 
 
 def _log_sample(rerun: Any, recording: Any, dataset: Dataset[Any], sample: Sample) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from gear.dataset.files import explained, refuse_folder, streamed_alone
 from gear.dataset.reading import Dataset
 from gear.plugins.prediction_pictures import legends_json, picture_legends
+from gear.plugins.text import printable
 from gear.reporting.display import displayed
 from gear.values.counted import counted
 from gear.values.progress import Callbacks, Progress
@@ -50,7 +51,7 @@ class ViewReport:
         text = f"{self.path}: {counted(self.samples, 'sample')}, {size}{scaled}"
         if self.problems:
             index, what = self.problems[0]
-            text += f"\n{len(self.problems)} not shown in full; first, sample {index}: {what}"
+            text += f"\n{len(self.problems)} not shown in full; first, sample {index}: {printable(what)}"
         return text
 
 

@@ -82,6 +82,10 @@ BAD: dict[str, Callable[[Path], Any]] = {
     "the folder": edited(lambda graph: graph["weightsManifest"][0].update(paths=[".."])),
     "a negative side": edited(lambda graph: entry_of(graph).update(shape=[-1, -5, 3, 4])),
     "an immense shape": edited(lambda graph: entry_of(graph).update(shape=[1 << 40, 1 << 40, 1, 1])),
+    "an infinite side": lambda path: path.write_text(path.read_text().replace('"shape": [', '"shape": [1e999, ', 1)),
+    "an immense scale": edited(
+        lambda graph: entry_of(graph).update(quantization={"dtype": "uint8", "scale": 10**400, "min": 0})
+    ),
     "an unknown type": edited(lambda graph: entry_of(graph).update(quantization=None, dtype="string")),
     "a loop": edited(lambda graph: [node.update(input=[node["name"]] * 2) for node in graph["modelTopology"]["node"]]),
     "no convolution": edited(lambda graph: graph["modelTopology"].update(node=[])),
@@ -106,3 +110,35 @@ def test_files_beyond_the_limit_are_not_read(
     monkeypatch.setattr(graph_model, "LARGEST_WEIGHTS_BYTES", 10)
     with pytest.raises(GearError, match=r"net\.bin is larger than"):
         read_graph_model(path)
+
+
+def test_all_files_together_have_a_limit(
+    tmp_path: Path, layers: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_graph_model(tmp_path, layers)
+    size = (tmp_path / "net.bin").stat().st_size
+    graph = json.loads(path.read_text())
+    graph["weightsManifest"].append({"paths": ["net.bin"] * 10_000, "weights": []})
+    path.write_text(json.dumps(graph))
+    read: list[str] = []
+    real = graph_model.read_bytes
+    monkeypatch.setattr(graph_model, "read_bytes", lambda found: (read.append(found.name), real(found))[1])
+    monkeypatch.setattr(graph_model, "LARGEST_WEIGHTS_BYTES", 3 * size)
+    with pytest.raises(GearError, match=r"net\.bin is larger than"):
+        read_graph_model(path)
+    assert read.count("net.bin") == 3
+
+
+def test_a_cycle_is_followed_once() -> None:
+    count = 1000
+    visits: list[str] = []
+
+    class Nodes(dict[str, Any]):
+        def get(self, name: str, default: Any = None) -> Any:
+            visits.append(name)
+            return super().get(name, default)
+
+    nodes = Nodes({str(i): {"op": "Identity", "input": [str((i + 1) % count)]} for i in range(count)})
+    origins: dict[str, str] = {}
+    assert len({graph_model._origin(nodes, str(i), origins) for i in range(count)}) == 1
+    assert len(visits) == count

@@ -10,6 +10,7 @@ import pytest
 
 import gear
 from gear.values.errors import GearError
+from gear.view import rerun_recording
 
 
 def test_a_dataset_becomes_a_recording(write_dataset: Any, tmp_path: Path) -> None:
@@ -22,6 +23,25 @@ def test_a_dataset_becomes_a_recording(write_dataset: Any, tmp_path: Path) -> No
     assert data.startswith(b"RR") and len(data) > 20_000  # the picture and two previews
     for path in (b"/world/left/image", b"/preview/depth", b"/world/actors", b"/world/surfaces"):
         assert path in data or path.lstrip(b"/") in data
+
+
+def test_a_recording_appears_whole_or_not_at_all(
+    write_dataset: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("rerun")
+    root, out = write_dataset("depth", 2), tmp_path / "new"
+    out.mkdir()
+    (out / "a.rrd").write_bytes(b"of an earlier run")
+
+    def broken(*_: Any) -> None:
+        assert (out / "a.rrd").read_bytes() == b"of an earlier run"
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rerun_recording, "_log_sample", broken)
+    with pytest.raises(KeyboardInterrupt):
+        gear.to_rerun(root, out / "a.rrd")
+    assert [path.name for path in out.iterdir()] == ["a.rrd"]
+    assert (out / "a.rrd").read_bytes() == b"of an earlier run"
 
 
 def test_without_rerun_it_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -16,12 +16,16 @@ from urllib.parse import unquote
 from gear.values.errors import DatasetError
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*(::|://)")
+_OF_THIS_MACHINE = re.compile(r"(?:^|::)(?:file|local)(?:://|::|$)")
 _LOCAL = re.compile(r"(?:file|local):///?(?=/)")
 
 PACKAGES = {"s3": "s3fs", "s3a": "s3fs", "gs": "gcsfs", "gcs": "gcsfs", "az": "adlfs", "abfs": "adlfs"}
 """Names of the packages that fsspec needs for object stores, by protocol. Object stores have no folders, and the
 packages would create a missing bucket instead.
 """
+
+MOST_WRAPPERS = 20
+"""Largest number of file systems that may wrap each other."""
 
 
 def is_address(out: str | Path) -> bool:
@@ -53,11 +57,14 @@ class RemoteFolder:
         """Opens the file system of an address; the folder need not exist.
 
         Raises:
-            DatasetError: no package for the protocol is installed, or the file system cannot be opened.
+            DatasetError: no package for the protocol is installed, the file system cannot be opened, or it is a folder
+                of this machine, which is written with other checks.
         """
         import fsspec
 
         self.address = address
+        if _OF_THIS_MACHINE.search(address):
+            raise _local_error(address)
         protocol = re.split("::|://", address, maxsplit=1)[0]
         try:
             self._files, root = fsspec.core.url_to_fs(address)
@@ -68,6 +75,8 @@ class RemoteFolder:
             raise DatasetError(address, f"no file system can be opened there ({_line(error)})") from error
         except Exception as error:  # the constructors of file systems read credentials, and may raise anything
             raise DatasetError(address, f"cannot be opened ({_line(error)})") from error
+        if _is_local(self._files):
+            raise _local_error(address)
         self._root = root.rstrip("/")
         self._has_folders = not PACKAGES.keys() & set(re.split("::|://", address))
 
@@ -150,6 +159,21 @@ class RemoteFolder:
             raise DatasetError(self.address, f"{problem}: no permission ({_line(error)})") from error
         except Exception as error:
             raise DatasetError(self.address, f"{problem} ({_line(error)})") from error
+
+
+def _is_local(files: Any) -> bool:
+    """Whether a file system of fsspec is this machine's disk, or is a wrapper around it, such as a cache."""
+    from fsspec.implementations.local import LocalFileSystem
+
+    for _ in range(MOST_WRAPPERS):
+        if files is None or isinstance(files, LocalFileSystem):
+            break
+        files = getattr(files, "fs", None) or getattr(files, "sync_fs", None)
+    return files is not None
+
+
+def _local_error(address: str) -> DatasetError:
+    return DatasetError(address, "is a folder of this machine; give its path")
 
 
 def _line(error: BaseException) -> str:

@@ -15,6 +15,7 @@ from gear.networks.checkpoint_states import Candidate, candidates_of
 from gear.networks.weights import mismatches
 from gear.plugins.build import blamed
 from gear.plugins.catalogue import PluginEntry
+from gear.plugins.manager import DISTRIBUTION
 from gear.plugins.text import printable
 from gear.values.errors import GearError
 
@@ -108,10 +109,11 @@ def _refusal(
         return 0 if state is None else len(wanted.keys() & state.keys())
 
     best = max(candidates, key=shared)  # among equals the first, the most probable candidate
-    state, convert = best.state, _convert_of(found)
-    if convert is not None:
-        with blamed(found, "convert"):
-            state = convert(state)
+    translated = _translated(found, best)
+    if translated is None and found.owner.package != DISTRIBUTION:
+        with blamed(found, "convert"):  # raises the error of the plugin's function
+            translated = _convert_of(found)(best.state)
+    state = best.state if translated is None else translated
     name = found.spec.name
     hints = [f"options that change the graph are given by --set; gear plugins show {name}"]
     if not wanted.keys() & state.keys():

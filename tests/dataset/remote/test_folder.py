@@ -43,6 +43,18 @@ def test_files_are_written_and_read(remote: str) -> None:
     assert folder.names() == ["a"]
 
 
+@pytest.mark.parametrize(
+    "address",
+    ["file://{}/a", "local://{}/a", "file://a", "local://a", "dir::file://{}/a", "simplecache::file://{}/a",
+     "simplecache::local://{}/a", "simplecache::{}/a", "blockcache::dir::file://{}/a"],
+)  # fmt: skip
+def test_folders_of_this_machine_are_refused(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(DatasetError, match="is a folder of this machine; give its path"):
+        RemoteFolder(address.format(tmp_path)).write("b", b"1")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("relative", ["../x", "a/../../x", "/x", "a//x", "", "a\\..\\x"])
 def test_no_file_is_written_outside(relative: str, remote: str) -> None:
     with pytest.raises(DatasetError, match="is no path of a file in this folder"):

@@ -11,7 +11,7 @@ import torch
 
 from gear.networks.checkpoint_states import entries_of
 from gear.plugins.build import find
-from gear.values.errors import GearError
+from gear.values.errors import GearError, PluginError
 from gear.verbs.weights.choose import choose_state
 
 WANTED = {"a.weight": torch.zeros(2, 3), "b.bias": torch.zeros(4)}
@@ -56,3 +56,21 @@ def test_the_message_explains_what_does_not_fit() -> None:
     assert "b.bias" in str(caught.value)
     with pytest.raises(GearError, match=r"its keys are like 'x\.y', those of ddrnet23_slim like 'a\.weight'"):
         chosen({"x.y": torch.zeros(1)})
+
+
+@pytest.mark.parametrize("name", ["nanodet_coco", "ddrnet23_slim"])
+def test_keys_that_cannot_be_translated_are_one_line(name: str) -> None:
+    states = entries_of({"a.bn.running_var": torch.ones(4)}, PATH)
+    with pytest.raises(GearError, match=f"not weights of {name}") as caught:
+        choose_state(find("model", name), WANTED, states, PATH)
+    assert not isinstance(caught.value, PluginError) and "\n" not in str(caught.value)
+
+
+def test_a_failing_function_of_another_package_is_blamed() -> None:
+    def convert(state: Any) -> Any:
+        raise KeyError("theirs")
+
+    found = model()
+    found = replace(found, spec=replace(found.spec, convert=convert), owner=replace(found.owner, package="theirs"))
+    with pytest.raises(PluginError, match="failed at convert: KeyError"):
+        choose_state(found, WANTED, entries_of({"a": torch.ones(1)}, PATH), PATH)
