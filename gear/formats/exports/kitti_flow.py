@@ -11,7 +11,14 @@ from gear.contracts.tasks import Sidecar
 from gear.formats.driving.flow_png import ACTORS, FLOW, VISIBLE, decode_flow, encode_flow
 from gear.formats.driving.oxts import calibration_files
 from gear.formats.exports.layout import ExportSplit, Layout, NoOptions, Read, Tree
-from gear.formats.exports.sequences import TASKS, calibration_of, driving_splits, pictures_of, sequences_of
+from gear.formats.exports.sequences import (
+    TASKS,
+    calibration_of,
+    driving_splits,
+    explained_content,
+    pictures_of,
+    sequences_of,
+)
 from gear.formats.png import decode_plain, encode_labels
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image, UInt16Image
@@ -19,6 +26,7 @@ from gear.values.frames import UInt8Image, UInt16Image
 FOLDERS = {"left": "image_2", "right": "image_3"}
 
 
+@explained_content
 def kitti_flow_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
     """The files of the driving sequences of a dataset in the layout of KITTI's optical flow benchmark of 2015.
 

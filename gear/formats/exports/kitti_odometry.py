@@ -11,6 +11,7 @@ from gear.formats.exports.sequences import (
     TASKS,
     calibration_of,
     driving_splits,
+    explained_content,
     pictures_of,
     records_of,
     sequences_of,
@@ -20,6 +21,7 @@ from gear.formats.kitti_object import SCAN
 FOLDERS = {"left": "image_2", "right": "image_3"}
 
 
+@explained_content
 def kitti_odometry_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
     """The files of the driving sequences of a dataset in the layout of KITTI's odometry benchmark.
 

@@ -13,6 +13,7 @@ from gear.formats.exports.sequences import (
     TASKS,
     calibration_of,
     driving_splits,
+    explained_content,
     pictures_of,
     records_of,
     sequences_of,
@@ -22,13 +23,15 @@ from gear.formats.kitti_object import SCAN
 FOLDERS = {"left": "image_02", "right": "image_03"}
 
 
+@explained_content
 def kitti_raw_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
     """The files of the driving sequences of a dataset in the layout of KITTI's raw data (synchronised and
     rectified).
 
     A sequence is a drive `<date>/<date>_drive_<number>_sync` with `image_02`, `image_03` (of a stereo dataset),
     `velodyne_points` (if the dataset has laser scans) and `oxts`. Each split has a date of its own, with its three
-    calibration files, because splits may have different cameras.
+    calibration files, because splits may have different cameras. The dates follow each other, from the earliest date on
+    which a split was created.
 
     Args:
         splits: the finished splits of the dataset.
@@ -38,8 +41,10 @@ def kitti_raw_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOption
     Raises:
         DatasetError: the dataset has no driving sequence.
     """
-    for later, split in enumerate(driving_splits(splits, "kitti-raw")):
-        day = datetime.date.fromisoformat(split.info.created) + datetime.timedelta(days=later)
+    driving = driving_splits(splits, "kitti-raw")
+    first_day = min(datetime.date.fromisoformat(split.info.created) for split in driving)
+    for later, split in enumerate(driving):
+        day = first_day + datetime.timedelta(days=later)
         date = f"{day:%Y_%m_%d}"
         for number, sequence in enumerate(sequences_of(split), start=1):
             if number == 1:

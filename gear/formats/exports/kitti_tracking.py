@@ -12,6 +12,7 @@ from gear.formats.exports.layout import ExportSplit, Layout, NoOptions, Read, Tr
 from gear.formats.exports.sequences import (
     calibration_of,
     driving_splits,
+    explained_content,
     pictures_of,
     records_of,
     sequences_of,
@@ -23,6 +24,7 @@ FOLDERS = {"left": "image_02", "right": "image_03"}
 MAPS = {"training": "evaluate_tracking.seqmap.training", "testing": "evaluate_tracking.seqmap.test"}
 
 
+@explained_content
 def kitti_tracking_tree(splits: Sequence[ExportSplit], read: Read, _options: NoOptions) -> Tree:
     """The files of the driving sequences of a stereo3d dataset in the layout of KITTI's tracking benchmark.
 

@@ -9,7 +9,7 @@ from typing import Literal
 from gear.contracts.tasks import Sidecar
 from gear.formats.driving.tracks import MOT_CLASSES, mot_line, mot_sequence_info
 from gear.formats.exports.layout import ExportSplit, Layout, Read, Tree
-from gear.formats.exports.sequences import driving_splits, pictures_of, sequences_of
+from gear.formats.exports.sequences import driving_splits, explained_content, pictures_of, sequences_of
 from gear.values.frames import STATIC_OBJECT_BASE
 from gear.values.serial import Json
 
@@ -29,6 +29,7 @@ class MotOptions:
     boxes: Literal["amodal", "visible"] = "amodal"
 
 
+@explained_content
 def mot_tree(splits: Sequence[ExportSplit], read: Read, options: MotOptions) -> Tree:
     """The files of the driving sequences of a detect2d dataset in the layout of the MOTChallenge.
 

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import wraps
+from itertools import groupby, pairwise
+from typing import TypeVar
 
 from gear.contracts.tasks import Sidecar
 from gear.formats.cityscapes import paths as cityscapes_paths
-from gear.formats.exports.layout import ExportSplit
+from gear.formats.exports.layout import ExportSplit, Read, Tree
 from gear.formats.kitti_object import Calibration
 from gear.values.errors import DatasetError
 from gear.values.scene import SceneRecord
 
 TASKS = ("detect2d", "semseg", "stereo3d", "depth")
 """Tasks whose pictures `pictures_of` finds."""
+
+IMPOSSIBLE = (LookupError, TypeError, ValueError, ArithmeticError, AttributeError)
+"""Errors that impossible values of metadata cause."""
+
+LONGEST = 200
+"""Largest number of characters of such an error in a message."""
+
+Options = TypeVar("Options")
 
 
 def driving_splits(splits: Sequence[ExportSplit], layout: str) -> list[ExportSplit]:
@@ -39,9 +49,49 @@ def sequences_of(split: ExportSplit) -> Iterator[list[Sidecar]]:
 
     Args:
         split: the split.
+
+    Raises:
+        DatasetError: a sequence has fewer than two frames, its frames do not count from 0, or its times do not
+            increase.
     """
-    for _, group in groupby(split.sidecars, key=lambda sidecar: sidecar.record.sequence):
-        yield list(group)
+    for number, group in groupby(split.sidecars, key=lambda sidecar: sidecar.record.sequence):
+        sequence = list(group)
+        frames = [sidecar.record.frame for sidecar in sequence]
+        times_s = [sidecar.record.time_s for sidecar in sequence]
+        if len(sequence) < 2:
+            problem = "has one frame only; a driving sequence has at least two"
+        elif frames != list(range(len(sequence))):
+            problem = f"has frames that do not count from 0 to {len(sequence) - 1}"
+        elif not all(before < after for before, after in pairwise(times_s)):
+            problem = "has frames whose times do not increase"
+        else:
+            yield sequence
+            continue
+        raise DatasetError(f"split {split.info.split}", f"sequence {number} {problem}")
+
+
+def explained_content(
+    tree: Callable[[Sequence[ExportSplit], Read, Options], Tree],
+) -> Callable[[Sequence[ExportSplit], Read, Options], Tree]:
+    """Makes a function of a layout report impossible content of sidecars and label files in one line.
+
+    The files of a dataset may come from another person. The functions of layouts read the metadata of a task (`facts`),
+    which nothing has checked before.
+
+    Returns:
+        A function with the arguments of `tree` that raises `DatasetError` in place of the errors in `IMPOSSIBLE`.
+    """
+
+    @wraps(tree)
+    def explained(splits: Sequence[ExportSplit], read: Read, options: Options) -> Tree:
+        try:
+            yield from tree(splits, read, options)
+        except IMPOSSIBLE as error:
+            names = ", ".join(split.info.split for split in splits)
+            problem = f"holds impossible values ({repr(error)[:LONGEST]}); collect the split again"
+            raise DatasetError(f"split {names}", problem) from error
+
+    return explained
 
 
 def records_of(sequence: Sequence[Sidecar]) -> list[SceneRecord]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from gear.formats.exports.kitti_raw import kitti_raw_tree
 from gear.formats.exports.layout import NoOptions
 from tests.formats.driving.drives import circle, split_with
@@ -19,3 +21,12 @@ def test_each_sequence_is_a_drive() -> None:
     assert {path.split("/")[0] for path in files} == {"2022_01_01", "2022_01_02"}, "splits may have other cameras"
     assert "2022_01_02/calib_cam_to_cam.txt" in files
     assert not any("velodyne" in path for path in files), "there are no scans"
+
+
+def test_no_two_splits_have_the_same_date() -> None:
+    splits = [split_with(circle(2), "depth", split=name) for name in ("video_b", "video_a")]
+    dates = ("2022-01-02", "2022-01-01")
+    dated = [replace(one, info=replace(one.info, created=date)) for one, date in zip(splits, dates, strict=True)]
+    files = dict(kitti_raw_tree(dated, str.encode, NoOptions()))
+    pictures = {path.split("/")[0]: data.decode().split("/")[1] for path, data in files.items() if ".png" in path}
+    assert pictures == {"2022_01_01": "video_b", "2022_01_02": "video_a"}
