@@ -17,7 +17,7 @@ from gear.values.errors import DatasetError
 from gear.values.regular_file import read_regular
 
 __all__ = [
-    "clear_scratch", "explained", "inside", "read_bytes", "refuse_folder", "sha256", "streamed_alone", "sync_folder",
+    "clear_scratch", "explained", "inside", "named_alone", "read_bytes", "refuse_folder", "sha256", "streamed_alone", "sync_folder",
     "write_alone", "write_whole",
 ]  # fmt: skip
 
@@ -83,15 +83,26 @@ def streamed_alone(path: Path) -> Iterator[BinaryIO]:
     Raises:
         DatasetError: a file cannot be written, or the path is a folder.
     """
+    with named_alone(path) as temporary, os.fdopen(os.open(temporary, NEW, 0o666), "wb") as stream:
+        yield stream
+
+
+@contextlib.contextmanager
+def named_alone(path: Path) -> Iterator[Path]:
+    """A context that yields a hidden name in the folder of a file outside of datasets, for other packages that write
+    a file by its name; the file gets its own name when the context ends without an error.
+
+    Raises:
+        DatasetError: a file cannot be written, or the path is a folder.
+    """
     refuse_folder(path)
     with explained(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(8)}")
         try:
-            with os.fdopen(os.open(temporary, NEW, 0o666), "wb") as stream:
-                yield stream
-                stream.flush()
-                os.fsync(stream.fileno())
+            yield temporary
+            with temporary.open("rb") as written:
+                os.fsync(written.fileno())
             temporary.replace(path)
         except BaseException:  # Ctrl-C, too
             temporary.unlink(missing_ok=True)

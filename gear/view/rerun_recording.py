@@ -5,16 +5,14 @@ Needs the package rerun-sdk (extra `mujoco-gear[rerun]`).
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gear.contracts.tasks import Sample
-from gear.dataset.files import explained, refuse_folder
+from gear.dataset.files import named_alone
 from gear.dataset.reading import Dataset
-from gear.dataset.scratch import unique_name
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import GearError
 from gear.values.scene import CameraRecord, SceneRecord
@@ -60,20 +58,9 @@ def to_rerun(
         recording.spawn()
         _log(rerun, recording, opened, samples)
         return recording
-    target = Path(out)
-    refuse_folder(target)
-    unfinished = target.with_name(f".{unique_name()}-{target.name}")
-    with explained(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            recording.save(str(unfinished))
-            _log(rerun, recording, opened, samples)
-            with unfinished.open("rb") as written:
-                os.fsync(written.fileno())
-            unfinished.replace(target)
-        except BaseException:  # Ctrl-C, too
-            unfinished.unlink(missing_ok=True)
-            raise
+    with named_alone(Path(out)) as unfinished:
+        recording.save(str(unfinished))
+        _log(rerun, recording, opened, samples)
     return recording
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gear.dataset.files import clear_scratch, inside, write_alone, write_whole
+from gear.dataset.files import clear_scratch, inside, named_alone, write_alone, write_whole
 from gear.values.errors import DatasetError
 
 
@@ -18,6 +18,19 @@ def test_a_file_appears_whole_and_leaves_nothing_beside_it(tmp_path: Path) -> No
     assert [p.name for p in (tmp_path / "a/b").iterdir()] == ["c.bin"]
     clear_scratch(tmp_path)
     assert not (tmp_path / "gear/scratch").exists()
+
+
+def test_a_file_of_another_package_has_its_name_only_when_it_is_complete(tmp_path: Path) -> None:
+    path = tmp_path / "new/a"
+    with named_alone(path) as unfinished:
+        unfinished.write_bytes(b"1")
+        assert not path.exists()
+    with pytest.raises(KeyboardInterrupt), named_alone(path) as unfinished:
+        unfinished.write_bytes(b"2")
+        raise KeyboardInterrupt
+    assert path.read_bytes() == b"1" and [one.name for one in path.parent.iterdir()] == ["a"]
+    with pytest.raises(DatasetError, match="is a folder"), named_alone(tmp_path):
+        pass
 
 
 @pytest.mark.parametrize("relative", ["/etc/passwd", "../x", "a/../../x", "", "a\\b", "a\0b"])
