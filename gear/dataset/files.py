@@ -17,8 +17,8 @@ from gear.values.errors import DatasetError
 from gear.values.regular_file import read_regular
 
 __all__ = [
-    "clear_scratch", "explained", "inside", "named_alone", "read_bytes", "refuse_folder", "sha256", "streamed_alone", "sync_folder",
-    "write_alone", "write_whole",
+    "clear_scratch", "explained", "inside", "named_alone", "read_bytes", "refuse_folder", "sha256", "streamed_alone",
+    "sync_folder", "write_alone", "write_whole",
 ]  # fmt: skip
 
 TRIES = 100
