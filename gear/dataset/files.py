@@ -92,6 +92,9 @@ def named_alone(path: Path) -> Iterator[Path]:
     """A context that yields a hidden name in the folder of a file outside of datasets, for other packages that write
     a file by its name; the file gets its own name when the context ends without an error.
 
+    Args:
+        path: path of the file.
+
     Raises:
         DatasetError: a file cannot be written, or the path is a folder.
     """

@@ -199,6 +199,10 @@ def remove_tree(root: Path, relative: str) -> None:
 def empty_tree(root: Path, relative: str) -> None:
     """Deletes everything in a folder below the root; links in the folder are deleted and not followed.
 
+    Args:
+        root: folder that is opened even if it is a link.
+        relative: path of the folder, relative to the root.
+
     Raises:
         DatasetError: a component of the path is a link, or a file cannot be deleted.
     """

@@ -78,6 +78,9 @@ def explained_content(
     The files of a dataset may come from another person. The functions of layouts read the metadata of a task (`facts`),
     which nothing has checked before.
 
+    Args:
+        tree: function that yields the files of a layout.
+
     Returns:
         A function with the arguments of `tree` that raises `DatasetError` in place of the errors in `IMPOSSIBLE`.
     """
