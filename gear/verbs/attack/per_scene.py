@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -25,6 +27,9 @@ from gear.verbs.attack.folder import NOTES, read_patches
 from gear.verbs.attack.report import AttackReport
 from gear.verbs.attack.request import AttackRequest
 from gear.verbs.attack.run import Paths, as_tuple, run_attack
+
+MOST_CHARACTERS = 100
+"""Largest number of characters that a folder's name takes from the names of a town and a scene."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,8 +151,24 @@ def _by_scene(paths: Sequence[str | Path]) -> dict[str, list[str]]:
         folder, split = root_and_split(path)
         for root in roots_of(folder) or [folder]:
             info = plan_of(root, split or splits_of(root)[0]).info
-            found.setdefault(f"{info.town}-{info.scene}", []).append(f"{root}:{split}" if split else str(root))
+            found.setdefault(folder_name(info.town, info.scene), []).append(f"{root}:{split}" if split else str(root))
     return found
+
+
+def folder_name(town: str, scene: str) -> str:
+    """Returns the name of a scene's patch folder: `<town>-<scene>` as one safe part of a path.
+
+    Both texts come from a dataset, which may be a stranger's. If a character had to be replaced, or the name had to be
+    cut, the first digits of its SHA-256 are appended, so names of different scenes stay different.
+
+    Args:
+        town: name of the town in the dataset.
+        scene: name of the scene in the dataset.
+    """
+    name = f"{town}-{scene}"
+    safe = re.sub(r"[^A-Za-z0-9_.+:-]", "_", name)[-MOST_CHARACTERS:].lstrip(".")
+    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()
+    return safe if safe == name else f"{safe}-{digest[:8]}"
 
 
 def run_attack_scenes(request: AttackRequest, engine: Engine, callbacks: Callbacks) -> dict[str, AttackReport]:

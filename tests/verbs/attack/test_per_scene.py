@@ -14,7 +14,7 @@ from gear.dataset.executors.in_process import InThisProcess
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.values.errors import GearError
 from gear.verbs.attack import per_scene
-from gear.verbs.attack.per_scene import Engine
+from gear.verbs.attack.per_scene import Engine, folder_name
 from tests.verbs.attack.conftest import SMALL
 from tests.verbs.conftest import Small, put_package
 
@@ -93,3 +93,21 @@ def test_a_single_worker_is_this_process() -> None:
     assert isinstance(Engine().opened(0), InThisProcess)
     with pytest.raises(GearError, match="engine_workers must be at least 1"):
         Engine(workers=0)
+
+
+def test_names_of_strangers_lead_to_no_other_folder(tmp_path: Path) -> None:
+    assert folder_name("town10", "my.yml:corner") == "town10-my.yml:corner"
+    names = [
+        ("/tmp/x", "board"),
+        ("..", "../../x"),
+        ("a\x1b[2J", "b\ud800"),
+        ("t" * 300, "s"),
+        ("t" * 301, "s"),
+        (".", "x"),
+    ]
+    made = [folder_name(*one) for one in names]
+    for name in made:
+        assert (tmp_path / name).parent == tmp_path and name.isprintable() and not name.startswith(".")
+        assert len(name) <= 120 and "/" not in name
+    assert len(set(made)) == len(made)
+    assert folder_name("a/b", "c") != folder_name("a_b", "c")
