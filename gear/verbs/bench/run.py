@@ -34,7 +34,7 @@ from gear.verbs.bench.all_metrics import COLUMNS as METRIC_COLUMNS
 from gear.verbs.bench.all_metrics import metric_records
 from gear.verbs.bench.carry_out import carry_out
 from gear.verbs.bench.chart import chart
-from gear.verbs.bench.config import BenchConfig
+from gear.verbs.bench.config import BenchConfig, settings_of
 from gear.verbs.bench.latex import document, tabular
 from gear.verbs.bench.page import page
 from gear.verbs.bench.paper_tables import paper_tables
@@ -45,7 +45,7 @@ from gear.verbs.bench.request import BenchRequest
 from gear.verbs.bench.scenes import calibration_scene, located, measured_scenes
 from gear.verbs.bench.schedule import OnStep, run_steps
 from gear.verbs.bench.table import text
-from gear.verbs.bench.validation import find_attack, plugins_of_tasks
+from gear.verbs.bench.validation import check_collect, find_attack, plugins_of_tasks
 from gear.verbs.evaluate.report import EvaluateReport
 
 CONFIG = "bench.yml"
@@ -258,9 +258,16 @@ def _check_pictures(plan: Plan, node: Node) -> None:
     """Checks the collection settings and task options of all tasks before the first step runs.
 
     Raises:
-        ConfigError: a key cannot be read, a weather is unknown, or a network expects another camera.
+        ConfigError: a key cannot be read or is decided by the benchmark, a weather is unknown, or a network expects
+            another camera.
     """
     for task_plugins in plan.plugins_of_tasks:
+        own = plan.config.tasks[task_plugins.name].collect
+        for collect, key in ((plan.config.collect, ("collect",)), (own, ("tasks", task_plugins.name, "collect"))):
+            try:
+                check_collect(task_plugins.name, settings_of(collect))
+            except GearError as error:
+                raise located(node, error, *key) from error
         for weather in plan.weathers:
             settings = (*plan.picture_settings(task_plugins), *weather.settings)
             try:

@@ -4,9 +4,10 @@ together.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from gear.config.load import load_collection
 from gear.config.nodes import Node
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
@@ -18,6 +19,23 @@ from gear.values.errors import GearError
 from gear.verbs.attack.models import check_attack
 from gear.verbs.bench.config import BenchConfig, PluginConfig, settings_of
 from gear.verbs.bench.scenes import located
+
+DECIDED = {
+    "task": "tasks",
+    "town": "places",
+    "scene": "places",
+    "scenes": "places",
+    "weather": "weathers",
+    "samples": "samples",
+    "seed": "seed",
+    "split": "",
+    "root": "",
+    "patch": "",
+    "patch_seed": "",
+    "probes": "",
+}
+"""Keys of a collection that a benchmark decides, each with the key of the bench config that decides it; empty where the
+benchmark alone does."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -186,3 +204,25 @@ def _check(one: TaskPlugins, attack: PluginEntry, config: BenchConfig, node: Nod
                 "`calibration: {town: town10, scene: billboard03}`"
             )
             raise located(node, GearError(problem), *at, "defenses", defense.label)
+
+
+def check_collect(task: str, settings: Iterable[str]) -> None:
+    """Checks that the collection settings of a benchmark leave alone what the benchmark decides, such as the folder of
+    the pictures or their seed.
+
+    The parsed config is checked, not the texts, so it does not matter how a key is spelled.
+
+    Args:
+        task: name of the task plugin.
+        settings: `KEY=VALUE` texts of `collect`.
+
+    Raises:
+        GearError: a setting cannot be read, or sets a key that the benchmark decides.
+    """
+    flag = "task"
+    unset = load_collection(None, {flag: task}).places[flag]
+    places = load_collection(None, {flag: task}, settings).places
+    for key, decided_by in DECIDED.items():
+        if key in places and not (key == flag and places[key] == unset):
+            instead = f"; it follows from the key {decided_by!r} of the bench config" if decided_by else ""
+            raise GearError(f"{key!r} is decided by the benchmark, so collect must not set it{instead}")

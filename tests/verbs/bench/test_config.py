@@ -61,6 +61,7 @@ def prepared(config: str | Path, *, out: Path, **given: Any) -> Plan:
             r"bench\.yml:9:7: .*fpda: .*layer: expected str",
         ),
         ("quality: fast", "qualty: fast", r"bench\.yml:.*did you mean 'quality'"),
+        ("quality: fast", "root: thesis", r"bench\.yml:\d+:1: collect: 'root' is decided by the benchmark"),
         ("width_px: 256", "width_px: 7", r"bench\.yml:.*width_px"),
         ("samples:", "weathers: [ClearNon]\nsamples:", r"did you mean ClearNoon"),
     ],
