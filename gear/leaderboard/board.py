@@ -8,7 +8,7 @@ from typing import Literal
 
 from gear.leaderboard.reading import Filed
 from gear.leaderboard.record import Figure
-from gear.leaderboard.rules import faults, harm, robust_figures, warnings, worst
+from gear.leaderboard.rules import faults, harm, is_transfer, robust_figures, warnings, worst
 from gear.leaderboard.verdict import Verdict
 
 State = Literal["claimed", "reproduced", "broken"]
@@ -77,13 +77,13 @@ def tables(records: Iterable[Filed], verdicts: Mapping[str, Verdict]) -> list[Ta
     Returns:
         The tables, one per benchmark, task and ranked metric; their rows have state, faults and warnings.
     """
-    grouped: dict[tuple[str, str, str], list[Filed]] = {}
+    grouped: dict[tuple[str, str, str, bool], list[Filed]] = {}
     for one in records:
         entry = one.record.entry
-        grouped.setdefault((one.record.benchmark.data_key, entry.task, entry.metric), []).append(one)
+        key = (one.record.benchmark.data_key, entry.task, entry.metric, entry.lower_is_better)
+        grouped.setdefault(key, []).append(one)
     found = []
-    for (data_key, task, metric), members in sorted(grouped.items(), key=lambda item: item[0]):
-        less = members[0].record.entry.lower_is_better
+    for (data_key, task, metric, less), members in sorted(grouped.items(), key=lambda item: item[0]):
         rows: dict[tuple[object, ...], list[Filed]] = {}
         for one in members:
             rows.setdefault(one.record.entry.row, []).append(one)
@@ -120,7 +120,9 @@ def _row(members: Sequence[Filed], verdicts: Mapping[str, Verdict], *, lower_is_
     counted = reproduced or standing or own
     foreign = [one for one in members if one.record.entry.kind == "attack"]
     attacks = [one for one in foreign if state(one) == "reproduced"]
-    figures = [(figure, one) for one in [*counted, *attacks] for figure in robust_figures(one.record)]
+    figures = [(figure, one) for one in counted for figure in robust_figures(one.record)]
+    # No check can measure the patches of other networks again, so they count only against their own author.
+    figures += [(f, one) for one in attacks for f in robust_figures(one.record) if not is_transfer(f.patch)]
     lowest = worst([figure for figure, _ in figures], lower_is_better=lower_is_better)
     found = next(((figure, one) for figure, one in figures if figure is lowest), None)
     is_broken = not standing or (found is not None and found[1] in attacks and _gains_nothing(found, counted[0]))

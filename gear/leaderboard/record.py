@@ -29,7 +29,7 @@ PLUGIN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*(/[a-z][a-z0-9_]*)?")
 """Pattern of a plugin's name, which may be preceded by its package."""
 
 LONGEST_TEXT = 300
-MOST_DATASETS, MOST_SAMPLES, MOST_RESULTS = 4_000, 20_000, 4_000
+MOST_DATASETS, MOST_SAMPLES, MOST_RESULTS, MOST_KINDS = 4_000, 20_000, 4_000, 64
 
 Kind = Literal["model", "defense", "attack"]
 """What a record claims: the results of a network alone, the results of a defense, or an attack against a row of others.
@@ -80,11 +80,11 @@ class Plugin:
                 check_sha256(field, getattr(self, field))
 
     @property
-    def identity(self) -> tuple[str, str, str, str]:
-        """Name, package, version, and hash of the options; plugins that agree in these belong to the same row of the
-        leaderboard.
+    def identity(self) -> tuple[str, str, str, str, str | None]:
+        """Name, package, version, and hashes of the options and of the weights; plugins that agree in these belong to
+        the same row of the leaderboard.
         """
-        return self.name, self.package, self.version, digest(self.options)
+        return self.name, self.package, self.version, digest(self.options), self.weights_sha256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -329,13 +329,13 @@ class Record:
         entry: network and defense.
         attack: the attack that made the patches.
         environment: versions of packages, renderer and device, by name.
-        data: datasets on which the entry was measured.
+        data: datasets on which the entry was measured; at most 64 kinds of patches.
         calibration: datasets on which the defense was calibrated; empty for a defense without calibration.
         patches: patches of each scene and each attacked target.
         results: numbers of the entry: its metrics for each kind of patch.
         reference: the same numbers of the network without a defense.
         sample_metric: name of the metric of single samples in `samples`.
-        samples: results of single samples.
+        samples: results of single samples: each sample of each dataset once.
         cost_s: mean seconds per picture, of `model` and `defense`.
         checked_by: always empty: a record cannot say that it was checked.
     """
@@ -371,6 +371,11 @@ class Record:
         for number, one in enumerate(self.samples):
             if one.data >= len(self.data) or one.index >= self.data[one.data].samples:
                 raise FieldError(f"samples[{number}]", "is a sample of a dataset that is not listed")
+        each = {(one.data, one.index) for one in self.samples}
+        if not len(self.samples) == len(each) == sum(one.samples for one in self.data):
+            raise FieldError("samples", "must hold every sample of every dataset exactly once")
+        if len(self.kinds()) > MOST_KINDS:
+            raise FieldError("data", f"has more than {MOST_KINDS} kinds of patches")
         counted = {kind: sum(one.samples for one in self.data if one.patch == kind) for kind in self.kinds()}
         for figure in self.results:
             if figure.n != counted.get(figure.patch):

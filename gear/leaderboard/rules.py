@@ -13,6 +13,9 @@ from gear.leaderboard.record import Figure, Record
 
 NONE, RANDOM, PATCH, ADAPTIVE = "none", "random", "patch", "adaptive patch"
 
+TRANSFER = f"{PATCH} of "
+"""Beginning of the kinds of patches that were optimised against another network, followed by its name."""
+
 MOST_CLEAN_LOSS = 0.02
 """Largest loss on clean pictures: two points of a metric in 0..1, or 2 % of an error."""
 
@@ -21,6 +24,11 @@ SEEDS = 3
 
 LEAST_KEPT = 0.5
 """Share of the predicted rise of an objective along its gradient below which gradients count as masked."""
+
+
+def is_transfer(kind: str) -> bool:
+    """Whether a kind of patch was optimised against another network; a record does not hold such patches."""
+    return kind.startswith(TRANSFER)
 
 
 def robust_figures(record: Record) -> list[Figure]:

@@ -43,7 +43,7 @@ class Verdict:
 
     Attributes:
         record_sha256: SHA-256 of the record's file.
-        state: `reproduced`, `differs`, or `incomplete` if the check could not measure anything.
+        state: `reproduced`, `differs`, or `incomplete` if the check did not compute the ranked metric again.
         seed: seed by which the check chose samples.
         repeated, fresh: number of samples that were measured again, and of samples that are not part of the benchmark.
         environment: versions, renderer and device of the check.

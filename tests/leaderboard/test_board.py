@@ -69,3 +69,19 @@ def test_other_data_make_another_table() -> None:
 
 def test_an_attack_alone_makes_no_row() -> None:
     assert rows([attacking(record(), 0.1)]) == []
+
+
+def test_a_record_that_turns_the_metric_around_is_ranked_apart() -> None:
+    turned = record(entry={"lower_is_better": True, "defense": plugin("turned")})
+    worse = record({**VALUES, "adaptive patch": 0.1}, entry={"defense": plugin("worse")})
+    found = tables([filed(turned), filed(record()), filed(worse)], {})
+    assert [(table.lower_is_better, len(table.rows)) for table in found] == [(False, 2), (True, 1)]
+    assert [value(row) for row in found[0].rows] == [0.5, 0.1]
+
+
+def test_patches_of_other_networks_count_only_against_their_author() -> None:
+    own, other = record(), attacking(record({**VALUES, "patch of other": 0.01}), 0.55)
+    (row,) = rows([own, other], verdict(other))
+    assert value(row) == 0.5 and row.state == "claimed"
+    (row,) = rows([record({**VALUES, "patch of other": 0.01})])
+    assert value(row) == 0.01

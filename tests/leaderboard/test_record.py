@@ -9,7 +9,7 @@ import pytest
 
 from gear.leaderboard.record import Benchmark, Figure, check_plain, digest
 from gear.values.errors import FieldError
-from tests.leaderboard.conftest import benchmark, plugin, record
+from tests.leaderboard.conftest import benchmark, plugin, record, sha
 
 
 def test_a_sound_record_passes() -> None:
@@ -58,6 +58,9 @@ def test_contradictions_are_refused() -> None:
         replace(one, results=(*one.results, one.results[0]))
     with pytest.raises(FieldError, match="not listed"):
         replace(one, samples=(replace(one.samples[0], index=99),))
+    for samples in (one.samples[1:], (*one.samples[1:], one.samples[1]), (*one.samples, one.samples[0]), ()):
+        with pytest.raises(FieldError, match="every sample of every dataset exactly once"):
+            replace(one, samples=samples)
     with pytest.raises(FieldError, match="hash of the config"):
         Benchmark(name="x", config={"seed": 1}, sha256=digest({"seed": 2}))
     with pytest.raises(FieldError, match="kind"):
@@ -67,3 +70,16 @@ def test_contradictions_are_refused() -> None:
 def test_comparable_benchmarks_have_one_key() -> None:
     assert benchmark().data_key == benchmark(seed=4, attack={"steps": 9}).data_key
     assert benchmark().data_key != benchmark(samples={"measure": 400}).data_key
+
+
+def test_kinds_of_patches_are_limited() -> None:
+    with pytest.raises(FieldError, match="more than 64 kinds of patches"):
+        record({f"patch of net{number}": 0.5 for number in range(65)}, results=())
+    assert len(record({f"patch of net{number}": 0.5 for number in range(64)}).kinds()) == 64
+
+
+def test_other_weights_are_another_row() -> None:
+    one, other = (record(entry={"network": plugin("net", weights_sha256=sha(name))}) for name in ("a", "b"))
+    assert one.entry.row != other.entry.row
+    guard = plugin("guard", weights_sha256=sha("a"))
+    assert record(entry={"defense": guard}).entry.row != record().entry.row

@@ -42,7 +42,7 @@ from gear.values.errors import FieldError, GearError
 from gear.values.serial import Json
 from gear.verbs.bench.config import settings_of
 from gear.verbs.bench.plan import PATCH, Plan, PlannedEvaluation
-from gear.verbs.bench.report import FOUND_SHARE, BenchReport, Result, TaskResult
+from gear.verbs.bench.report import FOUND_SHARE, BenchReport, Metric, Result, TaskResult
 from gear.verbs.bench.validation import TaskPlugins
 from gear.verbs.evaluate.report import Pool
 from gear.verbs.evaluate.table import metric_title
@@ -270,7 +270,7 @@ def _samples(
 ) -> tuple[tuple[Data, ...], tuple[SampleResult, ...], str]:
     """The datasets, the results of all their samples, and the name of the metric of single samples."""
     places = [(kind, *place) for kind in planned.pools for place in plan.places()]
-    metric = sample_metric(task, one.evaluation.rows[0].per_sample[0]["metrics"])
+    metric = sample_metric(task.metric, one.evaluation.rows[0].per_sample[0]["metrics"])
     data, samples = [], []
     for number, ((kind, scene, weather), row, dataset) in enumerate(
         zip(places, one.evaluation.rows, datasets, strict=True)
@@ -295,10 +295,15 @@ def files_sha256(hashes: Json) -> str:
     return sha256(canonical(dict(hashes)))
 
 
-def sample_metric(task: TaskResult, metrics: Json) -> str:
-    """The name of the metric of single samples that records hold; empty if the task has none."""
+def sample_metric(ranked: Metric | None, metrics: Json) -> str:
+    """The name of the metric of single samples that records hold; empty if the task has none.
+
+    Args:
+        ranked: the task's ranked metric; None if it has none.
+        metrics: metrics of one sample by report and name.
+    """
     named = metrics.get(TASK, {})
-    wanted = ("" if task.metric is None else task.metric.name, FOUND_SHARE, *named)
+    wanted = ("" if ranked is None else ranked.name, FOUND_SHARE, *named)
     return next((name for name in wanted if name in named), "")
 
 

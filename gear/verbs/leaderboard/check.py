@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from gear.collecting.job import versions
+from gear.contracts.specs import DefenseSpec
 from gear.dataset.files import write_whole
 from gear.leaderboard.package_facts import printable
 from gear.leaderboard.reading import Filed, read_record
@@ -28,8 +29,9 @@ from gear.verbs.leaderboard.compare import (
     compare_withheld,
     is_same_machine,
 )
+from gear.verbs.leaderboard.figures import compare_figures
 from gear.verbs.leaderboard.request import CheckRequest
-from gear.verbs.leaderboard.rerun import Again, Rerun
+from gear.verbs.leaderboard.rerun import Again, Rerun, check_data
 from gear.verbs.leaderboard.withheld import Withheld, read_withheld
 
 FRESH_PLACES = 3
@@ -58,7 +60,8 @@ def check_record(
 
     Repeated samples must give the same predictions on the same kind of machine, and metrics within a tolerance
     elsewhere. Fresh samples, with a seed that is not part of the benchmark, must give metrics of the same distribution.
-    Nothing in the record is run; its plugins must be installed.
+    The ranked metric is computed again if all samples of the benchmark are repeated, or if it is the mean of the values
+    of the samples; otherwise the verdict is `incomplete`. Nothing in the record is run; its plugins must be installed.
 
     Args:
         record: file of the record.
@@ -115,6 +118,7 @@ def run_check(request: CheckRequest, callbacks: Callbacks) -> Verdict:
     secret = None if request.withheld is None else read_withheld(Path(request.withheld), request.commitment)
     patches = Path(request.patches) if request.patches is not None else filed.path.parent / "patches"
     rerun = Rerun(record, Path(request.work), patches, request.settings, request.device)
+    check_data(record, places=len(rerun.plan.places()), samples=rerun.plan.config.samples.measure)
     chosen = _chosen(record, request)
     _refuse_many(rerun, chosen, request)
     count = _Counter(callbacks.on_progress, (len(chosen) + request.fresh) * len(_kinds(rerun)))
@@ -128,11 +132,13 @@ def run_check(request: CheckRequest, callbacks: Callbacks) -> Verdict:
     environment = _environment(rerun)
     found += compare_repeated(record, again, is_same=is_same_machine(record, environment))
     found += _compare_built(rerun, record)
+    figures = compare_figures(record, again, rerun.ranked)
+    found += figures.findings
     if request.fresh:
         found += _fresh(rerun, request, secret, count)
     verdict = Verdict(
         record_sha256=filed.sha256,
-        state=_state(found, again),
+        state=_state(found, is_whole=bool(again) and figures.is_whole),
         seed=request.seed,
         repeated=len(again),
         fresh=request.fresh * len(_kinds(rerun)),
@@ -198,12 +204,28 @@ def _static(record: Record) -> Iterator[Finding]:
 
 
 def _compare_built(rerun: Rerun, record: Record) -> Iterator[Finding]:
-    """Yields findings about the built network and the randomness of the defense."""
+    """Yields findings about the task's metrics, the built network, and the defense's gradient and randomness."""
+    entry, metric = record.entry, rerun.metric
+    title, lower = ("", False) if metric is None else (metric.title, metric.lower_is_better)
+    if (entry.task, entry.metric) != (rerun.planned.task_plugins.name, title):
+        yield finding(
+            "differs", f"{entry.task} by {entry.metric} in the record, the installed task is ranked by {title}"
+        )
+    if entry.lower_is_better != lower:
+        yield finding("differs", f"{entry.metric}: the record and the task disagree on whether lower is better")
+    if rerun.sample_metrics - {record.sample_metric}:
+        names = ", ".join(sorted(rerun.sample_metrics))
+        yield finding(
+            "differs", f"samples: measured by {names or 'nothing'}, not by {record.sample_metric or 'nothing'}"
+        )
     weights = rerun.guarded().weights_sha256
     if weights != record.entry.network.weights_sha256:
         yield finding("differs", "network: other weights than in the record")
     if rerun.planned.defense is None:
         return
+    spec = rerun.planned.defense.chosen.found.spec
+    if isinstance(spec, DefenseSpec) and spec.gradient != entry.gradient:
+        yield finding("differs", f"defense: its gradient is {spec.gradient}, the record says {entry.gradient}")
     if rerun.guarded().is_random(rerun.pictures) and not record.entry.is_random:
         yield finding("differs", "defense: its results depend on its random generator, the record says they do not")
 
@@ -238,7 +260,7 @@ def _environment(rerun: Rerun) -> dict[str, str]:
     return {key: printable(str(value)) for key, value in (facts | versions() | torch | own).items()}
 
 
-def _state(found: Sequence[Finding], again: Sequence[Again]) -> State:
+def _state(found: Sequence[Finding], *, is_whole: bool) -> State:
     if any(one.level == "differs" for one in found):
         return "differs"
-    return "reproduced" if again else "incomplete"
+    return "reproduced" if is_whole else "incomplete"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,16 +18,18 @@ from gear.dataset.plan import read_plan
 from gear.dataset.reading import Dataset
 from gear.dataset.shards import Picked, Shard
 from gear.leaderboard.reading import limited
-from gear.leaderboard.record import Data, Plugin, Record
+from gear.leaderboard.record import Data, PatchFacts, Plugin, Record
 from gear.measuring.guard import UNGUARDED, open_guard
 from gear.measuring.guarded_model import GuardedModel
 from gear.measuring.reports import TASK
 from gear.measuring.scoring import Scorer
+from gear.measuring.statistics import AnyEvaluator
 from gear.plugins.datasets import open_dataset, task_of
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
-from gear.verbs.bench.plan import RANDOM, SPLITS, Plan, Step
-from gear.verbs.bench.recording import files_sha256, guard_of, plugin_facts
+from gear.verbs.bench.plan import RANDOM, SPLITS, Plan, PlannedEvaluation, Step
+from gear.verbs.bench.recording import files_sha256, guard_of, plugin_facts, sample_metric
+from gear.verbs.bench.report import Metric
 from gear.verbs.bench.request import BenchRequest
 from gear.verbs.bench.run import prepared
 from gear.verbs.collect.request import CollectRequest
@@ -47,6 +50,7 @@ class Again:
         sha256: hash over the files of the prediction.
         value: metric of the sample; None if it is undefined.
         score: the defense's score; None without a score.
+        part: evaluator of the ranked metric that holds this sample alone; None if the task has no ranked metric.
     """
 
     patch: str
@@ -56,6 +60,7 @@ class Again:
     sha256: str
     value: float | None
     score: float | None
+    part: AnyEvaluator | None = None
 
 
 class Rerun:
@@ -68,6 +73,8 @@ class Rerun:
         network, defense: facts about the installed plugins; `defense` is None without a defense.
         pictures: (H, W, 3) uint8 pictures by camera name of the sample that was measured last.
         renderer: name, driver and device of the renderer that made them.
+        metric: the task's ranked metric; None if it has none.
+        sample_metrics: names of the metric of single samples, as the installed task states them.
     """
 
     def __init__(
@@ -83,7 +90,8 @@ class Rerun:
             device: device of the networks; None for that of the config.
 
         Raises:
-            GearError: a plugin is not installed, the config does not fit, or a patch is missing.
+            GearError: a plugin is not installed, the config does not fit, or it names several tasks, networks or
+                defenses.
         """
         self.record, self._work, self._patches = record, work, patches
         refuse_enormous(record.benchmark.config)
@@ -91,11 +99,11 @@ class Rerun:
         asked = tuple(settings)
         self.plan = _plan(work / "bench.yml", work / "bench", asked, device)
         self._asked, self._device = asked, device
-        (task_plugins,) = self.plan.plugins_of_tasks
-        guarded = record.entry.defense is not None
-        self.planned = next(
-            one for one in self.plan.planned_evaluations(task_plugins) if (one.defense is not None) == guarded
-        )
+        self.planned = only_evaluation(self.plan, guarded=record.entry.defense is not None)
+        spec = self.planned.task_plugins.task
+        self.metric = Metric.of(spec.metric, lower_is_better=spec.lower_is_better) if spec.metric else None
+        self.sample_metrics: set[str] = set()
+        self._make: Callable[[], AnyEvaluator] | None = None
         self.network = plugin_facts(self.planned.model.chosen)
         self.defense = None if self.planned.defense is None else plugin_facts(self.planned.defense.chosen)
         self.pictures: Mapping[str, UInt8Image] = {}
@@ -134,6 +142,17 @@ class Rerun:
                 opened = open_guard(guard, [chosen], self.planned.task_plugins.name)
             self._guarded[with_defense] = GuardedModel(chosen, opened, seed=self.plan.config.seed)
         return self._guarded[with_defense]
+
+    def ranked(self, again: Sequence[Again]) -> float | None:
+        """The ranked metric over some samples together; None if it is undefined."""
+        if self.metric is None or self._make is None:
+            return None
+        whole = self._make()
+        for one in again:
+            if one.part is not None:
+                whole.merge(one.part)
+        value = whole.result().get(self.metric.name)
+        return value if value is not None and math.isfinite(value) else None
 
     def pictures_of_calibration(self) -> int:
         """The number of pictures on which the defense is calibrated."""
@@ -187,13 +206,11 @@ class Rerun:
             settings: `KEY=VALUE` settings of the bench config that name the other places.
 
         Raises:
-            GearError: a place does not exist, or has more surfaces than the first scene.
+            GearError: a place does not exist, or has more surfaces than the first scene, or no patches are named.
         """
         other = Rerun(self.record, self._work / "withheld", self._patches, (*self._asked, *settings), self._device)
-        first = next(one for one in self.record.patches if one.target == self.planned.model.label)
-        shown = [one for one in self.record.patches if one.scene == first.scene]
-        facts = [replace(one, scene=scene.label) for scene in other.plan.scenes for one in shown]
-        other.record = replace(self.record, patches=(*facts, *self.record.patches))
+        moved = moved_patches(self.record, self.planned.model.label, [scene.label for scene in other.plan.scenes])
+        other.record = replace(self.record, patches=(*moved, *self.record.patches))
         return other
 
     def _calibration(self) -> None:
@@ -233,7 +250,10 @@ class Rerun:
     def _measured(
         self, dataset: Dataset[Any], patch: str, place: int, indices: Sequence[int], guarded: GuardedModel
     ) -> list[Again]:
-        scorer = Scorer(dataset, self._work, "scores", (), guarded.plugin)
+        more = () if self.metric is None or self.metric.report == TASK else (self.metric.report,)
+        scorer = Scorer(dataset, self._work, "scores", more, guarded.plugin)
+        if self.metric is not None:
+            self._make = scorer.reports[self.metric.report].make
         found = []
         self.renderer = dataset.content(dict, "renderer")
         for index in indices:
@@ -241,6 +261,7 @@ class Rerun:
             self.pictures = sample.images
             (answer,) = guarded.predict([sample.images], [index])
             result = scorer.score(index, sample, answer).result
+            self.sample_metrics.add(sample_metric(self.metric, result.metrics))
             value = result.metrics.get(TASK, {}).get(self.record.sample_metric)
             found.append(
                 Again(
@@ -251,6 +272,7 @@ class Rerun:
                     sha256=files_sha256(result.sha256),
                     value=None if value is None or value != value else value,
                     score=result.score,
+                    part=None if self.metric is None else result.parts[self.metric.report],
                 )
             )
         return found
@@ -272,6 +294,66 @@ class Rerun:
             if sha256(data) != digest:
                 raise GearError(f"{self._patches / digest}.png: is not the patch of that hash")
             write_whole(folder, f"patch_{number}.png", data)
+
+
+def check_data(record: Record, *, places: int, samples: int) -> None:
+    """Checks that a record has as many datasets and samples as its config makes.
+
+    Args:
+        record: the record.
+        places: number of (scene, weather) pairs of the config.
+        samples: number of samples of each dataset in the config.
+
+    Raises:
+        GearError: a kind of patch has another number of datasets, or a dataset has another number of samples.
+    """
+    for kind in record.kinds():
+        found = [one.samples for one in record.data if one.patch == kind]
+        if found != [samples] * places:
+            made = f"{places} datasets of {samples} samples"
+            raise GearError(f"the record's config makes {made} with {kind}, the record has {_numbers(found)}")
+
+
+def _numbers(samples: Sequence[int]) -> str:
+    shown = ", ".join(map(str, samples[:4]))
+    return f"{len(samples)} of {shown}{' and more' if len(samples) > 4 else ''} samples"
+
+
+def moved_patches(record: Record, target: str, scenes: Sequence[str]) -> list[PatchFacts]:
+    """The patches of the first scene of a record as those of other scenes.
+
+    Args:
+        record: the record.
+        target: name of the attacked network.
+        scenes: names of the other scenes.
+
+    Raises:
+        GearError: the record names no patches of this network.
+    """
+    first = next((one.scene for one in record.patches if one.target == target), None)
+    if first is None:
+        raise GearError(f"the record names no patches of {target} that other places could show")
+    return [replace(one, scene=scene) for scene in scenes for one in record.patches if one.scene == first]
+
+
+def only_evaluation(plan: Plan, *, guarded: bool) -> PlannedEvaluation:
+    """The single evaluation of a record's config.
+
+    Args:
+        plan: plan of the config.
+        guarded: whether the network is behind a defense.
+
+    Raises:
+        GearError: the config has several tasks, or not exactly one network with or without a defense.
+    """
+    if len(plan.plugins_of_tasks) != 1:
+        raise GearError(f"the record's config has {len(plan.plugins_of_tasks)} tasks; a record is about one")
+    every = plan.planned_evaluations(plan.plugins_of_tasks[0])
+    found = [one for one in every if (one.defense is not None) == guarded]
+    if len(found) != 1:
+        what = "network behind a defense" if guarded else "network"
+        raise GearError(f"the record's config names {len(found)} times a {what}; a record is about one")
+    return found[0]
 
 
 def _plan(config: Path, out: Path, settings: Sequence[str], device: str | None) -> Plan:

@@ -52,14 +52,61 @@ def forge(path: Path, change: Callable[[Record], Record]) -> Path:
 
 
 def test_an_honest_record_is_reproduced(records: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["leaderboard", "check", str(records / NAME), "--samples", "1", "--fresh", "2", "--seed", "3"]
+    words = ["leaderboard", "check", str(records / NAME), "--samples", "2", "--fresh", "2", "--seed", "3"]
     words += [word for text in HERE for word in ("--set", text)]
     assert main([*words, "--out", str(tmp_path / "checks")]) == 0
     out = capsys.readouterr().out
-    assert out.endswith(f"{NAME}: reproduced\n") and "4 of 4 predictions have equal bytes" in out
+    assert out.endswith(f"{NAME}: reproduced\n") and "8 of 8 predictions have equal bytes" in out
     sha256 = hashlib.sha256((records / NAME).read_bytes()).hexdigest()
     verdict = read_verdict(tmp_path / "checks" / f"{sha256}.json")
-    assert (verdict.state, verdict.repeated, verdict.fresh) == ("reproduced", 4, 8)
+    assert (verdict.state, verdict.repeated, verdict.fresh) == ("reproduced", 8, 8)
+
+
+def test_a_figure_counts_only_when_it_was_computed_again(records: Path, checked: Checked) -> None:
+    verdict = checked(records / NAME, samples=1)
+    assert verdict.state == "incomplete" and not texts(verdict), "a mean IoU depends on all samples together"
+    assert sum("it needs all 2 samples, 1 were measured" in text for text in texts(verdict, "note")) == 4
+
+    def better(one: Record) -> Record:
+        claimed = {"value": 0.99, "low": 0.99, "high": 0.99}
+        results = tuple(
+            dataclasses.replace(figure, **(claimed if figure.name == "miou" else {})) for figure in one.results
+        )
+        entry = dataclasses.replace(one.entry, lower_is_better=True)
+        return dataclasses.replace(one, results=results, entry=entry)
+
+    verdict = checked(forge(records / NAME, better), samples=2)
+    assert verdict.state == "differs"
+    assert sum("of all 2 samples is" in text for text in texts(verdict)) == 4
+    assert any("disagree on whether lower is better" in text for text in texts(verdict))
+
+    def nameless(one: Record) -> Record:
+        samples = tuple(dataclasses.replace(sample, value=None) for sample in one.samples)
+        return dataclasses.replace(one, samples=samples, sample_metric="nonsense")
+
+    verdict = checked(forge(records / NAME, nameless), samples=1)
+    assert verdict.state == "differs" and "samples: measured by miou, not by nonsense" in texts(verdict)
+
+
+def test_a_config_of_another_shape_is_one_line(records: Path, checked: Checked) -> None:
+    def two(one: Record) -> Record:
+        data = tuple(replaced for row in one.data for replaced in (row, row))
+        samples = tuple(dataclasses.replace(each, data=2 * each.data + more) for each in one.samples for more in (0, 1))
+        results = tuple(dataclasses.replace(figure, n=2 * figure.n) for figure in one.results)
+        return dataclasses.replace(one, data=data, samples=samples, results=results)
+
+    with pytest.raises(GearError, match="makes 1 datasets of 2 samples with none, the record has 2 of 2, 2 samples"):
+        checked(forge(records / NAME, two))
+
+    def led_away(one: Record) -> Record:
+        config = json.loads(json.dumps(one.benchmark.config))
+        config["collect"]["root"] = "thesis"
+        return dataclasses.replace(
+            one, benchmark=dataclasses.replace(one.benchmark, config=config, sha256=digest(config))
+        )
+
+    with pytest.raises(GearError, match="'root' is decided by the benchmark"):
+        checked(forge(records / NAME, led_away))
 
 
 def test_a_forged_record_is_seen(records: Path, checked: Checked) -> None:

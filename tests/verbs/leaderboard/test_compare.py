@@ -10,6 +10,7 @@ import pytest
 
 from gear.leaderboard.record import Record
 from gear.leaderboard.verdict import Finding
+from gear.verbs.leaderboard import compare
 from gear.verbs.leaderboard.compare import (
     compare_fresh,
     compare_repeated,
@@ -77,6 +78,32 @@ def test_a_defense_that_knows_the_benchmark_does_worse_on_other_pictures(value: 
     noise = np.random.default_rng(1).normal(0, 0.01, 8)
     fresh = [replace(again(one), index=index, value=value + noise[index]) for index in range(8)]
     assert ("differs" in levels(compare_fresh(one, fresh, 0))) == is_seen
+
+
+def test_many_tests_raise_no_more_alarms(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = long_record(0.6)
+    fresh = [replace(again(one, patch), index=index) for patch in one.kinds() for index in range(8)]
+    for p, seen in ((0.0024, 4), (0.0026, 0)):
+        monkeypatch.setattr(compare, "permutation_p", lambda *_, p=p: p)
+        found = list(compare_fresh(one, fresh, 0))
+        assert len(found) == 4 and sum(each.level == "differs" for each in found) == seen
+
+
+def test_means_of_large_values_are_compared_relatively() -> None:
+    one = record()
+    large = replace(one, samples=tuple(replace(each, value=40.0) for each in one.samples))
+    for value, level in ((40.5, "same"), (41.0, "differs")):
+        found = list(compare_repeated(large, [again(large, index=i, value=value) for i in range(2)], is_same=False))
+        assert [each.level for each in found if "mean miou" in each.text] == [level]
+
+
+def test_the_permutation_test_bounds_its_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    new, old = [0.1 * i for i in range(9)], [0.1 * i + 0.3 for i in range(11)]
+    whole = permutation_p(new, old, 0)
+    monkeypatch.setattr(compare, "MOST_NUMBERS", 100 * 20)
+    assert permutation_p(new, old, 0) == pytest.approx(whole, abs=0.02)
+    monkeypatch.setattr(compare, "MOST_NUMBERS", 3)
+    assert permutation_p([1.0] * 5, [1.0] * 5, 0) == 1.0
 
 
 def test_permutation_p_of_known_cases() -> None:
