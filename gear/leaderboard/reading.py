@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from gear.dataset.json_text import parse_json
+from gear.leaderboard.package_facts import printable
 from gear.leaderboard.record import FORMAT, VERSION, Record, canonical
 from gear.values.errors import DatasetError, FieldError
 from gear.values.regular_file import read_regular
@@ -116,7 +117,8 @@ def read_as(kind: type[T], data: bytes, path: Path, form: str, version: int) -> 
     if not isinstance(content, dict) or content.get("format") != form:
         raise DatasetError(path, f"is no {form}")
     if content.get("version") != version:
-        raise DatasetError(path, f"has version {str(content.get('version'))[:20]} of {form}; this gear reads {version}")
+        found = printable(str(content.get("version")))[:20]
+        raise DatasetError(path, f"has version {found} of {form}; this gear reads {version}")
     if not is_canonical:
         raise DatasetError(path, "is not in canonical form; it was edited after gear wrote it")
     return _typed(kind, {key: value for key, value in content.items() if key not in ("format", "version")}, path)
@@ -130,5 +132,5 @@ def _typed(kind: type[T], content: Json, path: Path) -> T:
 
 
 def _short(error: BaseException) -> str:
-    text = " ".join(str(error).split())
+    text = printable(str(error))
     return text if len(text) <= 200 else text[:197] + "..."

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
 from gear.dataset.files import explained, write_whole
+from gear.dataset.guarded_paths import remove_file
 from gear.leaderboard.board import Table, tables
-from gear.leaderboard.reading import Filed, read_records
-from gear.leaderboard.record import SHA256, canonical
+from gear.leaderboard.reading import Filed, limited, read_records
+from gear.leaderboard.record import LONGEST_TEXT, SHA256, canonical
 from gear.leaderboard.verdict import Verdict, read_verdict
+from gear.plugins.text import printable
 from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
-from gear.verbs.leaderboard.pages import index_page, record_page
+from gear.verbs.leaderboard.pages import index_page, is_record_page, record_page
 from gear.verbs.leaderboard.texts import board_json
+
+RECORDS = "records"
+"""Name of the folder with the pages of the records."""
+
+MOST_PAGE_BYTES = 64 << 20
+"""Largest size of a record's page."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -47,6 +56,8 @@ def build_leaderboard(
 ) -> BoardReport:
     """Makes static pages of a folder of records: `index.html`, one page per record, and `board.json`.
 
+    Pages of records that are no longer listed are removed.
+
     Args:
         records: folder with records (`*.json`).
         out: folder of the pages.
@@ -63,7 +74,7 @@ def build_leaderboard(
     filed: dict[str, Filed] = {}
     for one in read_records(Path(records)):
         if isinstance(one, DatasetError):
-            refused.append(f"{Path(one.path).name}: {one.problem}")
+            refused.append(_line(Path(one.path).name, one.problem))
         else:
             filed.setdefault(one.sha256, one)
     verdicts = {} if checks is None else _verdicts(Path(checks), refused)
@@ -72,7 +83,8 @@ def build_leaderboard(
     with explained(report.out):
         report.out.mkdir(parents=True, exist_ok=True)
     for sha256, one in filed.items():
-        write_whole(report.out, f"records/{sha256}.html", record_page(one, verdicts.get(sha256)).encode())
+        write_whole(report.out, f"{RECORDS}/{sha256}.html", record_page(one, verdicts.get(sha256)).encode())
+    _remove_old_pages(report.out, filed)
     write_whole(report.out, "board.json", canonical(report.as_json()))
     write_whole(report.out, "index.html", index_page(found, refused, commitment).encode())
     return report
@@ -87,10 +99,38 @@ def _verdicts(folder: Path, refused: list[str]) -> dict[str, Verdict]:
         try:
             verdict = read_verdict(path)
         except DatasetError as error:
-            refused.append(f"{path.name}: {error.problem}")
+            refused.append(_line(path.name, error.problem))
             continue
         if path.stem == verdict.record_sha256:
             found[verdict.record_sha256] = verdict
         else:
-            refused.append(f"{path.name}: is the verdict of another record, {verdict.record_sha256[:12]}")
+            refused.append(_line(path.name, f"is the verdict of another record, {verdict.record_sha256[:12]}"))
     return found
+
+
+def _line(name: str, problem: str) -> str:
+    """One line on a refused file; names of files and texts in them are strangers'."""
+    return f"{printable(name)}: {printable(problem, LONGEST_TEXT)}"
+
+
+def _remove_old_pages(out: Path, listed: Collection[str]) -> None:
+    """Removes the pages of records that are no longer listed, such as withdrawn ones.
+
+    Only pages that gear wrote are removed: files with the name and the content of such a page.
+
+    Args:
+        out: folder of the pages.
+        listed: SHA-256 of the listed records.
+
+    Raises:
+        DatasetError: the folder cannot be read, or leads through a link.
+    """
+    folder = out / RECORDS
+    with explained(folder):
+        if not folder.is_dir():
+            return
+        paths = sorted(path for path in folder.iterdir() if path.suffix == ".html" and SHA256.fullmatch(path.stem))
+        for path in paths:
+            is_old = path.stem not in listed and path.is_file() and not path.is_symlink()
+            if is_old and is_record_page(limited(path, MOST_PAGE_BYTES)):
+                remove_file(out, f"{RECORDS}/{path.name}")

@@ -158,7 +158,7 @@ def summary(filed: Filed, verdict: Verdict) -> str:
         verdict: result of the check.
     """
     lines = [f"{one.level}: {one.text}" for one in verdict.findings]
-    return "\n".join([*lines, f"{filed.path.name}: {verdict.state}"]) + "\n"
+    return "\n".join([*lines, f"{printable(filed.path.name)}: {verdict.state}"]) + "\n"
 
 
 class _Counter:

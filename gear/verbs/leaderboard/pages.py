@@ -40,6 +40,10 @@ LEGEND = (
     "from those with a random one."
 )
 
+START = '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>'
+BACK = '<p><a href="../index.html">leaderboard</a></p>'
+"""Link of a record's page to the main page."""
+
 
 def index_page(tables: Sequence[Table], refused: Sequence[str], commitment: str | None) -> str:
     """Returns the main page of a leaderboard as HTML text: for each benchmark and task the defenses, the attacks, and
@@ -91,7 +95,7 @@ def record_page(filed: Filed, verdict: Verdict | None) -> str:
     figures = [[one.patch, one.name, shown(one), str(one.n)] for one in record.results]
     data = [[one.scene, one.weather, one.patch, str(one.samples), one.content_key] for one in record.data]
     parts = [
-        '<p><a href="../index.html">leaderboard</a></p>',
+        BACK,
         _table(("what", "value"), [list(fact) for fact in facts]),
         _titled("Results", ("patch", "figure", "value", "samples"), figures),
         _titled("Data", ("scene", "weather", "patch", "samples", "content key"), data),
@@ -101,6 +105,11 @@ def record_page(filed: Filed, verdict: Verdict | None) -> str:
     else:
         parts.append(_titled(f"Check: {verdict.state}", ("", "finding"), [[o.level, o.text] for o in verdict.findings]))
     return _page(f"{named(entry.network)} {named(entry.defense)}", parts)
+
+
+def is_record_page(data: bytes) -> bool:
+    """Whether the content of a file is that of a page that `record_page` made."""
+    return data.startswith(START.encode()) and BACK.encode() in data
 
 
 def _defenses(table: Table) -> str:
@@ -155,7 +164,7 @@ def _list(lines: Sequence[str]) -> str:
 def _page(title: str, parts: Iterable[str]) -> str:
     policy = "default-src 'none'; style-src 'unsafe-inline'"
     return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{_safe(title)}</title>\n'
+        f"{START}{_safe(title)}</title>\n"
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head>\n'
         f"<body><h1>{_safe(title)}</h1>\n" + "\n".join(part for part in parts if part) + "\n</body></html>\n"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 from gear.cli.main import main
 from gear.leaderboard.reading import encoded
+from gear.leaderboard.record import canonical
 from gear.leaderboard.verdict import Verdict
 from gear.values.errors import GearError
 from gear.verbs.leaderboard.build import build_leaderboard
@@ -96,3 +98,51 @@ def test_a_wrong_commitment_or_folder_is_one_line(tmp_path: Path) -> None:
         build_leaderboard(tmp_path, out=tmp_path / "site", commitment="<b>")
     with pytest.raises(GearError, match="cannot be read"):
         build_leaderboard(tmp_path / "none", out=tmp_path / "site")
+
+
+def test_names_and_keys_of_strangers_are_printable(tmp_path: Path, capsysbinary: pytest.CaptureFixture[bytes]) -> None:
+    texts = {
+        b"\xff.json": b"{}",
+        b"\x1b[2J.json": b"{}",
+        b"key.json": canonical({"format": "gear-record", "version": 1, "\x1b]0;x": 1}),
+        b"version.json": canonical({"format": "gear-record", "version": "\x1b[31m\u202e"}),
+    }
+    (tmp_path / "records").mkdir()
+    for name, data in texts.items():
+        (tmp_path / "records" / os.fsdecode(name)).write_bytes(data)
+    assert main(["leaderboard", "build", str(tmp_path / "records"), "--out", str(tmp_path / "site")]) == 0
+    out = capsysbinary.readouterr().out.decode()
+    lines = out.splitlines()
+    assert len(lines) == 5 and all(line.isprintable() for line in lines), out
+    assert "\\udcff.json: is no gear-record" in out and "\\x1b[2J.json" in out
+    assert "\x1b" not in (tmp_path / "site/index.html").read_text() + (tmp_path / "site/board.json").read_text()
+
+
+def test_pages_of_withdrawn_records_are_removed(tmp_path: Path) -> None:
+    records, site = tmp_path / "records", tmp_path / "site"
+    gone = record(entry={"defense": plugin("gone")})
+    for name, one in {"a.json": record(), "b.json": gone}.items():
+        put(records, name, encoded(one))
+    build_leaderboard(records, out=site)
+    pages = site / "records"
+    foreign = {f"{sha('mine')}.html": "<p>mine</p>", "notes.html": (pages / f"{filed(gone).sha256}.html").read_text()}
+    for name, text in foreign.items():
+        (pages / name).write_text(text)
+    outside = tmp_path / "outside.html"
+    outside.write_text(foreign["notes.html"])
+    (pages / f"{sha('link')}.html").symlink_to(outside)
+    (records / "b.json").unlink()
+    build_leaderboard(records, out=site)
+    kept = {f"{filed(record()).sha256}.html", f"{sha('link')}.html", *foreign}
+    assert {path.name for path in pages.iterdir()} == kept and outside.exists()
+
+
+def test_no_page_is_removed_through_a_link(tmp_path: Path) -> None:
+    put(tmp_path / "records", "a.json", encoded(record()))
+    build_leaderboard(tmp_path / "records", out=tmp_path / "one")
+    (tmp_path / "records/a.json").unlink()
+    (tmp_path / "two").mkdir()
+    (tmp_path / "two/records").symlink_to(tmp_path / "one/records")
+    with pytest.raises(GearError, match="link"):
+        build_leaderboard(tmp_path / "records", out=tmp_path / "two")
+    assert len(list((tmp_path / "one/records").iterdir())) == 1
