@@ -33,6 +33,9 @@ from gear.verbs.bench.schedule import OnStep
 from gear.verbs.collect.run import collect
 
 MOST = 1000
+MOST_SECONDS = 1e9
+"""Largest time of a sample that a stored file may hold."""
+
 WIDTH_IN, HEIGHT_IN, TEXT_PT = 3.5, 2.2, 7
 
 
@@ -191,7 +194,11 @@ def run_times(
 
 
 def _measured(root: Path, name: str, step: Step, callbacks: Callbacks, run: Callable[..., Any]) -> tuple[float, ...]:
-    """Returns the seconds of each sample of a collection but the first, which also compiles the town."""
+    """Returns the seconds of each sample of a collection but the first, which also compiles the town.
+
+    Raises:
+        DatasetError: the stored file is of another collection, or holds no seconds.
+    """
     path = inside(root, f"times/{name}.json")
     arguments = {**step.arguments, "settings": list(step.arguments["settings"])}
     arguments["out"] = Path(step.arguments["out"]).relative_to(root).as_posix()
@@ -199,7 +206,7 @@ def _measured(root: Path, name: str, step: Step, callbacks: Callbacks, run: Call
         there = load_json(path)
         if not isinstance(there, dict) or there.get("arguments") != arguments:
             raise DatasetError(path, "is the time of another collection; use another --out, or remove it")
-        return tuple(float(value) for value in there["seconds"])
+        return _stored(path, there.get("seconds"))
     ends: list[float] = []
 
     def finished(done: int, total: int) -> None:
@@ -211,6 +218,18 @@ def _measured(root: Path, name: str, step: Step, callbacks: Callbacks, run: Call
     found = tuple(float(value) for value in np.diff(ends))
     write_whole(root, f"times/{name}.json", dump_json({"arguments": arguments, "seconds": list(found)}))
     return found
+
+
+def _stored(path: Path, seconds: Json) -> tuple[float, ...]:
+    """Returns the seconds of a stored file.
+
+    Raises:
+        DatasetError: they are no list of numbers of 0 or more.
+    """
+    is_list = isinstance(seconds, list) and len(seconds) > 0
+    if not is_list or not all(type(one) in (int, float) and 0 <= one <= MOST_SECONDS for one in seconds):
+        raise DatasetError(path, "holds no list of seconds; remove it, and the collection is measured again")
+    return tuple(float(one) for one in seconds)
 
 
 def _write(report: TimesReport) -> None:

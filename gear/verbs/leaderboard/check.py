@@ -29,7 +29,7 @@ from gear.verbs.leaderboard.compare import (
     compare_withheld,
     is_same_machine,
 )
-from gear.verbs.leaderboard.figures import compare_figures
+from gear.verbs.leaderboard.figures import compare_figures, compare_reference
 from gear.verbs.leaderboard.request import CheckRequest
 from gear.verbs.leaderboard.rerun import Again, Rerun, check_data
 from gear.verbs.leaderboard.withheld import Withheld, read_withheld
@@ -123,17 +123,15 @@ def run_check(request: CheckRequest, callbacks: Callbacks) -> Verdict:
     _refuse_many(rerun, chosen, request)
     count = _Counter(callbacks.on_progress, (len(chosen) + request.fresh) * len(_kinds(rerun)))
     found = [*_static(record), *compare_plugins(rerun)]
-    again = [
-        count(one)
-        for place in dict.fromkeys(place for place, _ in chosen)
-        for patch in _kinds(rerun)
-        for one in rerun.again(patch, place, [index for at, index in chosen if at == place])
-    ]
+    again = _again(rerun, chosen, count)
     environment = _environment(rerun)
     found += compare_repeated(record, again, is_same=is_same_machine(record, environment))
     found += _compare_built(rerun, record)
     figures = compare_figures(record, again, rerun.ranked)
     found += figures.findings
+    is_every = len(again) == sum(one.samples for one in record.data if one.patch in _kinds(rerun))
+    alone = _again(rerun, chosen, count, with_defense=False) if is_every and record.entry.defense is not None else []
+    found += compare_reference(record, alone, rerun.ranked)
     if request.fresh:
         found += _fresh(rerun, request, secret, count)
     verdict = Verdict(
@@ -187,6 +185,18 @@ def _chosen(record: Record, request: CheckRequest) -> list[tuple[int, int]]:
     rng = derive_rng(request.seed, "leaderboard", "samples")
     drawn = rng.permutation(len(every))[: request.samples]
     return sorted(every[int(number)] for number in drawn)
+
+
+def _again(
+    rerun: Rerun, chosen: Sequence[tuple[int, int]], count: Callable[[Again], Again], *, with_defense: bool = True
+) -> list[Again]:
+    """Measures the chosen samples again with every kind of patch."""
+    return [
+        count(one)
+        for place in dict.fromkeys(place for place, _ in chosen)
+        for patch in _kinds(rerun)
+        for one in rerun.again(patch, place, [index for at, index in chosen if at == place], with_defense=with_defense)
+    ]
 
 
 def _refuse_many(rerun: Rerun, chosen: Sequence[tuple[int, int]], request: CheckRequest) -> None:

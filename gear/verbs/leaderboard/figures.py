@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,6 +68,27 @@ def compare_figures(
             text = f"was not computed again: it needs all {figure.n} samples, {len(here)} were measured"
             found.append(finding("note", f"{name} {text}; raise --samples (and --most-pictures)"))
     return Compared(findings=tuple(found), is_whole=is_whole)
+
+
+def compare_reference(
+    record: Record, alone: Sequence[Again], ranked: Callable[[Sequence[Again]], float | None]
+) -> Iterator[Finding]:
+    """Yields one finding for each ranked figure of the network without its defense.
+
+    Args:
+        record: the record.
+        alone: samples that were measured again without the defense: all samples, or none.
+        ranked: computes the ranked metric over some samples; None where it is undefined.
+    """
+    if record.entry.defense is None or not record.reference:
+        return
+    for kind in record.kinds():
+        figure, here = record.figure(kind, is_reference=True), [one for one in alone if one.patch == kind]
+        name = f"without the defense, {kind}: {record.entry.metric}"
+        if figure is not None and here:
+            yield _compared(name, f"of all {len(here)} samples", figure, ranked(here), MOST_FIGURE_OFF)
+    if not alone:
+        yield finding("note", "the figures of the network without the defense were not computed again")
 
 
 def _compared(name: str, what: str, figure: Figure, value: float | None, most_off: float) -> Finding:

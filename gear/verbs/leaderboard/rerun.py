@@ -160,7 +160,7 @@ class Rerun:
         both = (None, None) if guard is None else (guard.calibration, guard.calibration_patched)
         return self.plan.config.samples.calibrate * sum(one is not None for one in both)
 
-    def again(self, patch: str, place: int, indices: Sequence[int]) -> list[Again]:
+    def again(self, patch: str, place: int, indices: Sequence[int], *, with_defense: bool = True) -> list[Again]:
         """Makes samples of one dataset of the benchmark again and measures them.
 
         Args:
@@ -176,7 +176,7 @@ class Rerun:
         """
         step = self._step(self.planned.pools[patch][place])
         dataset = self._part(step, self.data_of(patch)[place].samples, indices)
-        return self._measured(dataset, patch, place, indices, self.guarded())
+        return self._measured(dataset, patch, place, indices, self.guarded(with_defense=with_defense))
 
     def fresh(self, patch: str, place: int, count: int, seed: int, *, with_defense: bool = True) -> list[Again]:
         """Makes samples with another seed, which are not part of the benchmark, and measures them.

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from gear.values.errors import ConfigError, GearError
+from gear.values.errors import ConfigError, DatasetError, GearError
 from gear.values.progress import Callbacks
 from gear.verbs.bench import times
 from gear.verbs.bench.request import BenchRequest
@@ -69,6 +70,19 @@ def test_finished_collections_are_kept(tmp_path: Path, clock: Clock) -> None:
     assert len(clock.runs) == 4 and again.seconds["depth"] == (1.0, 1.0, 1.0, 1.5, 1.5, 1.5)
     with pytest.raises(GearError, match="is the time of another collection"):
         run_times(request(tmp_path, settings=("times.samples=5",)), Callbacks(), run=clock.collect)
+
+
+@pytest.mark.parametrize("seconds", [None, [], "2.5", ["2.5"], [None], [True], [-1.0], [1e300], {"a": 1}])
+def test_a_stored_file_without_seconds_is_one_line(tmp_path: Path, clock: Clock, seconds: Any) -> None:
+    run_times(request(tmp_path), Callbacks(), run=clock.collect)
+    path = tmp_path / "out/times/depth-seed1.json"
+    stored = json.loads(path.read_text())
+    path.write_text(json.dumps(stored | {"seconds": seconds}))
+    with pytest.raises(DatasetError, match=r"depth-seed1\.json: holds no list of seconds; remove it"):
+        run_times(request(tmp_path), Callbacks(), run=clock.collect)
+    path.write_text(json.dumps({"arguments": stored["arguments"]}))
+    with pytest.raises(DatasetError, match="holds no list of seconds"):
+        run_times(request(tmp_path), Callbacks(), run=clock.collect)
 
 
 def test_the_shipped_config(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gear.leaderboard.record import Figure, Record
-from gear.verbs.leaderboard.figures import Compared, compare_figures
+from gear.verbs.leaderboard.figures import Compared, compare_figures, compare_reference
 from gear.verbs.leaderboard.rerun import Again
 from tests.leaderboard.conftest import SAMPLES, record, sha
 
@@ -99,3 +99,15 @@ def test_a_kind_of_patch_that_the_config_does_not_make_differs() -> None:
     )
     found = compare_figures(transfer, [each for each in again(one) if each.patch != "patch"], mean)
     assert found.is_whole and levels(found) == {"same", "note"}
+
+
+def test_figures_without_the_defense_are_compared_if_all_samples_are_there() -> None:
+    one = record()
+    values = {figure.patch: figure.value for figure in one.reference}
+    alone = [replace(each, value=values[each.patch]) for each in again(one) if each.patch in values]
+    assert [each.level for each in compare_reference(one, alone, mean)] == ["same"] * 3
+    forged = replace(one, reference=tuple(shifted(figure, -0.05) for figure in one.reference))
+    assert [each.level for each in compare_reference(forged, alone, mean)] == ["differs"] * 3
+    assert [each.level for each in compare_reference(one, [], mean)] == ["note"]
+    network = record(entry={"kind": "model", "defense": None, "gradient": None}, reference=())
+    assert not list(compare_reference(network, [], mean))
