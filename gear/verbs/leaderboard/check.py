@@ -125,9 +125,10 @@ def run_check(request: CheckRequest, callbacks: Callbacks) -> Verdict:
     found = [*_static(record), *compare_plugins(rerun)]
     again = _again(rerun, chosen, count)
     environment = _environment(rerun)
-    found += compare_repeated(record, again, is_same=is_same_machine(record, environment))
+    is_same = is_same_machine(record, environment)
+    found += compare_repeated(record, again, is_same=is_same)
     found += _compare_built(rerun, record)
-    figures = compare_figures(record, again, rerun.ranked)
+    figures = compare_figures(record, again, rerun.ranked, is_same=is_same)
     found += figures.findings
     is_every = len(again) == sum(one.samples for one in record.data if one.patch in _kinds(rerun))
     alone = _again(rerun, chosen, count, with_defense=False) if is_every and record.entry.defense is not None else []

@@ -34,7 +34,7 @@ class Compared:
 
 
 def compare_figures(
-    record: Record, again: Sequence[Again], ranked: Callable[[Sequence[Again]], float | None]
+    record: Record, again: Sequence[Again], ranked: Callable[[Sequence[Again]], float | None], *, is_same: bool
 ) -> Compared:
     """Compares the ranked metric of every kind of patch.
 
@@ -46,7 +46,9 @@ def compare_figures(
         record: the record.
         again: samples that were measured again.
         ranked: computes the ranked metric over some samples; None where it is undefined.
+        is_same: whether this machine should give equal bytes; a figure of equal predictions must then be equal.
     """
+    claimed = {(record.data[one.data].patch, one.index, one.sha256) for one in record.samples}
     found: list[Finding] = []
     is_whole = True
     is_mean = _is_mean(record, again, ranked)
@@ -60,7 +62,9 @@ def compare_figures(
         elif not here:
             found.append(finding("differs", f"{name} is claimed, but the record's config makes no such pictures"))
         elif len(here) == figure.n:
-            found.append(_compared(name, f"of all {figure.n} samples", figure, ranked(here), MOST_FIGURE_OFF))
+            is_equal = is_same and all((kind, one.index, one.sha256) in claimed for one in here)
+            most_off = ROUNDING if is_equal else MOST_FIGURE_OFF
+            found.append(_compared(name, f"of all {figure.n} samples", figure, ranked(here), most_off))
         elif is_mean:
             found.append(_compared(name, "as the mean of the record's samples", figure, _mean(record, kind), ROUNDING))
         else:

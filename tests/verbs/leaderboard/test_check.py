@@ -73,12 +73,12 @@ def test_a_figure_counts_only_when_it_was_computed_again(records: Path, checked:
             dataclasses.replace(figure, **(claimed if figure.name == "miou" else {})) for figure in one.results
         )
         entry = dataclasses.replace(one.entry, lower_is_better=True)
-        reference = tuple(dataclasses.replace(figure, value=0.01, low=0.01) for figure in one.reference)
+        reference = tuple(dataclasses.replace(figure, value=0.5, low=0.5, high=0.5) for figure in one.reference)
         return dataclasses.replace(one, results=results, entry=entry, reference=reference)
 
     verdict = checked(forge(records / NAME, better), samples=2)
     assert verdict.state == "differs"
-    assert sum("of all 2 samples is" in text for text in texts(verdict)) == 4
+    assert sum("of all 2 samples is" in text for text in texts(verdict)) == 7, "four figures and three references"
     assert sum("without the defense, " in text for text in texts(verdict)) == 3
     assert any("disagree on whether lower is better" in text for text in texts(verdict))
 

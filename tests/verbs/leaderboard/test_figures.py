@@ -60,44 +60,54 @@ def levels(found: Compared) -> set[str]:
     ("ranked", "shift", "count"), [(mean, 0.0, 1), (mean, 0.0, SAMPLES), (pooled, -0.1, SAMPLES), (mean, 0.01, SAMPLES)]
 )
 def test_honest_figures_are_the_same(ranked: Ranked, shift: float, count: int) -> None:
-    found = compare_figures(honest(shift), again(honest(), count), ranked)
+    found = compare_figures(honest(shift), again(honest(), count), ranked, is_same=False)
     assert levels(found) == {"same"} and found.is_whole and len(found.findings) == 4
 
 
 @pytest.mark.parametrize(("ranked", "count"), [(mean, 1), (mean, SAMPLES), (pooled, SAMPLES)])
 def test_a_figure_that_the_samples_do_not_give_differs(ranked: Ranked, count: int) -> None:
-    found = compare_figures(honest(0.35), again(honest(), count), ranked)
+    found = compare_figures(honest(0.35), again(honest(), count), ranked, is_same=False)
     assert levels(found) == {"differs"}
 
 
+def test_equal_predictions_on_the_same_machine_give_equal_figures() -> None:
+    slightly = honest(0.01)
+    assert levels(compare_figures(slightly, again(honest()), mean, is_same=True)) == {"differs"}
+    assert levels(compare_figures(honest(), again(honest()), mean, is_same=True)) == {"same"}
+    other = [replace(one, sha256=sha("other")) for one in again(honest())]
+    assert levels(compare_figures(slightly, other, mean, is_same=True)) == {"same"}
+
+
 def test_a_figure_of_the_whole_dataset_needs_all_samples() -> None:
-    found = compare_figures(honest(0.35), again(honest(), SAMPLES - 1), pooled)
+    found = compare_figures(honest(0.35), again(honest(), SAMPLES - 1), pooled, is_same=False)
     assert not found.is_whole and levels(found) == {"note"}
     assert "none: miou was not computed again: it needs all 4 samples, 3 were measured" in found.findings[0].text
 
 
 def test_values_of_another_metric_say_nothing_about_the_figure() -> None:
-    found = compare_figures(replace(honest(0.35), sample_metric="nonsense"), again(honest(), 2), mean)
+    found = compare_figures(replace(honest(0.35), sample_metric="nonsense"), again(honest(), 2), mean, is_same=False)
     assert not found.is_whole and "same" not in levels(found)
 
 
 def test_a_record_without_values_is_not_reproduced() -> None:
     empty = replace(honest(), samples=tuple(replace(one, value=None) for one in honest().samples))
-    assert not compare_figures(empty, again(empty, 2), lambda _: None).is_whole
-    assert levels(compare_figures(empty, again(empty), lambda _: None)) == {"differs"}, "it claims figures"
+    assert not compare_figures(empty, again(empty, 2), lambda _: None, is_same=False).is_whole
+    assert levels(compare_figures(empty, again(empty), lambda _: None, is_same=False)) == {"differs"}, (
+        "it claims figures"
+    )
 
 
 def test_a_kind_of_patch_that_the_config_does_not_make_differs() -> None:
     one = honest()
     seen = [each for each in again(one) if each.patch != "adaptive patch"]
-    assert "differs" in levels(compare_figures(one, seen, mean))
+    assert "differs" in levels(compare_figures(one, seen, mean, is_same=False))
     named = {"patch": "patch of other"}
     transfer = replace(
         one,
         data=tuple(replace(each, patch=named.get(each.patch, each.patch)) for each in one.data),
         results=tuple(replace(each, patch=named.get(each.patch, each.patch)) for each in one.results),
     )
-    found = compare_figures(transfer, [each for each in again(one) if each.patch != "patch"], mean)
+    found = compare_figures(transfer, [each for each in again(one) if each.patch != "patch"], mean, is_same=False)
     assert found.is_whole and levels(found) == {"same", "note"}
 
 
