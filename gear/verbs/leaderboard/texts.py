@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from gear.leaderboard.board import Row, Table
 from gear.leaderboard.record import Figure, Plugin, Record
-from gear.leaderboard.rules import ADAPTIVE, NONE, PATCH, RANDOM
+from gear.leaderboard.rules import ADAPTIVE, NONE, PATCH, RANDOM, is_transfer
 from gear.values.serial import Json, to_json
 
 HEAD = (
@@ -103,7 +103,9 @@ def knowledge_rows(table: Table) -> list[list[str]]:
                 for filed in (*row.own, *row.attacks)
                 if filed.record.attack.knowledge == knowledge
                 for kind in filed.record.kinds()
-                if kind not in (NONE, RANDOM) and (figure := filed.record.figure(kind)) is not None
+                if kind not in (NONE, RANDOM)
+                and (filed in row.own or not is_transfer(kind))
+                and (figure := filed.record.figure(kind)) is not None
             ]
             sign = -1.0 if table.lower_is_better else 1.0
             cells.append(shown(min(found, key=lambda one: sign * (one.value or 0.0), default=None)))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from gear.leaderboard.board import tables
+from gear.leaderboard.verdict import Verdict
 from gear.verbs.leaderboard.texts import ATTACKS, BY_KNOWLEDGE, HEAD, attack_rows, defense_cells, knowledge_rows, named
-from tests.leaderboard.conftest import attacking, filed, plugin, record
+from tests.leaderboard.conftest import VALUES, attacking, filed, plugin, record
 
 
 def test_cells_fit_their_titles() -> None:
@@ -29,6 +30,17 @@ def test_figures_by_knowledge() -> None:
     assert len(cells) == len(BY_KNOWLEDGE) and cells[2:] == ["0.500 [0.480, 0.520]", ""], (
         "nobody has checked the attack"
     )
+
+
+def test_transfer_of_others_is_no_figure_of_the_row() -> None:
+    transfer = attacking(record({**VALUES, "patch of other": 0.01}), 0.45, knowledge="black-box", steps=0, queries=10)
+    one, other = filed(record()), filed(transfer)
+    made = Verdict(
+        record_sha256=other.sha256, state="reproduced", seed=0, repeated=1, fresh=0, environment={}, findings=()
+    )
+    (table,) = tables([one, other], {other.sha256: made})
+    (cells,) = knowledge_rows(table)
+    assert cells[3] == "0.450 [0.450, 0.450]", "no check can measure the patches of other networks"
 
 
 def test_plugins_of_others_are_named_with_their_package() -> None:
