@@ -97,7 +97,9 @@ def jackknife_interval(value: float, replicates: Values, limits: Interval = REAL
 
 
 def is_constant(replicates: Values) -> bool:
-    """Whether replicates differ by no more than rounding."""
+    """Whether replicates are finite and differ by no more than rounding."""
+    if not np.isfinite(replicates).all():
+        return False
     return bool(np.abs(replicates - replicates.mean()).max() <= NEGLIGIBLE * np.abs(replicates).max())
 
 

@@ -147,7 +147,7 @@ def test_foreign_models_defenses_and_tasks_have_their_rows(home: Path) -> None:
     baseline = ("--model", "panoptic_parts", "--set", "weights=none", "--data", "rows/panoptic-random")
     text = gear(home, "evaluate", *baseline, "--defense", "jedi", "--report", "outside_patch", "--out", "panoptic")
     assert text.startswith("panoptic: panoptic_parts guarded by jedi\n") and "outside_patch.pq" in text
-    (folder,) = (path for path in (home / "empty/panoptic").iterdir() if path.is_dir())
+    (folder,) = (path.parent for path in (home / "empty/panoptic").glob("*/predictions"))
     results = json.loads((folder / "predictions/panoptic.json").read_text())["annotations"]
     assert [one["image_id"] for one in results] == [1, 2]
     assert all((folder / "predictions/panoptic" / one["file_name"]).is_file() for one in results)

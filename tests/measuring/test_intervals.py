@@ -17,6 +17,7 @@ from gear.measuring.intervals import (
     MOST_GROUPS,
     combined_interval,
     interval_at_limit,
+    is_constant,
     jackknife_interval,
     leave_one_out,
     separated_interval,
@@ -152,3 +153,9 @@ def test_without_a_correction_for_skewness_they_are_too_narrow() -> None:
 def test_percentiles_of_a_bootstrap_do_not() -> None:
     found = coverage(BY_NAME["mIoU"], samples=5, simulations=100, methods=("percentile",), seed=1)
     assert found["percentile"] < 0.86, "resamples show fewer classes, and five pictures are few"
+
+
+def test_replicates_that_are_not_finite_are_not_constant() -> None:
+    assert not is_constant(np.array([np.inf, np.inf, np.inf]))
+    assert not is_constant(np.array([np.nan, np.nan]))
+    assert is_constant(np.array([0.5, 0.5, 0.5]))
