@@ -76,8 +76,8 @@ class StereoRcnnNetwork(Network):
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """Returns the outputs that the class describes, by name.
 
-        Each pair of pictures is processed by itself, as in training; therefore no output depends on other pairs of the
-        batch.
+        The network processes one pair of pictures at a time, as in training; therefore no output depends on other
+        pairs of the batch.
 
         Args:
             pictures: (B, 3, H, W) pictures `left` and `right`, float in 0..1, on the network's device.

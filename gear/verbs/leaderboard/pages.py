@@ -33,11 +33,11 @@ td.broken, td.differs { color: #a02020; font-weight: 600; } td.reproduced, td.sa
 """
 
 LEGEND = (
-    "Rows are ranked by the worst known figure under an optimised patch, whoever made the patch. In brackets: 95 % "
-    "intervals. claimed: nobody has measured the row again; reproduced: a check computed the ranked metric again, "
-    "directly or through its samples; broken: a check contradicts it, or a reproduced attack takes its gain away. No "
-    "check computes the intervals and AUROC again. AUROC: how well the defense's score separates pictures with a patch "
-    "from those with a random one."
+    "Rows are ranked by the worst known figure under any optimised patch, by the author of the row or by others. In "
+    "brackets: 95 % intervals. claimed: nobody has measured the row again; reproduced: a check computed the ranked "
+    "metric again, directly or through its samples; broken: a check contradicts it, or a reproduced attack takes its "
+    "gain away. No check computes the intervals and AUROC again. AUROC: how well the defense's score separates "
+    "pictures with a patch from those with a random one."
 )
 
 START = '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>'
