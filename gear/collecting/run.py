@@ -8,7 +8,7 @@ from pathlib import Path
 from gear.collecting.job import Job
 from gear.collecting.missing import collect_missing
 from gear.contracts.executors import Executor
-from gear.dataset.executors.engines import DEFAULT, open_engine
+from gear.dataset.executors.engines import DEFAULT, open_engine, open_executor
 from gear.dataset.executors.in_process import InThisProcess
 from gear.dataset.locks import SHARED, lock_note
 from gear.dataset.plan import manifest_facts
@@ -67,9 +67,8 @@ def executor_of(
         UnknownNameError: there is no such engine.
         GearError: the engine cannot use the address, or a package that it needs is not installed.
     """
-    if workers == 1 and engine == DEFAULT and address is None and not in_subprocess:
-        return InThisProcess()
-    return open_engine(engine, workers=workers, backend=job.config.renderer, address=address)
+    opened = open_engine if in_subprocess else open_executor
+    return opened(engine, workers=workers, backend=job.config.renderer, address=address)
 
 
 def run_job(

@@ -28,8 +28,8 @@ The folder --out gets patch_0.png, …, patch.safetensors, attack.json and figur
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of `gear attack` to its argument parser."""
-    from gear.cli.commands.evaluate import add_engine
     from gear.cli.commands.gap import add_places
+    from gear.cli.engine import add_engine, add_engine_workers
 
     parser.epilog = EXAMPLE
     parser.add_argument("--model", required=True, action="append", metavar="NAME", help="model plugin; repeatable")
@@ -78,7 +78,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="make patches for each scene of --data, in OUT/<town>-<scene>; --data may be a folder of datasets",
     )
-    add_engine(parser, "scenes that are attacked")
+    add_engine(parser, "with workers")
+    add_engine_workers(parser, "scenes that are attacked")
     parser.add_argument("--compositor", default="transport", metavar="NAME", help="transport, or homography")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random draws (0)")
     parser.add_argument("--allow-test-data", action="store_true", help="optimise on test splits too")

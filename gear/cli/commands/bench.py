@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from gear.cli.commands.collect import workers
+from gear.cli.engine import add_engine
+from gear.cli.flag_types import workers
 
 if TYPE_CHECKING:
     from gear.verbs.bench.plan import Step
@@ -42,10 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--device", choices=("auto", "cpu", "cuda"), help="device of the networks (the one in the config)"
     )
-    parser.add_argument(
-        "--engine", metavar="NAME", help="engine that carries out the steps: processes, ray or slurm (processes)"
-    )
-    parser.add_argument("--address", help="of the engine's cluster: a Ray cluster, or a SLURM partition")
+    add_engine(parser, "that carries out the steps")
     parser.add_argument(
         "--workers", type=workers, default=1, metavar="N", help="number of steps at the same time, or auto (1)"
     )

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from gear.collecting.workers import Workers
+from gear.cli.engine import add_engine
+from gear.cli.flag_types import workers
 
 EXAMPLE = """examples:
   gear collect --task stereo3d
@@ -16,21 +15,6 @@ EXAMPLE = """examples:
   gear collect --task semseg --split train --shard 2/8 --out part2
   gear collect --config my.yml --set weather.cloudiness=30 --set options.width_px=1024
 """
-
-
-def positive(text: str) -> int:
-    """Parses the text of a flag as a whole number of at least 1; a `type` function for argparse."""
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError("must be at least 1")
-    return number
-
-
-def workers(text: str) -> Workers:
-    """Parses `text`, the value of `--workers`: a whole number of at least 1, or `auto`; a `type` function for
-    argparse.
-    """
-    return "auto" if text == "auto" else positive(text)
 
 
 def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,10 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of `gear collect` to its argument parser."""
     parser.epilog = EXAMPLE
     add_collection_arguments(parser)
-    parser.add_argument(
-        "--engine", metavar="NAME", help="engine that makes the samples: processes, ray or slurm (processes)"
-    )
-    parser.add_argument("--address", help="of the engine's cluster: a Ray cluster, or a SLURM partition")
+    add_engine(parser, "that makes the samples")
     parser.add_argument(
         "--workers",
         type=workers,

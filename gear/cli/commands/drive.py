@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from gear.cli.commands.collect import workers
+from gear.cli.engine import add_engine
+from gear.cli.flag_types import workers
 
 EXAMPLE = """examples:
   gear drive quick --out drive/quick --workers auto       three scenarios, three twins, one network
@@ -33,8 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--device", choices=("auto", "cpu", "cuda"), help="device of the networks (the one in the config)"
     )
-    parser.add_argument("--engine", metavar="NAME", help="engine that makes the drives: processes, ray or slurm")
-    parser.add_argument("--address", help="of the engine's cluster: a Ray cluster, or a SLURM partition")
+    add_engine(parser, "that makes the drives")
     parser.add_argument(
         "--workers", type=workers, default=1, metavar="N", help="number of drives at the same time, or auto (1)"
     )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from gear.cli.commands.collect import positive
 from gear.cli.device import add_device
+from gear.cli.engine import add_engine, add_engine_workers
+from gear.cli.flag_types import positive
 from gear.cli.streams import line_width
 
 EXAMPLE = """examples:
@@ -62,7 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=positive, default=2, metavar="N", help="number of threads that read and measure (2)"
     )
-    add_engine(parser, "datasets that are evaluated")
+    add_engine(parser, "with workers")
+    add_engine_workers(parser, "datasets that are evaluated")
     parser.add_argument(
         "--seed",
         type=int,
@@ -79,20 +81,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_device(parser, "model_settings")
     parser.add_argument("--json", action="store_true", help="print results.json instead of the table")
-
-
-def add_engine(parser: argparse.ArgumentParser, what: str) -> None:
-    """Adds the flags `--engine`, `--address` and `--engine-workers` of commands that distribute large jobs.
-
-    Args:
-        parser: parser of the command.
-        what: what the workers carry out at the same time.
-    """
-    parser.add_argument("--engine", metavar="NAME", help="engine with workers: processes, ray or slurm (processes)")
-    parser.add_argument("--address", help="of the engine's cluster: a Ray cluster, or a SLURM partition")
-    parser.add_argument(
-        "--engine-workers", type=positive, default=1, metavar="N", help=f"number of {what} at the same time (1)"
-    )
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:

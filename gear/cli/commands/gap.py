@@ -21,8 +21,8 @@ The dataset must have been collected with --probes. With --patch the twin is ren
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of `gear gap` to its argument parser."""
-    from gear.cli.commands.collect import positive
     from gear.cli.commands.evaluate import add_calibration
+    from gear.cli.flag_types import positive
 
     parser.epilog = EXAMPLE
     parser.add_argument("dataset", help="root of a dataset with probes")

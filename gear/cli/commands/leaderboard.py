@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from gear.cli.commands.collect import positive
+from gear.cli.flag_types import positive
 
 EXAMPLE = """examples:
   gear bench paper --out bench/paper --record                        write records into bench/paper/records

@@ -6,7 +6,7 @@ import argparse
 import re
 from typing import TYPE_CHECKING
 
-from gear.cli.commands.collect import positive
+from gear.cli.flag_types import positive
 
 if TYPE_CHECKING:
     from gear.reporting.display import Display

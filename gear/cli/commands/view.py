@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from gear.cli.commands.collect import positive
+from gear.cli.flag_types import positive
 
 EXAMPLE = """examples:
   gear view data/stereo3d/town10-billboard01-ClearNoon/none

@@ -7,6 +7,7 @@ import pkgutil
 
 from gear.contracts.executors import Executor, Needs
 from gear.dataset import executors
+from gear.dataset.executors.in_process import InThisProcess
 from gear.values.errors import UnknownNameError
 
 NO_ENGINES = ("engines", "in_process", "jobs", "parts", "threads")
@@ -42,3 +43,24 @@ def open_engine(
     module = importlib.import_module(f"{executors.__name__}.{name}")
     opened: Executor = module.executor(workers=workers, backend=backend, address=address, needs=needs or Needs())
     return opened
+
+
+def open_executor(
+    name: str, *, workers: int, backend: str, address: str | None = None, needs: Needs | None = None
+) -> Executor:
+    """Opens an engine as `open_engine` does, except that a single worker of the default engine is this process.
+
+    Args:
+        name: name of the engine, such as `processes`.
+        workers: number of workers.
+        backend: name of the renderer or of the command, for messages about workers that died or hang.
+        address: address of the engine's cluster; None for the default.
+        needs: what each worker needs; by default what workers need that make samples.
+
+    Raises:
+        UnknownNameError: there is no such engine.
+        GearError: the engine cannot use the address, or a package that it needs is not installed.
+    """
+    if workers == 1 and name == DEFAULT and address is None:
+        return InThisProcess()
+    return open_engine(name, workers=workers, backend=backend, address=address, needs=needs)

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gear.contracts.executors import Executor, Needs, Outcome, Report
-from gear.dataset.executors.engines import DEFAULT, open_engine
-from gear.dataset.executors.in_process import InThisProcess
+from gear.dataset.executors.engines import DEFAULT, open_executor
 from gear.dataset.executors.jobs import carry_out_jobs, run_jobs, shared_folder
 from gear.dataset.json_text import load_json
 from gear.dataset.store import plan_of, splits_of
@@ -62,10 +61,8 @@ class Engine:
         Raises:
             GearError: the engine cannot be used.
         """
-        if self == Engine():
-            return InThisProcess()
         needs = Needs(silence_s=math.inf, gpus=gpus)
-        return open_engine(self.name, workers=self.workers, backend="attack", address=self.address, needs=needs)
+        return open_executor(self.name, workers=self.workers, backend="attack", address=self.address, needs=needs)
 
 
 def attack_scenes(

@@ -19,8 +19,7 @@ from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.executors import Executor, Needs, Outcome
 from gear.dataset.claims import clear_claims
-from gear.dataset.executors.engines import DEFAULT, open_engine
-from gear.dataset.executors.in_process import InThisProcess
+from gear.dataset.executors.engines import DEFAULT, open_executor
 from gear.dataset.files import clear_scratch, write_whole
 from gear.dataset.guarded_paths import remove_empty_folders
 from gear.dataset.json_text import dump_json
@@ -163,11 +162,8 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
 
 
 def _executor(request: DriveRequest) -> Executor:
-    count = fitting_workers(request.workers)
-    if count == 1 and request.engine == DEFAULT and request.address is None:
-        return InThisProcess()
-    needs = Needs(silence_s=LONGEST_DRIVE_S)
-    return open_engine(request.engine, workers=count, backend="drive", address=request.address, needs=needs)
+    count, needs = fitting_workers(request.workers), Needs(silence_s=LONGEST_DRIVE_S)
+    return open_executor(request.engine, workers=count, backend="drive", address=request.address, needs=needs)
 
 
 def _made(drives: Drives, executor: Executor, callbacks: Callbacks) -> dict[int, Outcome]:

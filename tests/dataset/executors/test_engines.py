@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gear.dataset import executors
-from gear.dataset.executors.engines import engine_names, open_engine
+from gear.dataset.executors.engines import engine_names, open_engine, open_executor
 from gear.dataset.executors.in_process import InThisProcess
 from gear.dataset.executors.processes import Processes
 from gear.values.errors import GearError, UnknownNameError
@@ -39,3 +39,12 @@ def test_a_new_engine_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_the_processes_of_one_machine_take_no_address() -> None:
     with pytest.raises(GearError, match="--address is for engines of several machines"):
         open_engine("processes", workers=1, backend="raster", address="auto")
+
+
+def test_only_a_single_worker_of_the_default_engine_is_this_process() -> None:
+    assert isinstance(open_executor("processes", workers=1, backend="classic"), InThisProcess)
+    assert isinstance(open_executor("processes", workers=2, backend="classic"), Processes)
+    with pytest.raises(GearError):  # the default engine takes no address, and an address is not passed over
+        open_executor("processes", workers=1, backend="classic", address="here")
+    with pytest.raises(UnknownNameError):
+        open_executor("nothing", workers=1, backend="classic")

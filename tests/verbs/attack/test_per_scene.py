@@ -76,7 +76,7 @@ def test_the_command_and_its_flags(
         asked.append((name, given["workers"], given["address"]))
         return InThisProcess()
 
-    monkeypatch.setattr(per_scene, "open_engine", opened)
+    monkeypatch.setattr(per_scene, "open_executor", opened)
     data = [word for root in scenes[:2] for word in ("--data", str(root))]
     command = ["attack", "--model", "tiny_segmenter", *data, "--out", str(tmp_path / "all"), "--steps", "1"]
     command += [word for setting in SMALL for word in ("--set", setting)]
