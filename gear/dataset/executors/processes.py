@@ -19,6 +19,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any, TypeVar
@@ -137,6 +138,10 @@ class _Pool:
         ours, theirs = context.Pipe()
         name = f"gear-{len(self.workers)}"
         process = context.Process(target=_work, args=(self.work, theirs), name=name)  # no daemon: it may have workers
+        if sys.platform != "win32":
+            # multiprocessing starts its resource tracker with the first process, which unblocks SIGINT. Started here,
+            # it leaves the mask below as it is.
+            resource_tracker.ensure_running()
         # The worker inherits the mask, so that Ctrl-C does not stop it amid its imports.
         with _no_interrupts(), threads_set(share_of(self.count)):
             process.start()

@@ -204,7 +204,12 @@ def test_workers_do_not_outlive_the_command(tmp_path: Path, number: signal.Signa
 def test_ctrl_c_while_workers_start_is_one_line(tmp_path: Path) -> None:
     """A terminal interrupts the whole group, workers that still import included."""
     (tmp_path / "sitecustomize.py").write_text(
-        "import os, signal, sys\nif '--multiprocessing-fork' in sys.orig_argv:\n    os.killpg(0, signal.SIGINT)\n"
+        "import os, signal, sys\n"
+        "if '--multiprocessing-fork' in sys.orig_argv:\n"
+        "    held_back = signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])\n"
+        f"    with open({str(tmp_path / 'held_back')!r}, 'a') as file:\n"
+        "        file.write(f'{held_back} ')\n"
+        "    os.killpg(0, signal.SIGINT)\n"
     )
     # A shell's background ignores it, and so would all that is started there.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -219,6 +224,7 @@ def test_ctrl_c_while_workers_start_is_one_line(tmp_path: Path) -> None:
     assert done.returncode == 130
     assert done.stderr == "gear: stopped; run the same command again to go on\n"
     assert not (tmp_path / "out").exists()
+    assert set((tmp_path / "held_back").read_text().split()) == {"True"}, "from the first worker on"
 
 
 def test_another_configuration_needs_force(tmp_path: Path, collect_small: Collect, copy_small: Copy) -> None:
