@@ -35,6 +35,7 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.attacks.square",
     "gear.plugins.attacks.rp2",
     "gear.plugins.attacks.thys",
+    "gear.plugins.attacks.naturalistic",
     "gear.plugins.attacks.control",
     "gear.plugins.controllers.detect2d",
     "gear.plugins.controllers.stereo3d",

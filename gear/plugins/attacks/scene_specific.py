@@ -23,6 +23,7 @@ from gear.values.errors import FieldError, GearError
 
 if TYPE_CHECKING:
     from gear.contracts.attacks import Objective
+    from gear.plugins.attacks.optimisation.parametrisation import Parametrisation
 
 CATEGORY_IDS = {name: number for number, name in CATEGORY_NAMES.items()}
 APPEAR_CLASS = "person"
@@ -120,8 +121,17 @@ class SceneSpecific:
         self._check_losses(model, dataset[0])
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
         return optimise_textures(
-            problem, unit_gradients(problem, objective, settings), budget=budget, rng=rng, monitor=monitor
+            problem,
+            unit_gradients(problem, objective, settings),
+            budget=budget,
+            rng=rng,
+            monitor=monitor,
+            parametrisation=self.parametrisation(),
         )
+
+    def parametrisation(self) -> Parametrisation | None:
+        """The parameters from which textures are computed; None, because the pixels are free."""
+        return None
 
     def settings(self, sample: Any) -> SceneSpecificConfig:
         """Returns the attack's options with the learning rate that fits the task of a sample, unless the options

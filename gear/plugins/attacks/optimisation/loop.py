@@ -1,4 +1,6 @@
-"""The optimisation loop for textures: Adam along an ascent direction that the attack chooses."""
+"""The optimisation loop for textures: Adam along an ascent direction that the attack chooses, on the textures' values
+or on the parameters from which the textures are computed.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +20,7 @@ from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
 from gear.plugins.attacks.optimisation.frozen_model import frozen
 from gear.plugins.attacks.optimisation.model_group import members_of
 from gear.plugins.attacks.optimisation.objectives import all_terms, not_finite
+from gear.plugins.attacks.optimisation.parametrisation import Parametrisation, Pixels
 from gear.plugins.attacks.optimisation.regularisers import non_printability, smoothness
 from gear.plugins.attacks.optimisation.settings import Settings, TextureSettings
 from gear.values.errors import GearError
@@ -31,18 +34,19 @@ NO_GRADIENT = (
 )
 
 
-ARRAYS, NUMBERS = ("textures", "mean", "square"), ("done", "seed", "has_gradient", "steps_without")
+ARRAYS, NUMBERS = ("parameters", "mean", "square"), ("done", "seed", "has_gradient", "steps_without")
 """Names of the arrays and of the numbers in a checkpoint."""
 
 
 class TextureOptimiser:
-    """The state of a texture optimisation: textures, Adam's moments, and the number of completed steps.
+    """The state of a texture optimisation: parameters, Adam's moments, and the number of completed steps.
 
     `state` returns all arrays and numbers from which an interrupted optimisation can be resumed.
 
     Attributes:
-        textures: (S, 3, h, w) float32 in 0..1.
-        mean, square: (S, 3, h, w) running means of the gradient and of its square.
+        parametrisation: computes the textures from the parameters.
+        parameters: (S, 3, ...) float32; the textures themselves with the parametrisation `Pixels`.
+        mean, square: running means of the gradient and of its square, of the parameters' shape.
         rate: peak learning rate, a scalar or (3, 1, 1).
         done: number of completed steps.
         seed: seed of the run's further random draws.
@@ -52,22 +56,31 @@ class TextureOptimiser:
     Args:
         surfaces: number S of patch surfaces.
         settings: size of the patches, and the learning rate.
-        rng: generator of the first textures and of the seed; not used with a saved state.
+        rng: generator of the first parameters and of the seed; not used with a saved state.
         saved: result of an earlier `state`, to resume from; None to start anew.
+        parametrisation: computes the textures from the parameters; None for free pixels.
     """
 
-    def __init__(self, surfaces: int, settings: TextureSettings, rng: np.random.Generator, saved: State | None) -> None:
-        shape = (surfaces, 3, settings.height_px, settings.width_px)
+    def __init__(
+        self,
+        surfaces: int,
+        settings: TextureSettings,
+        rng: np.random.Generator,
+        saved: State | None,
+        parametrisation: Parametrisation | None = None,
+    ) -> None:
+        self.parametrisation = parametrisation or Pixels(settings.height_px, settings.width_px)
+        shape = self.parametrisation.shape(surfaces)
         self.rate = torch.as_tensor(settings.rate, dtype=torch.float32).reshape(-1, 1, 1)
         if saved is None:
-            self.textures = torch.from_numpy(rng.uniform(0, 1, shape).astype(np.float32))
+            self.parameters = self.parametrisation.first(surfaces, rng)
             self.mean, self.square = torch.zeros(shape), torch.zeros(shape)
             self.done, self.seed = 0, int(rng.integers(2**62))
             self.has_gradient, self.steps_without = False, 0
             return
         blank, number = np.broadcast_to(np.float32(0), shape), np.array(0)
         check_saved(saved, dict.fromkeys(ARRAYS, blank) | dict.fromkeys(NUMBERS, number))
-        self.textures, self.mean, self.square = (torch.from_numpy(saved[n].copy()) for n in ARRAYS)
+        self.parameters, self.mean, self.square = (torch.from_numpy(saved[n].copy()) for n in ARRAYS)
         self.done, self.seed = int(saved["done"]), int(saved["seed"])
         self.has_gradient, self.steps_without = bool(saved["has_gradient"]), int(saved["steps_without"])
 
@@ -81,11 +94,11 @@ class TextureOptimiser:
         self.has_gradient |= (gradient or 0.0) > 0
 
     def step(self, ascent: Tensor, share: float) -> None:
-        """Changes the textures by one Adam step along a direction, in place; values are clipped to 0..1, and
-        `done` rises by 1.
+        """Changes the parameters by one Adam step along a direction and projects them onto the allowed ones; `done`
+        rises by 1.
 
         Args:
-            ascent: (S, 3, h, w) direction in which the textures are changed.
+            ascent: direction in which the parameters are changed, of their shape.
             share: factor on the learning rate, 0..1.
         """
         self.done += 1
@@ -93,11 +106,13 @@ class TextureOptimiser:
         self.square.lerp_(ascent.square(), 1 - BETAS[1])
         mean = self.mean / (1 - BETAS[0] ** self.done)
         square = self.square / (1 - BETAS[1] ** self.done)
-        self.textures = (self.textures + share * self.rate * mean / (square.sqrt() + EPSILON)).clamp(0, 1)
+        moved = self.parameters + share * self.rate * mean / (square.sqrt() + EPSILON)
+        self.parameters = self.parametrisation.projected(moved)
 
     def patches(self) -> tuple[Patch, ...]:
         """The current textures as patches, one for each surface."""
-        rgb = self.textures.permute(0, 2, 3, 1).contiguous().numpy()
+        textures = self.parametrisation.textures(self.parameters)
+        rgb = textures.permute(0, 2, 3, 1).contiguous().numpy()
         return tuple(Patch(name=f"patch_{n}", rgb=one.copy()) for n, one in enumerate(rgb))
 
     def state(self) -> State:
@@ -185,6 +200,7 @@ def optimise_textures(
     rng: np.random.Generator,
     monitor: Monitor | None = None,
     before: Callable[[int], None] | None = None,
+    parametrisation: Parametrisation | None = None,
 ) -> tuple[Patch, ...]:
     """Optimises the textures of all patch surfaces together with Adam, and returns them as patches.
 
@@ -195,6 +211,7 @@ def optimise_textures(
         rng: generator of all random choices.
         monitor: called after every step; it can end the run and provide a saved state to start from.
         before: called before every step with the number of completed steps.
+        parametrisation: computes the textures from the optimised parameters; None for free pixels.
 
     Returns:
         Patches named `patch_0`, `patch_1`, …, in the order of the scene's surfaces.
@@ -205,7 +222,7 @@ def optimise_textures(
     """
     settings, count = problem.settings, len(problem.dataset)
     saved = monitor.resume() if monitor is not None else None
-    optimiser = TextureOptimiser(problem.surfaces(), settings, rng, saved)
+    optimiser = TextureOptimiser(problem.surfaces(), settings, rng, saved, parametrisation)
     begun = optimiser.done
     with frozen(problem.model):
         while optimiser.done < budget.steps:
@@ -213,7 +230,9 @@ def optimise_textures(
             if before is not None:
                 before(done)
             indices = batch_of(done, count, settings.batch, optimiser.seed)
-            textures = optimiser.textures.clone().requires_grad_(True)
+            parameters = optimiser.parameters.clone().requires_grad_(True)
+            shown = optimiser.parametrisation.textures(parameters)
+            textures = shown.detach().clone().requires_grad_(True)
             direction, values = ascend(textures, problem.compose_batch(textures, indices, done, optimiser.seed))
             if not bool(direction.isfinite().all()):
                 raise not_finite(f"the gradient of step {done + 1}", indices)
@@ -221,7 +240,8 @@ def optimise_textures(
             if optimiser.steps_without * settings.batch >= 2 * count + settings.batch:
                 raise GearError(NO_GRADIENT)
             share = 0.5 * (1 + math.cos(math.pi * done / budget.steps)) if settings.decay else 1.0
-            optimiser.step(direction, share)
+            (ascent,) = torch.autograd.grad(shown, parameters, direction)
+            optimiser.step(ascent, share)
             if monitor is not None and monitor.step(optimiser.done, values, optimiser.patches, optimiser.state):
                 break
     if optimiser.done > begun and not optimiser.has_gradient:

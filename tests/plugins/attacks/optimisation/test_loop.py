@@ -123,7 +123,7 @@ def test_steps_are_adams_within_the_colour_cube(rate: Any) -> None:
     """Kingma and Ba, ICLR 2015, algorithm 1, upwards."""
     settings = TextureSettings(height_px=4, width_px=8, learning_rate=rate)
     ours = TextureOptimiser(2, settings, derive_rng(0, "textures"), None)
-    rng, wanted = derive_rng(0, "ascents"), ours.textures.double().numpy()
+    rng, wanted = derive_rng(0, "ascents"), ours.parameters.double().numpy()
     first, second = np.zeros_like(wanted), np.zeros_like(wanted)
     for step, share in enumerate((1.0, 0.7, 0.4, 0.1), start=1):
         ascent = rng.normal(size=wanted.shape).astype(np.float32)
@@ -131,7 +131,7 @@ def test_steps_are_adams_within_the_colour_cube(rate: Any) -> None:
         first, second = 0.9 * first + 0.1 * ascent, 0.999 * second + 0.001 * ascent**2
         way = (first / (1 - 0.9**step)) / (np.sqrt(second / (1 - 0.999**step)) + 1e-8)
         wanted = (wanted + share * np.reshape(rate, (-1, 1, 1)) * way).clip(0, 1)
-        np.testing.assert_allclose(ours.textures.numpy(), wanted, atol=2e-5)
+        np.testing.assert_allclose(ours.parameters.numpy(), wanted, atol=2e-5)
     assert ours.done == 4 and wanted.min() == 0 and wanted.max() == 1
 
 
@@ -143,13 +143,13 @@ def test_the_rate_falls_with_a_cosine_where_it_is_to(decay: bool) -> None:
     settings = replace(SETTINGS, learning_rate=0.1, decay=decay)
     problem = Problem(model=contract.model(), dataset=dataset, compositor=TinyCompositor(dataset), settings=settings)
     black = TextureOptimiser(1, settings, derive_rng(0, "black"), None).state()
-    monitor = RecordingMonitor(start=black | {"textures": np.zeros_like(black["textures"])})
+    monitor = RecordingMonitor(start=black | {"parameters": np.zeros_like(black["parameters"])})
     optimise_textures(
         problem, lambda textures, _: (torch.ones_like(textures), {"gradient": 1.0}), budget=Budget(steps=5),
         rng=derive_rng(0, "optimise_textures"), monitor=monitor,
     )  # fmt: skip
     shares = [0.5 * (1 + math.cos(math.pi * done / 5)) if decay else 1.0 for done in range(5)]
-    gone = [float(state["textures"].mean()) for state in monitor.states]
+    gone = [float(state["parameters"].mean()) for state in monitor.states]
     assert gone == pytest.approx(np.cumsum(shares) * 0.1, abs=1e-5)
 
 
@@ -228,7 +228,7 @@ def test_a_state_of_another_size_is_refused() -> None:
     [
         ({"mean": np.zeros((1, 3, 12, 1), np.float32)}, r"patches of \(1, 3, 12, 1\), not \(1, 3, 12, 24\)"),
         ({"square": np.zeros((1, 3, 12, 24))}, "its 'square' is no float32"),
-        ({"textures": np.full((1, 3, 12, 24), np.nan, np.float32)}, "its 'textures' is no float32"),
+        ({"parameters": np.full((1, 3, 12, 24), np.nan, np.float32)}, "its 'parameters' is no float32"),
         ({"done": np.zeros(2, np.int64)}, "its 'done' is no int64"),
         ({"seed": np.array(0.5)}, "its 'seed' is no int64"),
     ],
