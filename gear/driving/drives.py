@@ -65,6 +65,15 @@ class DriveRun:
         return self.town, self.scene, self.scenario, self.speed_kmh, self.seed
 
     @property
+    def caption(self) -> str:
+        """Twin, driver and situation in a few printable words: the title of the drive's video."""
+        where = f"{Path(self.town).stem}/{self.scene}"
+        speed = f"{self.speed_kmh:g} km/h"
+        return printable(
+            f"{self.twin.upper()}   {self.driver}: {self.scenario} at {speed}, {where}, seed {self.seed}", LONGEST_TITLE
+        )
+
+    @property
     def title(self) -> str:
         """The drive in one line that is safe to print."""
         return printable(

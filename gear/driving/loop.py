@@ -20,8 +20,9 @@ from gear.measuring.guarded_model import GuardedModel
 from gear.plugins.build import blamed
 from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import PluginError
-from gear.values.frames import UInt8Image
+from gear.values.frames import Frame, UInt8Image
 from gear.values.rig import Rig
+from gear.values.scene import SceneRecord
 from gear.values.serial import Json, to_json
 
 FORMAT = 1
@@ -56,8 +57,7 @@ class Sight:
         Returns:
             (H, W, 3) uint8 pictures by camera, and the prediction; the prediction is None without a model.
         """
-        record = self.session.pipeline.with_effects(simulation.record(self.rig, frame))
-        shown = self.session.to_frame(self.session.shoot(record))
+        record, shown = self._shot(simulation, frame)
         views = {name: view.rgb for name, view in shown.views.items()}
         if self.model is None:
             return views, None
@@ -66,6 +66,19 @@ class Sight:
             with blamed(self.session.plugin, f"frame {frame}"):
                 self.evaluator.update(self.session.task.ground_truth(shown, record), prediction)
         return views, prediction
+
+    def pictures(self, simulation: DriveSimulation, frame: int) -> Mapping[str, UInt8Image]:
+        """Renders the current state for the video: (H, W, 3) uint8 pictures by camera; nothing is predicted.
+
+        Args:
+            simulation: the drive whose current state is rendered.
+            frame: number of the frame, from 0.
+        """
+        return {name: view.rgb for name, view in self._shot(simulation, frame)[1].views.items()}
+
+    def _shot(self, simulation: DriveSimulation, frame: int) -> tuple[SceneRecord, Frame]:
+        record = self.session.pipeline.with_effects(simulation.record(self.rig, frame))
+        return record, self.session.to_frame(self.session.shoot(record))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -121,8 +134,10 @@ class Wheel:
         return PluginError(f"{self.spec.name} ({owner.package} {owner.version})", stage, problem)
 
 
-Watch = Callable[[Situation, Mapping[str, UInt8Image], Any, Action], None]
-"""Type of a function that is called in every frame with the state, the pictures, the prediction and the action."""
+Watch = Callable[[Situation, Mapping[str, UInt8Image], Any, Action | None], None]
+"""Type of a function that is called in every frame with the state, the pictures, the prediction and the action, and
+once more at the end of the drive, where prediction and action are None.
+"""
 
 
 def drive(
@@ -135,7 +150,7 @@ def drive(
         draw: the scenario, the speed and the seed.
         wheel: the controller.
         sight: cameras and network; None for a controller without cameras, for which nothing is rendered.
-        watch: called in every frame with the state, the pictures, the prediction and the action; None for nothing.
+        watch: called in every frame and at the end of the drive (`Watch`); None for nothing.
 
     Returns:
         The log: a head with the scenario, the car and the assets of the road users; one entry per frame
@@ -168,6 +183,8 @@ def drive(
             watch(situation, views, seen, action)
         situation = simulation.step(action)
     log.append(frame_entry(situation, danger_of(situation, scripted), None, ids))
+    if watch is not None:
+        watch(situation, {} if sight is None else sight.pictures(simulation, situation.frame), None, None)
     log.append({"ending": situation.ending, "crash": None if situation.crash is None else to_json(situation.crash)})
     return log
 

@@ -228,7 +228,7 @@ def _made(shop: _Workshop, run: DriveRun) -> bool:
         sight = Sight(session=session, rig=session.task.rig(), model=model, evaluator=evaluator)
     wheel = Wheel(plugin=cast.controller.found, controller=build(cast.controller.found, cast.controller.options))
     draw = Draw(name=run.scenario, scenario=drives.scenario(run), speed_mps=run.speed_kmh / 3.6, seed=run.seed)
-    video = Video() if drives.has_video(run) else None
+    video = Video(run.caption) if drives.has_video(run) else None
     log = drive(place.simulation, draw, wheel, sight, None if video is None else video.watch)
     data = log_bytes(log)
     result = DriveResult(

@@ -5,18 +5,20 @@ from __future__ import annotations
 import base64
 import html
 from collections.abc import Sequence
+from urllib.parse import quote
 
 from gear.reporting.report_page import report_page
 from gear.verbs.drive.report import DriveReport
 from gear.verbs.drive.table import cells, legend, speed_cells
 
 
-def page(report: DriveReport, figures: Sequence[tuple[str, bytes]] = ()) -> str:
+def page(report: DriveReport, figures: Sequence[tuple[str, bytes]] = (), videos: Sequence[tuple[str, str]] = ()) -> str:
     """The whole page as HTML text. Names from configs are escaped, and the page has no scripts.
 
     Args:
         report: the report.
         figures: SVG charts of situations, each with its title.
+        videos: paths of the videos of twins, relative to the folder of the page, each with its title.
     """
     parts = [f'<p class="dim">{html.escape(legend())}.</p>']
     parts += ["<h2>Drivers, scenarios and twins</h2>", table(cells(report), 3)]
@@ -27,6 +29,9 @@ def page(report: DriveReport, figures: Sequence[tuple[str, bytes]] = ()) -> str:
         parts.append(
             f'<h3>{name}</h3><p><img alt="ways and speeds: {name}" src="data:image/svg+xml;base64,{source}"></p>'
         )
+    if videos:
+        links = "".join(f'<li><a href="{quote(path)}">{html.escape(title)}</a></li>' for title, path in videos)
+        parts.append(f"<h2>Videos of the twins beside each other</h2><ul>{links}</ul>")
     if report.failed:
         failed = "".join(f"<li>{html.escape(title)}: {html.escape(problem)}</li>" for title, problem in report.failed)
         parts.append(f"<h2>Drives that could not be made</h2><ul>{failed}</ul>")

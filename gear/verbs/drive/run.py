@@ -37,6 +37,7 @@ from gear.verbs.drive.page import page
 from gear.verbs.drive.report import DriveReport
 from gear.verbs.drive.request import DriveRequest
 from gear.verbs.drive.table import text
+from gear.verbs.drive.twin_videos import write_twin_videos
 
 LONGEST_DRIVE_S = 7200.0
 """Time without a message after which a worker counts as hung, seconds: a drive of two minutes has 1200 frames, and the
@@ -69,7 +70,9 @@ def drive(
     road users move. Each drive depends only on the config and its seed.
 
     The folder `out` gets `report.html`, `table.txt`, `drives.csv` (one line per drive), `drive.json`, `drive.yml` (the
-    config with all defaults filled in), and the folder `drives` with a log of each drive.
+    config with all defaults filled in), and the folder `drives` with a log of each drive. With `video: true`, each
+    drive of a driver with cameras also leaves a video, and the folder `videos` has the twins of each situation beside
+    each other.
 
     Args:
         config: name (`gear drive quick`) or path of a drive config.
@@ -146,7 +149,7 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
         ("drives.csv", _csv(report)),
         ("drive.json", dump_json(report.as_json())),
         ("table.txt", text(report).encode()),
-        ("report.html", page(report, _figures(drives, results)).encode()),
+        ("report.html", page(report, _figures(drives, results), write_twin_videos(drives, results)).encode()),
     ):
         write_whole(drives.root, name, data)
     clear_scratch(drives.root)

@@ -97,7 +97,8 @@ def test_the_tables() -> None:
 
 
 def test_the_page_escapes_names_and_has_no_scripts() -> None:
-    shown = page(study(), [("a <title>", b"<svg/>")])
+    shown = page(study(), [("a <title>", b"<svg/>")], [("a <video>", 'videos/"a".mp4')])
+    assert '<a href="videos/%22a%22.mp4">a &lt;video&gt;</a>' in shown
     assert "a &lt;title&gt;" in shown and "data:image/svg+xml;base64,PHN2Zy8+" in shown
     assert "a &lt;drive&gt;" in shown and "<script" not in shown and "70 % [35, 93]" in shown
     assert table([["a", "b"], ["x", "1"], ["x", "2"]], 2).count(">x<") == 1

@@ -100,7 +100,9 @@ def test_a_driver_with_a_camera_drives_the_same_twins(config: Path, tmp_path: Pa
     found = gear.drive(config, out=tmp_path, settings=settings)
     videos = list((tmp_path / "drives").glob("*/*/video.mp4"))
     assert len(videos) == 2 and all(video.stat().st_size > 5000 for video in videos)
-    assert "data:image/svg+xml" in (tmp_path / "report.html").read_text()
+    together = list((tmp_path / "videos").glob("eyes/*.mp4"))
+    shown = (tmp_path / "report.html").read_text()
+    assert len(together) == 1 and f'href="videos/eyes/{together[0].name}"' in shown and "data:image/svg+xml" in shown
     assert len(set(hashes(found))) == 1 and len(found.results) == 2
     assert [one.patch for one in found.results] == ["none", "random"]
     assert found.results[0].renderer is not None
