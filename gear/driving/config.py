@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from gear.config.collection import MOST_CROWDED, WeatherConfig
 from gear.config.nodes import Mapping, Node, Place
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
+from gear.driving.dynamics import DynamicsName
 from gear.driving.scenario import SPEEDS_KMH
 from gear.values.errors import FieldError
 from gear.values.serial import PLACES
@@ -83,6 +84,8 @@ class DriveConfig:
         seed: seed of the first drive.
         weather: a weather preset, or a preset and the parameters that differ from it.
         crowd: factor on the scene's numbers of other vehicles and people, 0 to 10.
+        dynamics: model of the ego car's motion: `kinematic` for the bicycle, `mujoco` for a car with four wheels and a
+            suspension.
         video: whether each drive with cameras leaves a video (MP4), which needs the extra `video`.
         open_loop: whether the predictions of each drive are also evaluated by the metrics of their task, against the
             ground truth of the very same frames.
@@ -99,6 +102,7 @@ class DriveConfig:
     seed: int = 0
     weather: WeatherConfig = field(default_factory=WeatherConfig)
     crowd: float = 0.5
+    dynamics: DynamicsName = "kinematic"
     video: bool = False
     open_loop: bool = False
     collect: Node = field(default_factory=_nothing)

@@ -210,6 +210,7 @@ class Drives:
             "patch": {"label": patch.label, "sha256": patch.digest},
             "versions": versions(),
             **({"open_loop": True} if self.config.open_loop else {}),
+            **({} if self.config.dynamics == "kinematic" else {"dynamics": self.config.dynamics}),
         }
 
     def folder(self, run: DriveRun, patch: PatchSet) -> str:

@@ -99,7 +99,9 @@ def _distance_m(outline_m: Points, observation: Observation) -> float:
     return float(min(np.linalg.norm(outside, axis=1).min(), np.linalg.norm(other, axis=1).min()))
 
 
-def frame_entry(situation: Situation, danger: Danger, action: Action | None, ids: Mapping[str, int]) -> Json:
+def frame_entry(
+    situation: Situation, danger: Danger, action: Action | None, ids: Mapping[str, int], *, with_tilt: bool = False
+) -> Json:
     """The log entry of one frame.
 
     Args:
@@ -107,11 +109,13 @@ def frame_entry(situation: Situation, danger: Danger, action: Action | None, ids
         danger: what is in front of the car.
         action: the controller's decision; None in the last frame.
         ids: ids of the road users by body.
+        with_tilt: whether the entry has the pitch and the roll of the ego car.
 
     Returns:
         Motion of the ego car (`ego` is x, y, z and yaw), its position on the route, the danger, and `actors` (id, x, y,
         yaw and speed of each other road user); with a decision also `command` (acceleration, steering angle) and
-        `notes`. Metres, seconds, radians.
+        `notes`; with `with_tilt` also `tilt` (pitch, positive with the nose down, and roll, positive to the right).
+        Metres, seconds, radians.
     """
     ego, position = situation.ego, situation.position
     entry: dict[str, Any] = {
@@ -133,6 +137,9 @@ def frame_entry(situation: Situation, danger: Danger, action: Action | None, ids
             for body, spawn in situation.spawns.items()
         ],
     }
+    if with_tilt:
+        rotation = situation.world_from_ego.rotation
+        entry["tilt"] = [math.asin(-float(rotation[2, 0])), math.atan2(float(rotation[2, 1]), float(rotation[2, 2]))]
     if action is not None:
         entry["command"] = [action.acceleration_mps2, action.steering_rad]
         entry["notes"] = dict(sorted(action.notes.items()))

@@ -153,7 +153,8 @@ def drive(
         watch: called in every frame and at the end of the drive (`Watch`); None for nothing.
 
     Returns:
-        The log: a head with the scenario, the car and the assets of the road users; one entry per frame
+        The log: a head with the scenario, the car, the assets of the road users, and the dynamics if they are not
+        kinematic; one entry per frame
         (`frame_entry`); and an end with `ending` and `crash`.
 
     Raises:
@@ -164,6 +165,7 @@ def drive(
     with blamed(wheel.plugin, "reset"):
         wheel.controller.reset(draw.seed)
     ids, scripted = simulation.ids, simulation.scripted_id
+    has_body = simulation.dynamics != "kinematic"
     log: list[Json] = [
         {
             "format": FORMAT,
@@ -173,16 +175,17 @@ def drive(
             "conflict_s_m": _finite(simulation.start.conflict_s_m),
             "scripted_id": scripted,
             "actors": {str(ids[body]): name for body, name in simulation.assets.items()},
+            **({"dynamics": simulation.dynamics} if has_body else {}),
         }
     ]
     while not situation.is_over:
         views, seen = ({}, None) if sight is None else sight.look(simulation, situation.frame)
         action = wheel.decide(situation, sight, views, seen)
-        log.append(frame_entry(situation, danger_of(situation, scripted), action, ids))
+        log.append(frame_entry(situation, danger_of(situation, scripted), action, ids, with_tilt=has_body))
         if watch is not None:
             watch(situation, views, seen, action)
         situation = simulation.step(action)
-    log.append(frame_entry(situation, danger_of(situation, scripted), None, ids))
+    log.append(frame_entry(situation, danger_of(situation, scripted), None, ids, with_tilt=has_body))
     if watch is not None:
         watch(situation, {} if sight is None else sight.pictures(simulation, situation.frame), None, None)
     log.append({"ending": situation.ending, "crash": None if situation.crash is None else to_json(situation.crash)})

@@ -15,13 +15,16 @@ import numpy as np
 
 from gear.contracts.controllers import Action, CarFacts, Observation, Obstacle, Points
 from gear.driving.crash import Crash, CrashDetector, impact_mps
+from gear.driving.dynamics import Dynamics, DynamicsName, PlanarCar
 from gear.driving.lane_path import PathPosition, to_ego
 from gear.driving.road_users import RoadUserMotion
 from gear.driving.start import Draw, Start, StartSampler
-from gear.driving.vehicle import KinematicBicycle, VehicleState, car_facts
+from gear.driving.vehicle import VehicleState, car_facts
+from gear.driving.wheeled_car import WheeledCar
 from gear.values.geometry import RigidTransform
 from gear.values.rig import CameraMount, Rig
 from gear.values.scene import SceneRecord
+from gear.world.assets.actor_types import ActorType
 from gear.world.placement import PlacementSpace
 from gear.world.planner import actor_record
 from gear.world.roads.junctions import Junctions
@@ -61,7 +64,8 @@ class Situation:
         frame: number of the frame, from 0.
         time_s: time since the start.
         ego: the ego car.
-        world_from_ego: its pose on the ground.
+        world_from_ego: its pose; its pitch and roll are those of the ground, or of the car's body with the dynamics
+            `mujoco`.
         car: its sizes and limits.
         position: its position on its route.
         cruise_mps: its desired speed.
@@ -128,7 +132,7 @@ class _Drive:
     start: Start
     motion: RoadUserMotion
     detector: CrashDetector
-    bicycle: KinematicBicycle
+    dynamics: Dynamics
     ids: dict[str, int] = field(default_factory=dict)
     stood_s: float = 0.0
 
@@ -138,20 +142,27 @@ class DriveSimulation:
     depends only on its draw (scenario, speed and seed) and on the actions.
     """
 
-    def __init__(self, world: World, crowd: SceneSpec) -> None:
+    def __init__(self, world: World, crowd: SceneSpec, dynamics: DynamicsName = "kinematic") -> None:
         """Prepares drives in a world.
 
         Args:
             world: the compiled world.
             crowd: the scene with the numbers of the other road users.
+            dynamics: model of the ego car's motion.
         """
-        self._world = world
+        self._world, self._dynamics = world, dynamics
+        self._wheeled_car: WheeledCar | None = None
         bodies = {slot.body: world.types[slot.actor.name] for slot in world.slots}
         self._space = PlacementSpace(world.placement_model, bodies, world.parked_m)
         self._sampler = StartSampler(world, crowd, self._space)
         self._junctions = Junctions(world.lanes)
         self._drive: _Drive | None = None
         self._situation: Situation | None = None
+
+    @property
+    def dynamics(self) -> DynamicsName:
+        """Name of the model of the ego car's motion."""
+        return self._dynamics
 
     @property
     def start(self) -> Start:
@@ -202,12 +213,13 @@ class DriveSimulation:
             start=start,
             motion=motion,
             detector=CrashDetector(self._space, body, spawn.actor_type),
-            bicycle=KinematicBicycle(car=car_facts(spawn.actor_type)),
+            dynamics=self._dynamics_of(spawn.actor_type),
             ids={name: number for number, name in enumerate(start.road_users.spawns, start=1)},
         )
         state = VehicleState(x_m=spawn.x_m, y_m=spawn.y_m, yaw_rad=spawn.yaw_rad, speed_mps=start.speed_mps)
         position = start.path.locate(state, start.s_m)
         pose = start.road_users.poses[body]
+        self._drive.dynamics.reset(state, pose)
         self._situation = self._at(0, state, position, pose, motion.spawns())
         return self._situation
 
@@ -225,7 +237,7 @@ class DriveSimulation:
         state, position, pose = now.ego, now.position, now.world_from_ego
         crash, tick_s = None, FRAME_S / TICKS
         for tick in range(1, TICKS + 1):
-            state = drive.bicycle.step(state, action, tick_s)
+            state = drive.dynamics.step(action, tick_s)
             position = drive.start.path.locate(state, position.s_m)
             drive.motion.advance(tick_s, position, state.speed_mps)
             height_m = float(pose.translation_m[2])
@@ -235,7 +247,7 @@ class DriveSimulation:
             )
             is_last = tick == TICKS
             if near or is_last:
-                pose = drive.detector.ego_pose(state.x_m, state.y_m, height_m, state.yaw_rad)
+                pose = drive.dynamics.pose() or drive.detector.ego_pose(state.x_m, state.y_m, height_m, state.yaw_rad)
             body = drive.detector.hit(pose, near)
             if body is not None or (is_last and drive.detector.hits_town(pose)):
                 crash = self._crash(now.time_s + tick * tick_s, state, near, body)
@@ -248,7 +260,8 @@ class DriveSimulation:
         return self._situation
 
     def record(self, rig: Rig, index: int) -> SceneRecord:
-        """The scene record of the current state, which a renderer draws.
+        """The scene record of the current state, which a renderer draws. With the dynamics `mujoco`, the cameras have
+        the pitch and the roll of the car's body.
 
         Args:
             rig: the cameras on the ego car.
@@ -260,9 +273,11 @@ class DriveSimulation:
         actors = [actor_record(drive.ids[ego_body], ego, now.world_from_ego)]
         for body, spawn in now.spawns.items():
             is_still = body not in drive.motion.moving
-            pose = drive.start.road_users.poses[body] if is_still else drive.detector.pose(spawn)
-            actors.append(actor_record(drive.ids[body], spawn, pose))
+            standing = drive.start.road_users.poses[body] if is_still else drive.detector.pose(spawn)
+            actors.append(actor_record(drive.ids[body], spawn, standing))
         carrier = next((actor.id for actor in actors if actor.role == "carrier"), None)
+        placed = rig if self._dynamics == "kinematic" else replace(rig, follows_road=True)
+        pose = now.world_from_ego
         return SceneRecord(
             town=self._world.town_name,
             scene=self._world.scene_name,
@@ -275,8 +290,16 @@ class DriveSimulation:
             weather=self._world.weather,
             actors=tuple(actors),
             surfaces=self._world.surface_records(carrier),
-            cameras=rig.place(now.world_from_ego),
+            cameras=placed.place(RigidTransform.from_parts("world", "ego", pose.rotation, pose.translation_m)),
         )
+
+    def _dynamics_of(self, actor_type: ActorType) -> Dynamics:
+        """The model of the ego car; the four-wheeled car is compiled once."""
+        if self._dynamics == "kinematic":
+            return PlanarCar(car_facts(actor_type))
+        if self._wheeled_car is None:
+            self._wheeled_car = WheeledCar(self._world.placement_model, actor_type)
+        return self._wheeled_car
 
     def _at(
         self, frame: int, state: VehicleState, position: PathPosition, pose: RigidTransform, spawns: Mapping[str, Spawn]
@@ -288,7 +311,7 @@ class DriveSimulation:
             time_s=frame * FRAME_S,
             ego=state,
             world_from_ego=pose,
-            car=drive.bicycle.car,
+            car=drive.dynamics.car,
             position=position,
             cruise_mps=drive.start.speed_mps,
             path_m=drive.start.path.ahead(state, position.s_m),

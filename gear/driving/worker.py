@@ -37,6 +37,7 @@ from gear.values.errors import DatasetError, GearError, PlacementError
 from gear.values.serial import Json, from_json, to_json
 from gear.world.compilation.world_cache import load_or_compile
 from gear.world.scene_spec import SceneSpec
+from gear.world.world import World
 
 LEAST_POOL = 4
 """Smallest number of other vehicles and of people that a world can show, so that scenarios find their actors."""
@@ -120,11 +121,13 @@ class _Workshop:
             world = load_or_compile(
                 town=config.town, scene_name=config.scene, scene=with_pool(scene), weather=named.weather
             )
-            return _Place(simulation=DriveSimulation(world, with_any_number(scene)), session=None, job=None)
+            return _Place(simulation=self._simulation(world, scene), session=None, job=None)
         job = resolve(config)
         session = self.open_places.enter_context(open_session(replace(job, scene=with_pool(job.scene))))
-        simulation = DriveSimulation(session.world, with_any_number(job.scene))
-        return _Place(simulation=simulation, session=session, job=job)
+        return _Place(simulation=self._simulation(session.world, job.scene), session=session, job=job)
+
+    def _simulation(self, world: World, scene: SceneSpec) -> DriveSimulation:
+        return DriveSimulation(world, with_any_number(scene), self.drives.config.dynamics)
 
     def model_of(self, cast: Cast) -> GuardedModel | None:
         """The network of a driver, with its defense; None without one."""

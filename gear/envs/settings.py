@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from gear.config.collection import RendererName
 from gear.contracts.rendering import Quality
+from gear.driving.dynamics import DynamicsName
 from gear.driving.scenario import SPEEDS_KMH, Scenario, load_scenarios
 from gear.driving.start import Draw
 from gear.values.errors import FieldError, GearError, UnknownNameError
@@ -34,6 +35,8 @@ class DriveSettings:
         scenarios: name of a scenario library, or path of its YAML.
         scenario: name of a scenario; empty to draw one of the library in each episode.
         speed_kmh: speed of the ego car at the start, and its desired speed; 0 to draw one of the scenario's.
+        dynamics: model of the ego car's motion: `kinematic` for the bicycle, `mujoco` for a car with four wheels and a
+            suspension.
         obstacles: number of the nearest road users whose true positions are observed; 0 for none.
         width_px, height_px: size of the camera's picture; 0 for an environment without camera, which renders nothing.
         renderer, quality: renderer of the pictures.
@@ -47,6 +50,7 @@ class DriveSettings:
     scenarios: str = "standard"
     scenario: str = ""
     speed_kmh: float = 0.0
+    dynamics: DynamicsName = "kinematic"
     obstacles: int = 8
     width_px: int = 0
     height_px: int = 0
@@ -61,6 +65,8 @@ class DriveSettings:
         low, high = SPEEDS_KMH
         if self.speed_kmh and not low <= self.speed_kmh <= high:
             raise FieldError("speed_kmh", f"must be 0, or {low:g} to {high:g}, got {self.speed_kmh:g}")
+        if self.dynamics not in get_args(DynamicsName):
+            raise FieldError("dynamics", f"must be {' or '.join(get_args(DynamicsName))}, got {self.dynamics!r}")
         if self.patch != "none" and not self.has_camera:
             raise FieldError("patch", "a patch needs a camera that sees it; give width_px and height_px")
 

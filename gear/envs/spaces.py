@@ -11,6 +11,7 @@ import numpy.typing as npt
 from gear.contracts.controllers import Action, CarFacts, Obstacle
 from gear.driving.simulation import Situation
 from gear.envs.settings import DriveSettings
+from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -88,7 +89,12 @@ def action_of(pedals_and_steering: npt.NDArray[Any], car: CarFacts) -> Action:
         pedals_and_steering: (2,) numbers in -1..1, larger ones are clipped: pedals (1 full acceleration, -1 full
             braking) and steering (1 fully to the left).
         car: limits of the car, by which the numbers are scaled.
+
+    Raises:
+        GearError: a number is not finite.
     """
+    if not np.isfinite(pedals_and_steering).all():
+        raise GearError(f"environment: an action must be two finite numbers, got {pedals_and_steering!r}")
     pedals, steering = (float(value) for value in np.clip(pedals_and_steering, -1.0, 1.0))
     most_mps2 = car.most_acceleration_mps2 if pedals > 0 else car.most_braking_mps2
     return Action(acceleration_mps2=pedals * most_mps2, steering_rad=steering * car.most_steering_rad)

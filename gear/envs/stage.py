@@ -52,13 +52,13 @@ class DriveStage:
         if settings.has_camera:
             job = resolve(config)
             session = opened.enter_context(open_session(job))
-            simulation = DriveSimulation(session.world, job.scene)
+            simulation = DriveSimulation(session.world, job.scene, settings.dynamics)
             return DriveStage(
                 scene=settings.scene, simulation=simulation, session=session, _patch=settings.patch, _opened=opened
             )
         named = look_up(config)
         world = load_or_compile(town=config.town, scene_name=config.scene, scene=named.scene, weather=named.weather)
-        simulation = DriveSimulation(world, named.scene)
+        simulation = DriveSimulation(world, named.scene, settings.dynamics)
         return DriveStage(scene=settings.scene, simulation=simulation, session=None, _patch="none", _opened=opened)
 
     def show_patch(self, patch: str) -> None:

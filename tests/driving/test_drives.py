@@ -53,6 +53,15 @@ def test_folders_differ_and_depend_on_all_that_decides_a_drive() -> None:
     assert str(TINY_TOWN.parent) not in "".join(first)
 
 
+def test_dynamics_are_part_of_what_decides_a_drive() -> None:
+    first, other = planned(), planned(TEXT + "dynamics: mujoco\n")
+    run = first.runs[0]
+    patch = first.patch(run, 1)
+    assert "dynamics" not in first.identity(run, patch) and other.identity(run, patch)["dynamics"] == "mujoco"
+    with pytest.raises(ConfigError, match=r"drive.yml:\d+:11: dynamics: .*kinematic.*mujoco"):
+        planned(TEXT + "dynamics: bicycle\n")
+
+
 def test_pictures_have_the_options_of_the_driver() -> None:
     drives = planned()
     config = drives.collection(next(run for run in drives.runs if run.driver == "eyes"))

@@ -54,6 +54,15 @@ def simulation() -> DriveSimulation:
     return DriveSimulation(world, world.scene)
 
 
+def test_the_log_has_the_tilt_of_a_car_with_a_body() -> None:
+    world = tiny_world()
+    brake = wheel(Foreign(Action(acceleration_mps2=-8.0, steering_rad=0.0)))
+    log = drive(DriveSimulation(world, world.scene, "mujoco"), SHORT, brake)
+    assert log[0]["dynamics"] == "mujoco"
+    pitch_rad, roll_rad = log[9]["tilt"]
+    assert pitch_rad > 0.015 and abs(roll_rad) < 0.005, "the nose dives"
+
+
 def test_a_controller_receives_what_its_spec_asks_for(simulation: DriveSimulation) -> None:
     straight = Foreign(Action(acceleration_mps2=0.0, steering_rad=0.0, notes={"gap_m": 3.0}))
     watched: list[Situation] = []
@@ -61,6 +70,7 @@ def test_a_controller_receives_what_its_spec_asks_for(simulation: DriveSimulatio
     assert straight.seeds == [1] and len(straight.seen) == len(watched) - 1 == 10
     assert all(not one.obstacles and not one.views and one.prediction is None for one in straight.seen)
     assert len(log) == 1 + 11 + 1 and log[1]["notes"] == {"gap_m": 3.0} and log[-1]["ending"] == "time"
+    assert "dynamics" not in log[0] and "tilt" not in log[1]
     knowing = Foreign(straight.answer)
     drive(simulation, SHORT, wheel(knowing, needs_truth=True))
     assert knowing.seen[0].obstacles

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from gear.contracts.controllers import Action
+from gear.driving.dynamics import DynamicsName
 from gear.driving.lane_path import to_ego
 from gear.driving.road_users import lateral_m
 from gear.driving.scenario import load_scenarios
@@ -26,17 +28,24 @@ STANDARD = load_scenarios("standard").scenarios
 
 
 @cache
-def simulation(scene: str = "board") -> DriveSimulation:
+def simulation(scene: str = "board", dynamics: DynamicsName = "kinematic") -> DriveSimulation:
     world = tiny_world(scene)
-    return DriveSimulation(world, world.scene)
+    return DriveSimulation(world, world.scene, dynamics)
 
 
 def draw(name: str, speed_kmh: float, seed: int = 0) -> Draw:
     return Draw(name=name, scenario=STANDARD[name], speed_mps=speed_kmh / 3.6, seed=seed)
 
 
-def drive(name: str, speed_kmh: float, controller: Baseline, seed: int = 0, scene: str = "board") -> list[Situation]:
-    simulator = simulation(scene)
+def drive(
+    name: str,
+    speed_kmh: float,
+    controller: Baseline,
+    seed: int = 0,
+    scene: str = "board",
+    dynamics: DynamicsName = "kinematic",
+) -> list[Situation]:
+    simulator = simulation(scene, dynamics)
     situations = [simulator.reset(draw(name, speed_kmh, seed))]
     controller.reset(seed)
     while not situations[-1].is_over:
@@ -53,9 +62,10 @@ def blind() -> Blind:
 
 
 @pytest.mark.parametrize("name", ["stopped_lead", "slower_lead", "crossing_pedestrian", "standing_pedestrian"])
-@pytest.mark.parametrize("speed_kmh", [30.0, 60.0])
-def test_truth_is_saved_and_blindness_crashes(name: str, speed_kmh: float) -> None:
-    saved, lost = drive(name, speed_kmh, truth())[-1], drive(name, speed_kmh, blind())[-1]
+@pytest.mark.parametrize(("speed_kmh", "dynamics"), [(30.0, "kinematic"), (60.0, "kinematic"), (60.0, "mujoco")])
+def test_truth_is_saved_and_blindness_crashes(name: str, speed_kmh: float, dynamics: DynamicsName) -> None:
+    saved = drive(name, speed_kmh, truth(), dynamics=dynamics)[-1]
+    lost = drive(name, speed_kmh, blind(), dynamics=dynamics)[-1]
     assert saved.crash is None, saved.crash
     assert lost.crash is not None and lost.ending == "crash"
     assert lost.crash.kind == ("person" if "pedestrian" in name else "vehicle")
@@ -122,9 +132,27 @@ def test_the_record_shows_the_state() -> None:
     assert len(record.actors) == 1 + len(now.obstacles) == len({actor.id for actor in record.actors})
     assert record.camera("rgb").width_px == 320
     assert to_json(record) == to_json(simulator.record(SMALL_RIG, 0))
+    assert simulator.record(replace(SMALL_RIG, follows_road=True), 0).cameras == record.cameras, "the road is level"
     lead = record.actor(2)
     ahead = to_ego(now.ego, np.array([lead.world_from_actor.position_m[:2]]))[0]
     assert ahead[0] == pytest.approx(now.obstacles[0].ahead_m, abs=1e-4)
+
+
+def test_with_mujoco_the_camera_dives_and_the_drive_repeats() -> None:
+    simulator, logs = simulation(dynamics="mujoco"), []
+    for _ in range(2):
+        now = simulator.reset(draw("stopped_lead", 50.0))
+        level = simulator.record(SMALL_RIG, 0).cameras[0].world_from_camera.transform("world", "camera")
+        assert level.rotation[2, 2] == pytest.approx(0.0, abs=1e-6), "before it brakes the camera looks straight ahead"
+        for _ in range(10):
+            now = simulator.step(Action(acceleration_mps2=-8.0, steering_rad=0.0))
+        record = simulator.record(SMALL_RIG, 0)
+        camera = record.cameras[0].world_from_camera.transform("world", "camera")
+        assert camera.rotation[2, 2] < -0.015, "the camera looks down, because the nose dives"
+        assert record.ego.world_from_actor.transform("world", "actor").rotation[2, 0] < -0.015
+        logs.append((now.ego, now.world_from_ego.rotation.tobytes()))
+        drive("free_road", 30.0, truth(), seed=5, dynamics="mujoco")
+    assert logs[0] == logs[1]
 
 
 def test_a_place_without_room_is_one_line() -> None:

@@ -18,6 +18,8 @@ def test_an_episode_changes_what_it_names() -> None:
     assert settings.for_episode(None) == settings
     with pytest.raises(GearError, match="speed_kmh"):
         settings.for_episode({"speed_kmh": 1})
+    with pytest.raises(GearError, match="dynamics: must be kinematic or mujoco"):
+        settings_of({"dynamics": "bicycle"})
 
 
 def test_all_scenarios_and_speeds_are_drawn_once() -> None:
