@@ -154,7 +154,7 @@ class DepthEvaluator:
             (R,) values by name of the metric; NaN where no picture has ground truth.
         """
         values = {name: np.array(self.metrics.get(name, []), np.float64) for name in self._names()}
-        return {name: _known_means(one[draws]) for name, one in values.items() if len(one)}
+        return {name: known_means(one[draws]) for name, one in values.items() if len(one)}
 
     def range_of(self, metric: str) -> tuple[float, float]:
         """Smallest and largest possible value of a metric: 0 and 1 for `d1` to `d3` (shares of pixels), 0 and
@@ -211,8 +211,15 @@ class NearDepth(DepthEvaluator):
         return _renamed(super().resampled(draws))
 
 
-def _known_means(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """(R,) means of the rows of (R, N) values without NaN; NaN where a row has no other value."""
+def known_means(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The means of rows without their NaN values.
+
+    Args:
+        values: (R, N) values.
+
+    Returns:
+        (R,) means; NaN where a row has no other value.
+    """
     known = ~np.isnan(values)
     count = known.sum(axis=1)
     return np.asarray(np.where(known, values, 0).sum(axis=1) / np.where(count, count, np.nan), np.float64)

@@ -24,6 +24,7 @@ from gear.formats.jsontext import dump
 from gear.formats.png import encode_labels, encode_rgb, encode_tiff
 from gear.formats.png_rows import encode_deep
 from gear.metrics.depth import Crop, DepthEvaluator, NearDepth
+from gear.metrics.obstacle_depth import NEAREST_OBSTACLE, ObstacleDepth
 from gear.plugins.tasks.common import (
     CameraOptions,
     draw_surfaces,
@@ -200,8 +201,10 @@ class DepthTask:
         return DepthEvaluator(max_depth_m=self.config.eval_max_depth_m, crop=self.config.eval_crop)
 
     def reports(self) -> Mapping[str, Evaluator[DepthSample, FloatImage]]:
-        """Further evaluators by name: `reference` evaluates whole pictures below 80 m, without the sky."""
-        return {"reference": NearDepth()}
+        """Further evaluators by name: `reference` evaluates whole pictures below 80 m, without the sky;
+        `nearest_obstacle` evaluates the pixels of the nearest road user in the ego lane.
+        """
+        return {"reference": NearDepth(), NEAREST_OBSTACLE: ObstacleDepth(VIEW)}
 
     def without(self, sample: DepthSample, masks: Masks) -> DepthSample:
         """Returns a copy of the sample without ground truth (NaN) at the pixels of the mask, so that no metric

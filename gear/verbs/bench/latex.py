@@ -17,7 +17,12 @@ SPECIAL = {
     "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}",
 }  # fmt: skip
 
-PACKAGES = ("booktabs", "multirow", "graphicx")
+PACKAGES = ("booktabs", "graphicx")
+"""Packages of the document besides geometry and xcolor; all are in the smallest installations of TeX Live."""
+
+
+NARROWED = r"\ifdim\width>\textwidth\textwidth\else\width\fi"
+"""Width of a table in the document: its own, or that of the text if the table is wider."""
 
 
 def safe(text: str) -> str:
@@ -43,14 +48,15 @@ def tabular(table: PaperTable) -> str:
         members = list(grouped)
         lines.append(r"\midrule")
         for number, line in enumerate(members):
-            head = rf"\multirow{{{len(members)}}}{{*}}{{{safe(scene)}}}" if number == 0 else ""
+            head = f"{{{safe(scene)}}}" if number == 0 else ""  # rules read a `[` that follows as an option
             cells = " & ".join(_cell(cell) for cell in line.cells)
             lines.append(rf"{head} & {safe(line.label)} & {cells} \\")
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
 
 
 def document(tables: Sequence[PaperTable], title: str) -> str:
-    """Returns a LaTeX document that inputs the files of all tables, each scaled to the width of the text.
+    """Returns a LaTeX document that inputs the files of all tables; a table that is wider than the text is scaled to
+    its width.
 
     Args:
         tables: the tables; the file of each is in the folder of the document.
@@ -69,7 +75,7 @@ def document(tables: Sequence[PaperTable], title: str) -> str:
             r"\begin{table}[ht]",
             r"\centering",
             rf"\caption{{{safe(table.caption)}}}",
-            rf"\resizebox{{\textwidth}}{{!}}{{\input{{{table.name}}}}}",
+            rf"\resizebox{{{NARROWED}}}{{!}}{{\input{{{table.name}}}}}",
             r"\end{table}",
             r"\clearpage",
         ]
