@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from gear.camera.response import response_for
+from gear.collecting.devices import planned_renderer, planned_versions
 from gear.collecting.lookup import look_up
 from gear.collecting.patch_sources import PatchSet
 from gear.config.collection import CollectionConfig, SplitConfig
@@ -110,12 +111,12 @@ def resolve(config: CollectionConfig) -> Job:
         "interval_s": split.interval_s,
         "scene": _scene_content(named.scene),
         "weather": to_json(weather),
-        "renderer": to_json(renderer),
+        "renderer": planned_renderer(renderer, mixed=config.mixed_devices),
         "quality": config.quality,
         "camera": to_json(config.camera),
         "response": {"exposure": response.exposure, "contrast": response.contrast, "encoding": response.encoding},
         "assets": assets_digest(library),
-        "versions": versions(),
+        "versions": planned_versions(versions(), mixed=config.mixed_devices),
     }
     plan = Plan(
         task={"name": spec.name, "package": owner.package, "version": owner.version},
@@ -145,7 +146,7 @@ def recipe_of(config: CollectionConfig) -> Json:
     of the dataset.
     """
     recipe: Json = to_plain(config)
-    unused = [kind for kind in KINDS if not getattr(config, kind)]
+    unused = [name for name in (*KINDS, "mixed_devices") if not getattr(config, name)]
     for name in ("root", "patch", "town", "scenes", "simulation", *unused):
         recipe.pop(name)
     return recipe

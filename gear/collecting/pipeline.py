@@ -89,7 +89,7 @@ def _write(session: Session, store: Store, index: int, shot: Shot) -> Outcome:
         files = session.finish(shot)
     except Exception as error:
         return _failure(index, error)
-    store.write(*files)
+    store.write(*files, device=session.device)
     return Outcome(index=index)
 
 

@@ -9,24 +9,22 @@ from typing import Any
 
 from gear.camera.pipeline import CameraPipeline
 from gear.camera.reflection import MirrorView, Reflection
+from gear.collecting.devices import device_of, refuse_other_renderer
 from gear.collecting.flow_files import flow_files
 from gear.collecting.job import Job, versions
 from gear.collecting.probes import ProbeShot, compute_probes, shoot_probes
 from gear.collecting.scan_files import scan_files
-from gear.contracts.rendering import RawView, Renderer, RendererInfo
+from gear.contracts.rendering import RawView, Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
 from gear.dataset.output_checks import check_encoded
-from gear.dataset.plan import differences
 from gear.dataset.probe_files import AuxiliaryFiles, probe_files
 from gear.groundtruth.laser_scan import scan_cameras, scan_points
 from gear.groundtruth.optical_flow import FlowView, object_ids, optical_flow
 from gear.plugins.build import blamed, build, find
 from gear.plugins.catalogue import PluginEntry
 from gear.render.registry import open_renderer
-from gear.values.errors import BackendError
 from gear.values.frames import Frame, GeomTable, SceneObject
 from gear.values.scene import SceneRecord
-from gear.values.serial import to_json
 from gear.world.compilation.memory import map_large_buffers, release_memory, release_render_arrays
 from gear.world.compilation.world_cache import load_or_compile
 from gear.world.planner import ScenePlanner
@@ -94,6 +92,11 @@ class Session:
     planner: ScenePlanner
     renderer: Renderer
     pipeline: CameraPipeline
+
+    @property
+    def device(self) -> dict[str, str]:
+        """Names of device, driver and processor for the samples' sidecars; empty unless the split has mixed devices."""
+        return device_of(self.job.plan.content, self.renderer.info, versions())
 
     def record(self, index: int) -> SceneRecord:
         """The scene record of the sample `index` (actors, surfaces and cameras); it depends only on the job and the
@@ -216,7 +219,7 @@ def open_session(job: Job) -> Iterator[Session]:
     night = night_of(world, job.weather, job.config.renderer)
     renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
     try:
-        _refuse_other_renderer(job, renderer.info)
+        refuse_other_renderer(job.plan.content, renderer.info, versions())
         release_render_arrays(world.model)
         release_memory()
         planner = ScenePlanner(world, rig, job.split, split_name=job.config.split)
@@ -234,16 +237,3 @@ def open_session(job: Job) -> Iterator[Session]:
         )
     finally:
         renderer.close()
-
-
-def _refuse_other_renderer(job: Job, info: RendererInfo) -> None:
-    """Refuses a machine that would make other bytes than the plan says: another device, driver or version.
-
-    Raises:
-        BackendError: names the first differences.
-    """
-    planned = {"renderer": to_json(job.renderer), "versions": job.plan.content["versions"]}
-    here = {"renderer": to_json(info), "versions": versions()}
-    if differing := differences(planned, here, places=("in the plan", "on this worker")):
-        problem = f"this worker would make other pictures ({', '.join(differing[:2])})"
-        raise BackendError(info.name, problem, "collect on machines with the same renderer, device and versions")

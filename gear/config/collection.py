@@ -131,6 +131,8 @@ class CollectionConfig:
         scans: whether to store a laser scan (Velodyne HDL-64E) of each sample, for `gear export --layout kitti`.
         flow: whether to store the optical flow to the next frame of a driving sequence, for `gear export --layout
             kitti-flow`.
+        mixed_devices: whether different graphics devices, drivers and processors may make samples of the split; the
+            same config does not give the same bytes then.
         simulation: name or path of the simulation config.
         options: the task's own options (`gear plugins show TASK`).
         places: file, line and column of each given value, by key.
@@ -155,6 +157,7 @@ class CollectionConfig:
     probes: bool = False
     scans: bool = False
     flow: bool = False
+    mixed_devices: bool = False
     simulation: str = "default"
     options: Node = field(default_factory=lambda: Mapping({}, Place("defaults")))
     places: dict[str, Place] = field(default_factory=dict, compare=False, repr=False, metadata=PLACES)

@@ -98,6 +98,8 @@ class Sidecar:
         facts: JSON data that the task's `encode` returned.
         files: sha256 of each of the sample's files, by path relative to the dataset's root.
         auxiliary: further files by name; empty unless the collection requested them.
+        device: graphics device, driver and processor that rendered the sample; empty unless the split has mixed
+            devices.
     """
 
     record: SceneRecord
@@ -105,6 +107,7 @@ class Sidecar:
     facts: Json
     files: Mapping[str, str]
     auxiliary: Mapping[str, Auxiliary] = field(default_factory=dict)
+    device: Mapping[str, str] = field(default_factory=dict)
 
 
 class Evaluator(Protocol[SampleT_contra, PredictionT_contra]):

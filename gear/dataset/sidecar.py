@@ -14,8 +14,8 @@ from gear.values.serial import from_json, to_json
 
 
 def sidecar_bytes(sidecar: Sidecar) -> bytes:
-    """Encodes a sidecar as JSON with a hash of its own content; `auxiliary` is left out if the sample has no
-    additional files.
+    """Encodes a sidecar as JSON with a hash of its own content; `auxiliary` and `device` are left out if they
+    are empty.
     """
     content = {
         "record": to_json(sidecar.record),
@@ -25,6 +25,8 @@ def sidecar_bytes(sidecar: Sidecar) -> bytes:
     }
     if sidecar.auxiliary:
         content["auxiliary"] = to_json(dict(sidecar.auxiliary))
+    if sidecar.device:
+        content["device"] = dict(sidecar.device)
     return sealed_json(content)
 
 
@@ -47,6 +49,7 @@ def read_sidecar(path: Path) -> Sidecar:
             facts=data["facts"],
             files=from_json(dict[str, str], data["files"], "files"),
             auxiliary=from_json(dict[str, Auxiliary], data.get("auxiliary", {}), "auxiliary"),
+            device=from_json(dict[str, str], data.get("device", {}), "device"),
         )
         check_sidecar(sidecar)
         if (

@@ -228,7 +228,12 @@ class Store:
         return lacking, sorted(name for name in there if file_hash(inside(self.root, name)) != hashes[name])
 
     def write(
-        self, sample: Sample, encoded: Encoded, auxiliary: Mapping[str, tuple[Auxiliary, bytes]] | None = None
+        self,
+        sample: Sample,
+        encoded: Encoded,
+        auxiliary: Mapping[str, tuple[Auxiliary, bytes]] | None = None,
+        *,
+        device: Mapping[str, str] | None = None,
     ) -> None:
         """Writes the files of one sample, and last its sidecar (JSON file), which marks the sample as complete.
 
@@ -236,6 +241,7 @@ class Store:
             sample: the sample with its scene record and surfaces.
             encoded: the files and metadata that the task made from the sample.
             auxiliary: additional files of the sample, such as probes, with their bytes, by name.
+            device: device that rendered the sample, for splits with mixed devices.
 
         Raises:
             DatasetError: a file cannot be written.
@@ -254,6 +260,7 @@ class Store:
             facts=encoded.facts,
             files=hashes,
             auxiliary={name: file for name, (file, _) in further.items()},
+            device=device or {},
         )
         write_whole(self.root, sidecar_path(self.split, sample.record.index), sidecar_bytes(sidecar))
         remove_file(self.root, begun)

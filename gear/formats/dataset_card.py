@@ -33,6 +33,14 @@ COLLECTION = (
     "buffers; no person labelled anything. Nothing in the data shows or describes a real person."
 )
 
+MIXED_DEVICES = "mixed"
+"""Name of the device in the manifest of a split whose samples were rendered by different devices."""
+
+MIXED_NOTE = (
+    "Different graphics devices rendered the samples; the sidecar of each sample names its device. The same "
+    "configuration does not give the same bytes again, and twins may differ in last bits outside the patch."
+)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplitFacts:
@@ -45,6 +53,7 @@ class SplitFacts:
         samples: number of samples.
         created: ISO date.
         gear, mujoco: versions of gear and of MuJoCo.
+        has_mixed_devices: whether different graphics devices rendered the samples.
     """
 
     name: str
@@ -59,6 +68,7 @@ class SplitFacts:
     created: str
     gear: str
     mujoco: str
+    has_mixed_devices: bool = False
 
     @property
     def hub_name(self) -> str:
@@ -94,6 +104,7 @@ class SplitFacts:
             created=info.created,
             gear=at("versions", "gear"),
             mujoco=at("versions", "mujoco"),
+            has_mixed_devices=at("renderer", "device") == MIXED_DEVICES,
         )
 
 
@@ -153,6 +164,8 @@ def card(splits: Sequence[SplitFacts], configs: Mapping[str, Mapping[str, Sequen
     ]
     made = f"gear {first.gear}, MuJoCo {first.mujoco}, renderer {first.renderer}"
     lines += ["", "## Structure", "", structure, "", "## Creation", "", f"{COLLECTION} Versions: {made}."]
+    if mixed := ", ".join(one.name for one in splits if one.has_mixed_devices):
+        lines += ["", f"{MIXED_NOTE} Splits: {mixed}."]
     lines += ["", "## Uses", "", USES, "", "## Limits", "", LIMITS]
     lines += [
         "",

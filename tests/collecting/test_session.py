@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from gear.collecting import session as module
+from gear.collecting.devices import planned_renderer, planned_versions
 from gear.collecting.job import Job, versions
 from gear.collecting.session import open_session
 from gear.contracts.rendering import RendererInfo
@@ -39,12 +40,16 @@ class _Nothing:
     def __exit__(self, *_: object) -> None: ...
 
 
-def job_of(info: RendererInfo, changed: dict[str, str]) -> Any:
+def job_of(info: RendererInfo, changed: dict[str, str], *, mixed: bool = False) -> Any:
     config = SimpleNamespace(
         task="depth", options=None, town="town10", scene="billboard01", renderer="raster", quality="film",
         split="test", camera=None,
     )  # fmt: skip
-    plan = SimpleNamespace(content={"versions": {**versions(), **changed}})
+    content = {
+        "renderer": planned_renderer(info, mixed=mixed),
+        "versions": {**planned_versions(versions(), mixed=mixed), **changed},
+    }
+    plan = SimpleNamespace(content=content)
     return SimpleNamespace(config=config, scene=None, weather=None, split=None, renderer=info, plan=plan)
 
 
@@ -73,3 +78,24 @@ def test_a_worker_with_another_renderer_or_version_is_refused(
     with pytest.raises(BackendError, match=f"renderer raster: this worker would make other pictures .{said}"):
         open_session(job).__enter__()
     assert closed == ["raster"]
+
+
+def test_mixed_devices_share_a_split_that_names_each_of_them(closed: list[str]) -> None:
+    other = dataclasses.replace(HERE, backend="vulkan", driver="550.1", device="H200", is_software=False)
+    job: Job = job_of(other, {}, mixed=True)
+    with open_session(job) as session:
+        assert session.device == {
+            "backend": "egl", "driver": "4.5 Mesa", "device": "llvmpipe", "machine": versions()["machine"]
+        }  # fmt: skip
+    with open_session(job_of(HERE, {})) as session:
+        assert session.device == {}
+
+
+@pytest.mark.parametrize(
+    ("info", "changed"), [(dataclasses.replace(HERE, name="classic"), {}), (HERE, {"mujoco": "3.0.0"})]
+)
+def test_mixed_devices_still_need_one_renderer_and_the_same_packages(
+    info: RendererInfo, changed: dict[str, str], closed: list[str]
+) -> None:
+    with pytest.raises(BackendError, match="this worker would make other pictures"):
+        open_session(job_of(info, changed, mixed=True)).__enter__()

@@ -19,6 +19,7 @@ class VerifyReport:
         findings: files that are damaged, missing or unexpected; after a repair, only those that could not be repaired.
         repaired: files that were made again, or deleted as leftovers of an interrupted run.
         unrepaired: one line with the reason for each split that could not be repaired.
+        notes: one line for each repaired split whose new files may differ from the original ones.
     """
 
     root: Path
@@ -26,6 +27,7 @@ class VerifyReport:
     findings: tuple[Finding, ...]
     repaired: tuple[Finding, ...] = ()
     unrepaired: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def is_whole(self) -> bool:
@@ -33,12 +35,12 @@ class VerifyReport:
         return not self.findings
 
     def lines(self) -> list[str]:
-        """Returns one line per repaired or faulty file, one per split that could not be repaired, and a summary
-        line.
+        """Returns one line per repaired or faulty file, one per split that could not be repaired, the notes,
+        and a summary line.
         """
         lines = [f"repaired   {one.path}" for one in self.repaired]
         lines += [one.line() for one in self.findings]
-        lines += self.unrepaired
+        lines += [*self.unrepaired, *self.notes]
         if self.is_whole:
             return [*lines, f"{self.root}: {self.files} files, all as they were written"]
         counts = [
@@ -57,4 +59,5 @@ class VerifyReport:
             "findings": [asdict(one) for one in self.findings],
             "repaired": [asdict(one) for one in self.repaired],
             "unrepaired": list(self.unrepaired),
+            "notes": list(self.notes),
         }

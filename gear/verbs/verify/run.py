@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from gear.collecting.devices import has_mixed_devices
 from gear.collecting.run import executor_of, run_job
 from gear.dataset.cards import damaged_cards, own_cards, write_cards
 from gear.dataset.guarded_paths import refuse_links, remove_files
@@ -75,11 +76,12 @@ def _verified(
     if sources is None or not findings:
         return VerifyReport(root=root, files=_count(root, checks, chosen), findings=tuple(findings))
     unrepaired: list[str] = []
+    notes: list[str] = []
     leftovers = any(one.detail for one in findings if one.problem == "unexpected")
     for name in chosen:
         if checks[name].findings or leftovers:
             try:
-                _repair(root, checks[name], sources, workers, callbacks)
+                notes += _repair(root, checks[name], sources, workers, callbacks)
             except DatasetError as error:
                 unrepaired.append(str(error))
     write_cards(root, is_repair=True)
@@ -92,6 +94,7 @@ def _verified(
         findings=tuple(left),
         repaired=tuple(one for one in findings if one.path not in paths),
         unrepaired=tuple(unrepaired),
+        notes=tuple(notes),
     )
 
 
@@ -113,8 +116,11 @@ def _count(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) -> 
     return len({path for name in chosen for path in checks[name].known} | own_cards(root))
 
 
-def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callbacks: Callbacks) -> None:
+def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callbacks: Callbacks) -> list[str]:
     """Makes the damaged and missing files of a split again.
+
+    Returns:
+        A note if the new files may differ from the original ones; otherwise nothing.
 
     Raises:
         DatasetError: it is not recorded how the split was made, other bytes would be made on this machine, or another
@@ -128,3 +134,9 @@ def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callb
             write_plan(root, job.plan)
         remove_files(root, [sidecar_path(check.split, index) for index in sorted(check.broken_samples)])
     run_job(job, executor=executor_of(job, workers, in_subprocess=False), callbacks=callbacks)
+    if not has_mixed_devices(job.plan.content):
+        return []
+    return [
+        f"split {check.split!r} has samples of different graphics devices; the repaired samples may differ from the "
+        "original ones in last bits"
+    ]
