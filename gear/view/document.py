@@ -33,9 +33,13 @@ def asset(name: str) -> str:
     return (files("gear.view") / "page" / name).read_text(encoding="utf-8")
 
 
-def script() -> str:
-    """Returns the JavaScript of the page as one function without global variables."""
-    body = "\n".join(asset(f"{name}.js") for name in SCRIPTS)
+def script(names: Sequence[str] = SCRIPTS) -> str:
+    """Returns the JavaScript of a page as one function without global variables.
+
+    Args:
+        names: names of the JavaScript files in `gear/view/page`, in the order in which they are joined.
+    """
+    body = "\n".join(asset(f"{name}.js") for name in names)
     return f'(() => {{\n"use strict";\n{body}\n}})();\n'
 
 
@@ -104,13 +108,13 @@ def document(title: str, entries: Sequence[Entry], about: dict[str, Json]) -> It
         "script": code,
     }
     head, tail = asset("page.html").split("{{pictures}}")
-    yield _filled(head, fillings)
+    yield filled(head, fillings)
     channels = channels_of(entries)
     for number, entry in enumerate(entries):
-        yield _block(f"d{number}", entry.detail)
+        yield block(f"d{number}", entry.detail)
         for place, channel in enumerate(channels):
             if channel in entry.pictures:
-                yield _block(f"p{number}.{place}", entry.pictures[channel].data)
+                yield block(f"p{number}.{place}", entry.pictures[channel].data)
     yield tail
 
 
@@ -137,10 +141,17 @@ def embedded(value: Json) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _filled(template: str, fillings: dict[str, str]) -> str:
-    """Fills the template in one pass, so placeholders inside inserted texts are not replaced."""
+def filled(template: str, fillings: dict[str, str]) -> str:
+    """Returns a template with its placeholders `{{name}}` replaced in one pass, so that placeholders inside inserted
+    texts are not replaced.
+
+    Args:
+        template: text with placeholders.
+        fillings: text for each placeholder, by name.
+    """
     return re.sub(r"\{\{(\w+)\}\}", lambda match: fillings[match[1]], template)
 
 
-def _block(name: str, data: bytes) -> str:
+def block(name: str, data: bytes) -> str:
+    """Returns data as a script block with the id `name`, which browsers do not execute; the content is base64."""
     return f'<script type="text/plain" id="{name}">{base64.b64encode(data).decode()}</script>\n'

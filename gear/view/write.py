@@ -13,10 +13,13 @@ from gear.plugins.prediction_pictures import legends_json, picture_legends
 from gear.plugins.text import printable
 from gear.reporting.display import displayed
 from gear.values.counted import counted
+from gear.values.errors import DatasetError
 from gear.values.progress import Callbacks, Progress
 from gear.values.serial import Json
 from gear.view.build import Builder, fitting_scale
 from gear.view.document import document
+from gear.view.drive_page import drive_page
+from gear.view.drives import study_roots
 from gear.view.rows import finite
 from gear.view.sources import Source, open_compared, sources_of
 from gear.view.streets import streets
@@ -36,6 +39,7 @@ class ViewReport:
         size_bytes: size of the page.
         scale: factor by which the embedded pictures were resized.
         problems: (index, problem) of the samples whose pictures or labels are incomplete.
+        unit: what the page lists, `sample` or `drive`.
     """
 
     path: Path
@@ -43,15 +47,17 @@ class ViewReport:
     size_bytes: int
     scale: float
     problems: tuple[tuple[int, str], ...]
+    unit: str = "sample"
 
     def summary(self) -> str:
         """Returns one line about the page, and a second line for the first problem if there are any."""
         size = f"{self.size_bytes / MEGABYTE:.1f} MB"
         scaled = "" if self.scale == 1 else f", pictures at {self.scale:.0%} of their width"
-        text = f"{self.path}: {counted(self.samples, 'sample')}, {size}{scaled}"
+        text = f"{self.path}: {counted(self.samples, self.unit)}, {size}{scaled}"
         if self.problems:
             index, what = self.problems[0]
-            text += f"\n{len(self.problems)} not shown in full; first, sample {index}: {printable(what)}"
+            where = f"{self.unit} {index}: " if index >= 0 else ""
+            text += f"\n{len(self.problems)} not shown in full; first, {where}{printable(what)}"
         return text
 
 
@@ -78,22 +84,27 @@ def write_view(
 
     Args:
         path: root of a dataset of any task; or a folder of datasets that are twins; or the folder of an evaluation,
-            which shows its first dataset and that dataset's twins.
+            which shows its first dataset and that dataset's twins; or a folder of `gear drive`, or a folder of several
+            of them, whose drives are played.
         out: HTML file to write.
         twins: roots of datasets that differ from the first one only in their patch; `DIR:SPLIT` selects a split.
         evaluations: folders of `gear evaluate` with results for any of these datasets.
         split: the split to show; optional if there is only one.
-        samples: number of samples, counted from the first; all by default.
+        samples: number of samples or drives, counted from the first; all by default.
         max_mb: approximate limit for the size of the page in megabytes.
         progress: shows a progress bar.
         on_progress: called after every sample with the numbers of finished and of all samples.
 
     Raises:
-        DatasetError: there is no finished split to show, a dataset is no twin, an evaluation is of other datasets, or
-            `out` cannot be written.
+        DatasetError: there is no finished split or drive to show, a dataset is no twin, an evaluation is of other
+            datasets, or `out` cannot be written.
         UnknownNameError: the plugin of the dataset's task is not installed.
     """
     with displayed(Callbacks.of(on_progress=on_progress), "view", progress=progress) as shown:
+        if studies := study_roots(path):
+            if twins or evaluations or split is not None:
+                raise DatasetError(path, "holds drives, which have no split and no evaluation, and know their twins")
+            return write_drives(studies, out, drives=samples, max_mb=max_mb, on_progress=shown.on_progress)
         dataset, others, found = open_compared(path, twins, split)
         sources = sources_of(dataset, others, [*found, *evaluations], Path(out))
         return write_sources(sources, out, samples=samples, max_mb=max_mb, on_progress=shown.on_progress)
@@ -118,6 +129,42 @@ def write_page(
     """
     sources = sources_of(dataset, (), (), Path(out))
     return write_sources(sources, out, samples=samples, max_mb=max_mb, on_progress=on_progress)
+
+
+def write_drives(
+    studies: Sequence[Path],
+    out: str | Path,
+    *,
+    drives: int | None = None,
+    max_mb: float = 48.0,
+    on_progress: Progress | None = None,
+) -> ViewReport:
+    """Writes the HTML page of one or several studies of `gear drive`.
+
+    Args:
+        studies: folders of `gear drive`.
+        out: HTML file to write; missing folders are made.
+        drives: number of drives, counted from the first; None for all.
+        max_mb: approximate limit for the size of the page in megabytes.
+        on_progress: called after every drive with the numbers of finished and of all drives.
+
+    Raises:
+        DatasetError: there is no drive to show, or `out` cannot be written.
+    """
+    target = Path(out)
+    refuse_folder(target)
+    with explained(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+    page = drive_page(studies, most=drives, budget_bytes=max_mb * MEGABYTE / BASE64, on_progress=on_progress)
+    size = _write(target, page.document())
+    return ViewReport(
+        path=target,
+        samples=len(page.motions),
+        size_bytes=size,
+        scale=page.scale,
+        problems=page.problems,
+        unit="drive",
+    )
 
 
 def write_sources(

@@ -19,6 +19,7 @@ from tests.verbs.conftest import put_package
 from tests.verbs.evaluate.conftest import Oracle, model_spec
 
 from .browser import Browser, find_chromium
+from .drive_studies import make_study
 from .view_datasets import OPTIONS, store_samples
 
 Write = Callable[..., Path]
@@ -55,6 +56,13 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     opened = Browser(program, tmp_path_factory.mktemp("profile"))
     yield opened
     opened.close()
+
+
+@pytest.fixture(scope="session")
+def drive_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small study of `gear drive`; tests that change it copy it."""
+    pytest.importorskip("av")
+    return make_study(tmp_path_factory.mktemp("drives") / "study")
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from gear.cli.main import COMMANDS, main
 from gear.dataset.reading import Dataset
 from gear.values.errors import DatasetError
 from gear.view.document import SCRIPTS, asset, policy, script
+from gear.view.drive_page import SCRIPTS as DRIVE_SCRIPTS
 from gear.view.sources import base_url
 from gear.view.write import write_page, write_view
 
@@ -103,9 +104,11 @@ def test_the_page_asks_for_nothing_from_elsewhere(write_dataset: Any, tmp_path: 
 
 
 def test_the_script_never_parses_html() -> None:
-    assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\b|new Function", script())
-    assert {p.stem for p in (Path(__file__).parents[2] / "gear/view/page").glob("*.js")} == set(SCRIPTS)
-    assert "</script" not in script() and "</style" not in asset("style.css")
+    whole = script() + script(DRIVE_SCRIPTS)
+    assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\b|new Function", whole)
+    scripts = {p.stem for p in (Path(__file__).parents[2] / "gear/view/page").glob("*.js")}
+    assert scripts == {*SCRIPTS, *DRIVE_SCRIPTS}
+    assert "</script" not in whole and "</style" not in asset("drives.css") and "</style" not in asset("style.css")
 
 
 def test_a_small_budget_makes_small_pictures_and_links_the_files(write_dataset: Any, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ EXAMPLE = """examples:
   gear view data/twin --split test --samples 200 --out twin.html
   gear view data/none --twin data/random --twin data/patched --evaluation evaluations/semseg/ddrnet23_slim
   gear view evaluations/semseg/ddrnet23_slim+zmask        # its datasets, predictions and defended pictures
+  gear view drive/quick                    # plays the drives of gear drive, twins beside each other
   gear view data/big --max-mb 400          # larger pictures; the page takes longer to open
 
 The page is one file; it needs no server and no network. On the page, press ? for a list of keys.
@@ -28,7 +29,7 @@ def megabytes(text: str) -> float:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of `gear view` to its argument parser."""
     parser.epilog = EXAMPLE
-    parser.add_argument("dataset", help="root of a dataset of any task, a folder of twins, or an evaluation")
+    parser.add_argument("dataset", help="root of a dataset of any task, a folder of twins, an evaluation, or drives")
     parser.add_argument(
         "--twin",
         action="append",
@@ -46,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="folder of `gear evaluate` whose predictions are shown; repeatable",
     )
     parser.add_argument("--split", help="split to show, if the dataset has several")
-    parser.add_argument("--samples", type=positive, metavar="N", help="only the first N samples (all)")
+    parser.add_argument("--samples", type=positive, metavar="N", help="only the first N samples or drives (all)")
     parser.add_argument("--out", default="view.html", metavar="FILE", help="HTML file to write (view.html)")
     parser.add_argument(
         "--max-mb",
