@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from gear.verbs.verify.run import verify
     from gear.verbs.weights.average import average_weights
     from gear.verbs.weights.convert import ConvertReport, convert_weights
+    from gear.view.fiftyone_dataset import to_fiftyone
     from gear.view.rerun_recording import to_rerun
     from gear.view.write import ViewReport, write_view
 
@@ -95,6 +96,7 @@ __all__ = [
     "read_town",
     "sheet",
     "sweep",
+    "to_fiftyone",
     "to_rerun",
     "towns",
     "train",
@@ -148,6 +150,7 @@ _HOME = {
     "read_town": "gear.verbs.towns.facts",
     "sheet": "gear.verbs.sheet",
     "sweep": "gear.verbs.bench.sweep",
+    "to_fiftyone": "gear.view.fiftyone_dataset",
     "to_rerun": "gear.view.rerun_recording",
     "towns": "gear.verbs.towns.facts",
     "train": "gear.verbs.train.run",

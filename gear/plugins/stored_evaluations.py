@@ -98,6 +98,21 @@ class StoredResults:
         with explained(path):
             return task.decode_prediction(folder, sample, stored["facts"], dataset.plan.info)
 
+    def prediction_files(self, index: int) -> list[Path]:
+        """Returns the paths of the files of a stored prediction; empty for a task that stores predictions as JSON.
+
+        Args:
+            index: index of the sample in its dataset.
+
+        Raises:
+            DatasetError: the stored result is missing or damaged, or a file is missing, damaged or outside the
+                evaluation.
+        """
+        stored = read_result(inside(self.root, f"{self.name}/samples/{index:06d}.json"))
+        folder = inside(self.root, f"{self.name}/{PREDICTIONS}")
+        check_files(folder, stored["sha256"])
+        return [inside(folder, name) for name in stored["sha256"]]
+
     def defended(self, index: int) -> dict[str, UInt8Image]:
         """Reads the stored pictures that the defense returned for a sample, (H, W, 3) uint8 by camera.
 

@@ -10,17 +10,12 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import PurePosixPath
 from typing import Any
 from urllib.parse import quote
 
-import cv2
-import numpy as np
-
 from gear.contracts.tasks import Sample, Sidecar
-from gear.dataset.files import inside, read_bytes
 from gear.dataset.reading import Dataset
-from gear.values.errors import DatasetError, GearError
+from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
 from gear.values.machine import cores
 from gear.values.progress import Progress
@@ -28,13 +23,12 @@ from gear.values.serial import Json
 from gear.view.changes import metrics_of, object_changes, picture_change
 from gear.view.channels import Channel, PreviewError, Shown, images, predictions, previews
 from gear.view.encoding import Picture, encode, largest_scale
+from gear.view.picture_files import is_inside, picture_file
 from gear.view.rows import detail, finite, row
 from gear.view.sources import Source
 
 PROBES = 6
 """Number of samples, evenly spaced over the split, from which the scale of the pictures is estimated."""
-
-PICTURE_FILES = (".png", ".jpg", ".jpeg", ".webp")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -207,16 +201,8 @@ def _links(source: Source, sidecar: Sidecar) -> dict[str, str]:
 
 def _original(source: Source, sidecar: Sidecar, pixels: UInt8Image) -> str | None:
     """Returns the link to the sample's picture file with exactly these pixels; None if there is none."""
-    for relative, link in _links(source, sidecar).items():
-        if PurePosixPath(relative).suffix.lower() in PICTURE_FILES:
-            try:
-                data = read_bytes(inside(source.dataset.root, relative))
-            except DatasetError:
-                continue
-            stored = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) if data else None
-            if stored is not None and np.array_equal(stored[..., ::-1], pixels):
-                return link
-    return None
+    relative = picture_file(source.dataset.root, sidecar, pixels)
+    return None if relative is None else _links(source, sidecar)[relative]
 
 
 def fitting_scale(builder: Builder, count: int, budget_bytes: float) -> float:
@@ -244,11 +230,3 @@ def deflated(value: Json) -> bytes:
     """Returns a JSON value as zlib-compressed UTF-8, which `DecompressionStream` in the page's script decompresses."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return zlib.compress(text.encode("utf-8", "replace"), 6)
-
-
-def is_inside(relative: str) -> bool:
-    """Whether a relative path from a sample's metadata stays inside the dataset; only such paths are linked on the
-    page.
-    """
-    pure = PurePosixPath(relative)
-    return not pure.is_absolute() and ".." not in pure.parts and "\\" not in relative and "\0" not in relative
