@@ -65,9 +65,9 @@ def to_fiftyone(
         DatasetError: there is no finished split, a dataset is no twin, an evaluation is of other datasets, or a file
             is damaged.
     """
-    if isinstance(dataset, Dataset):
-        dataset, split = dataset.root, dataset.plan.info.split
-    opened, others, found = open_compared(dataset, twins, split)
+    root = dataset.root if isinstance(dataset, Dataset) else dataset
+    chosen = dataset.plan.info.split if isinstance(dataset, Dataset) else split
+    opened, others, found = open_compared(root, twins, chosen)
     sources = sources_of(opened, others, [*found, *evaluations], Path("view.html"))
     fiftyone = _package()
     wanted = name or f"gear {opened.root.resolve().name}"
