@@ -6,7 +6,9 @@ from collections.abc import Iterator, Mapping
 
 from gear.measuring.metric_json import known_json
 from gear.values.serial import Json
+from gear.verbs.bench.detection import DetectionRate, detection_rates
 from gear.verbs.bench.paper_tables import scenes_of
+from gear.verbs.bench.plan import RANDOM
 from gear.verbs.bench.report import BenchReport, Result
 from gear.verbs.evaluate.report import Difference, Estimate, Metrics, Pool, RowReport
 from gear.verbs.evaluate.table import metric_title
@@ -16,7 +18,9 @@ COLUMNS = (
     "p", "ceiling",
 )  # fmt: skip
 """Columns of metrics.csv. `quantity` is `value`; `change`, the difference to the pictures named in `against`; `mean
-change`, the mean over single pictures with its p; `auroc`; `mask`; or `seconds`.
+change`, the mean over single pictures with its p; `auroc`; `detection`, the share of pictures with an alarm at a
+threshold from other scenes, with p against random patches; `false alarms`, the share of clean pictures with an alarm at
+the same threshold; `mask`; or `seconds`.
 """
 
 ALL = "all"
@@ -35,10 +39,15 @@ def metric_records(report: BenchReport) -> Iterator[dict[str, Json]]:
             who = {"task": task.name, "model": one.model, "defense": one.defense or ""}
             for pool in one.evaluation.pools:
                 yield from _of(who, ALL, pool.name, pool, pool.differences, {})
-                for name, scene in zip(pool.rows, scenes, strict=True):
+                yield from _detections(
+                    {**who, "scene": ALL, "patch": pool.name}, pool.samples, detection_rates(one, pool)
+                )
+                for place, (name, scene) in enumerate(zip(pool.rows, scenes, strict=True)):
                     row = next(each for each in one.evaluation.rows if each.name == name)
                     found = tuple(each for each in one.evaluation.differences if each.row == name)
                     yield from _of(who, scene, pool.name, row, found, _patches(one))
+                    rates = detection_rates(one, pool, place)
+                    yield from _detections({**who, "scene": scene, "patch": pool.name}, row.samples, rates)
 
 
 def _patches(one: Result) -> dict[str, str]:
@@ -69,6 +78,14 @@ def _of(
                 yield {**against, "quantity": "mean change", "metric": metric_title(report, name), **values}
         if one.auroc is not None:
             yield {**against, "quantity": "auroc", "metric": "auroc", **_estimate(one.auroc)}
+
+
+def _detections(at: Mapping[str, Json], samples: int, rates: tuple[DetectionRate, ...]) -> Iterator[dict[str, Json]]:
+    for one in rates:
+        who = {**at, "samples": samples, "metric": one.title}
+        test = {} if one.p is None else {"against": RANDOM, **known_json({"p": one.p})}
+        yield {**who, "quantity": "detection", **_estimate(one.found), **test}
+        yield {**who, "quantity": "false alarms", **_estimate(one.false_alarms)}
 
 
 def _estimates(at: Mapping[str, Json], metrics: Metrics) -> Iterator[dict[str, Json]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gear.values.serial import Json
+from gear.verbs.bench.detection import detection_rates
 from gear.verbs.bench.gains import against_clean, gain, is_failed
 from gear.verbs.bench.report import Result, TaskResult
 from gear.verbs.evaluate.report import Estimate, Pool
@@ -50,6 +51,7 @@ def _pool_json(task: TaskResult, one: Result, pool: Pool) -> Json:
         "outside_patch": None if outside is None else {"metric": outside[0], **outside[1].as_json()},
         "is_failed_attack": is_failed(task, one, pool),
         "auroc": _estimate(None if against is None else against.auroc),
+        "detection": [each.as_json() for each in detection_rates(one, pool)],
         "defense": dict(pool.as_json()["defense"]),
         "cost": dict(pool.cost),
         **({} if against is None or against.objects is None else {"objects": against.objects.as_json()}),

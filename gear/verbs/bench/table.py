@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from gear.measuring.detection_rates import FALSE_ALARMS
 from gear.measuring.text_table import number_table
+from gear.verbs.bench.detection import detection_rates
 from gear.verbs.bench.gains import against_clean, gain, is_failed
 from gear.verbs.bench.report import BenchReport, Result, TaskResult
 from gear.verbs.evaluate.report import Difference, Pool
@@ -19,7 +21,7 @@ OBJECT_COLUMNS = {
 }
 """Column titles for tasks with detected objects, each with the key of the count in `ObjectChanges.counts`."""
 
-REST = ("AUROC", "mask IoU", "s/picture")
+REST = ("AUROC", *(f"TPR at {100 * share:g} %" for share in FALSE_ALARMS), "mask IoU", "s/picture")
 
 FAILED = " (failed)"
 """Mark of an optimised patch that is no worse than a random one."""
@@ -54,8 +56,9 @@ def legend() -> str:
         "patch against a random one, and of a random one against none, behind the same defense; outside patch: mean "
         "change of a picture, without the pixels of the patch where the task can leave them out; p: two-sided p of a "
         "paired permutation test; hidden, misclassified, moved: shares of the objects found in the twin; invented: "
-        "detections per picture that neither an object nor the twin explains; (failed): the patches are no worse than "
-        "random ones, or only by chance (p above 0.05)"
+        "detections per picture that neither an object nor the twin explains; TPR: share of the pictures that raise an "
+        "alarm, at a threshold that 1 % or 5 % of the other scenes' clean pictures exceed; (failed): the patches are "
+        "no worse than random ones, or only by chance (p above 0.05)"
     )
 
 
@@ -90,6 +93,7 @@ def line(task: TaskResult, one: Result, pool: Pool) -> list[str]:
     against = one.against(pool)
     outside = task.outside_patch(against)
     test = None if outside is None or not outside[1].pairs else outside[1]
+    rates = detection_rates(one, pool)
     return [
         one.model,
         one.defense or ALONE,
@@ -101,6 +105,8 @@ def line(task: TaskResult, one: Result, pool: Pool) -> list[str]:
         "" if test is None else f"{test.p:.2g}",
         *(_rate(against, name) for name in OBJECT_COLUMNS.values()),
         shown(None if against is None else against.auroc),
+        *(shown(each.found) for each in rates),
+        *[""] * (len(FALSE_ALARMS) - len(rates)),
         number(pool.defense["mask_iou"]) if "mask_iou" in pool.defense else "",
         f"{pool.cost['model_s'] + pool.cost['defense_s']:.3f}",
     ]
