@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from gear.formats.jsontext import dump
 from gear.values.ground_truth import BoxPx
+from gear.values.run_lengths import run_lengths
 from gear.values.serial import Json
 
 SUPERCATEGORIES: tuple[tuple[str, str], ...] = (
@@ -67,8 +68,8 @@ class Annotation:
         rle: compressed run lengths of the visible mask.
         is_crowd: whether evaluations ignore the object.
         extras: values for which COCO has no field, such as the distance; written under the key `gear`.
-        polygons: corners `x, y, x, y, ...` in edge pixels of each polygon of the mask. Without polygons, and for
-            ignored objects (`is_crowd`), `rle` is written.
+        polygons: corners `x, y, x, y, ...` in edge pixels of each polygon of the mask. Without polygons, `rle` is
+            written, and for ignored objects (`is_crowd`) its uncompressed run lengths.
     """
 
     category_id: int
@@ -229,10 +230,15 @@ def _annotation_entries(picture: Picture, first_id: int) -> list[Json]:
 
 
 def _segmentation(item: Annotation, picture: Picture) -> Json:
-    """The mask in COCO's form: polygons for single objects, run lengths for crowds."""
+    """The mask in COCO's form: polygons for single objects, uncompressed run lengths for crowds.
+
+    Tools that convert every segmentation with `pycocotools.mask.frPyObjects`, such as DETR's processors, cannot read
+    the compressed run lengths of a crowd.
+    """
     if item.polygons and not item.is_crowd:
         return [list(polygon) for polygon in item.polygons]
-    return {"size": [picture.height_px, picture.width_px], "counts": item.rle}
+    counts = run_lengths(item.rle).tolist() if item.is_crowd else item.rle
+    return {"size": [picture.height_px, picture.width_px], "counts": counts}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,7 +1,9 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from pycocotools import mask as coco_mask
 
 from gear.formats.coco import (
     CATEGORIES,
@@ -15,6 +17,12 @@ from gear.formats.coco import (
 )
 from gear.formats.jsontext import dump
 from gear.values.labels import LABELS
+
+MASK = np.zeros((8, 9), np.uint8)
+MASK[2:5, 1:6] = 1
+RLE = coco_mask.encode(np.asfortranarray(MASK))["counts"].decode()
+RUNS = [10, 3, 5, 3, 5, 3, 5, 3, 5, 3, 27]
+"""Lengths of the runs of zeros and ones, column by column."""
 
 
 def test_all_eighty_categories() -> None:
@@ -45,25 +53,26 @@ def test_annotations_are_numbered_from_one_through_all_pictures() -> None:
 
 
 def test_crowds_are_marked_and_boxes_are_corner_and_size() -> None:
-    item = Annotation(category_id=3, box_xywh=(1, 2, 5, 3), area_px=11, rle="abc", is_crowd=True, extras={"k": 1})
+    item = Annotation(category_id=3, box_xywh=(1, 2, 5, 3), area_px=15, rle=RLE, is_crowd=True, extras={"k": 1})
     shown = Picture(id=7, file_name="a.png", height_px=8, width_px=9, annotations=(item, replace(item, is_crowd=False)))
     crowd, single = dataset_json([shown], description="", created="2022-01-01")["annotations"]
     assert crowd == {
-        "id": 1, "image_id": 7, "category_id": 3, "bbox": [1, 2, 5, 3], "area": 11, "iscrowd": 1, "gear": {"k": 1},
-        "segmentation": {"size": [8, 9], "counts": "abc"},
+        "id": 1, "image_id": 7, "category_id": 3, "bbox": [1, 2, 5, 3], "area": 15, "iscrowd": 1, "gear": {"k": 1},
+        "segmentation": {"size": [8, 9], "counts": RUNS},
     }  # fmt: skip
-    assert single["iscrowd"] == 0
+    assert single["iscrowd"] == 0 and single["segmentation"]["counts"] == RLE
+    assert coco_mask.frPyObjects(crowd["segmentation"], 8, 9)["counts"].decode() == RLE  # as DETR's processor does
     (line,) = results_json(7, [Detection(category_id=3, box_px=(1.0, 2.0, 6.0, 5.0), score=0.5)])
     assert line == {"image_id": 7, "category_id": 3, "bbox": [1, 2, 5, 3], "score": 0.5}
 
 
 def test_single_objects_have_polygons_and_crowds_run_lengths() -> None:
-    one = Annotation(category_id=3, box_xywh=(1, 2, 2, 1), area_px=2, rle="abc", is_crowd=False, extras={},
+    one = Annotation(category_id=3, box_xywh=(1, 2, 2, 1), area_px=2, rle=RLE, is_crowd=False, extras={},
                      polygons=[[1, 2, 3, 2, 3, 3, 1, 3]])  # fmt: skip
     shown = Picture(id=1, file_name="a.png", height_px=8, width_px=9, annotations=(one, replace(one, is_crowd=True)))
     single, crowd = dataset_json([shown], description="", created="2022-01-01")["annotations"]
     assert single["segmentation"] == [[1, 2, 3, 2, 3, 3, 1, 3]]
-    assert crowd["segmentation"] == {"size": [8, 9], "counts": "abc"}
+    assert crowd["segmentation"] == {"size": [8, 9], "counts": RUNS}
 
 
 def test_json_text_is_steady() -> None:
