@@ -6,24 +6,24 @@ import dataclasses
 import inspect
 from typing import Any
 
-from gear.contracts import attacks, controllers, defenses, hookspecs, models, specs, tasks
+from gear.contracts import attacks, controllers, defenses, hookspecs, loggers, models, specs, tasks
 from gear.plugins.describe import meanings_of, options
 from gear.plugins.manager import discover
 
 SPECS = (
     specs.Spec, specs.TaskSpec, specs.ModelSpec, specs.AttackSpec, specs.DefenseSpec, specs.ControllerSpec,
-    specs.MetricSpec,
+    specs.MetricSpec, specs.LoggerSpec,
 )  # fmt: skip
 PROTOCOLS = (
     tasks.Task, tasks.Evaluator, models.Model, attacks.Attack, attacks.Compositor, attacks.Objective,
     attacks.HarmObjective, attacks.WithObjective, attacks.WithTaskOptions, attacks.WithInputFiles, models.Trainable,
     models.BatchPredictor, defenses.Defense, defenses.FittedDefense,
-    defenses.DifferentiableDetector, defenses.ReportsFit, controllers.Controller,
+    defenses.DifferentiableDetector, defenses.ReportsFit, controllers.Controller, loggers.Logger, loggers.RunLogger,
 )  # fmt: skip
 VALUES = (
     tasks.Sample, tasks.SplitInfo, tasks.Encoded, tasks.Sidecar, attacks.Patch, attacks.Budget, defenses.DefenseResult,
     defenses.DefendedBatch, defenses.FitReport, controllers.Observation, controllers.Action, controllers.EgoState,
-    controllers.CarFacts, controllers.Obstacle,
+    controllers.CarFacts, controllers.Obstacle, loggers.LoggedRun,
 )  # fmt: skip
 
 

@@ -38,7 +38,7 @@ COMMANDS: dict[str, str] = {
     "towns": "list towns and their scenes, or draw a map of a town and a picture of every scene",
     "models": "list the installed networks, with their size, input and weights",
     "weights": "convert, average or show weights files",
-    "plugins": "list the installed plugins: tasks, models, attacks, defenses, controllers, metrics",
+    "plugins": "list the installed plugins: tasks, models, attacks, defenses, controllers, metrics, loggers",
     "new": "write a small, complete Python package for a new plugin",
     "doctor": "check the renderers of this machine: device, driver and time of a reference frame",
     "show-config": "print the complete collection config that results from flags and files",

@@ -98,7 +98,8 @@ class Monitor(Protocol):
 
         Args:
             done: number of steps done.
-            values: scalars by name, such as terms, losses and norms.
+            values: scalars by name, such as terms and norms. Figures say that up is better for the attack, except for
+                `gradient`, `queries_left`, `smoothness` and `printability`.
             patches: function that returns the current patches; the monitor calls it only if it needs them.
             state: function that returns the state to resume from; an empty mapping where the attack cannot be resumed.
 

@@ -1,6 +1,6 @@
-"""The six hooks that a plugin implements. They take no arguments, have no effects and return specs.
+"""The seven hooks that a plugin implements. They take no arguments, have no effects and return specs.
 
-gear's own tasks, models, attacks, defenses and controllers are registered through the same hooks.
+gear's own tasks, models, attacks, defenses, controllers and loggers are registered through the same hooks.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 
 import pluggy
 
-from gear.contracts.specs import AttackSpec, ControllerSpec, DefenseSpec, MetricSpec, ModelSpec, TaskSpec
+from gear.contracts.specs import AttackSpec, ControllerSpec, DefenseSpec, LoggerSpec, MetricSpec, ModelSpec, TaskSpec
 
 PROJECT = "gear"
 hookspec = pluggy.HookspecMarker(PROJECT)
@@ -56,4 +56,12 @@ def gear_controllers() -> Iterable[ControllerSpec[Any]]:
 @hookspec
 def gear_metrics() -> Iterable[MetricSpec[Any]]:
     """Hook that returns the specs of a plugin's metrics for existing tasks, of gear or of another package."""
+    return ()
+
+
+@hookspec
+def gear_loggers() -> Iterable[LoggerSpec[Any]]:
+    """Hook that returns the specs of a plugin's loggers. A logger shows the curves and figures of a run in a tool such
+    as TensorBoard.
+    """
     return ()

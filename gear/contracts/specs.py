@@ -11,6 +11,7 @@ from typing import Any, Generic, Literal, TypeVar
 from gear.contracts.attacks import Attack
 from gear.contracts.controllers import Controller
 from gear.contracts.defenses import Defense
+from gear.contracts.loggers import Logger
 from gear.contracts.models import Model, PublishedWeights, Recipe
 from gear.contracts.tasks import Evaluator, Task
 
@@ -34,8 +35,8 @@ class Spec(Generic[ConfigT, ProductT]):
         name: name by which users select the plugin; matches `[a-z][a-z0-9_]*`.
         summary: description in one line.
         config: frozen dataclass of the options, all with defaults.
-        build: function that makes the task, model, attack, defense, controller or evaluator from the options; imports
-            heavy packages.
+        build: function that makes the task, model, attack, defense, controller, evaluator or logger from the options;
+            imports heavy packages.
         protocol: version of the plugin protocol for which the plugin was written.
     """
 
@@ -191,9 +192,17 @@ class ControllerSpec(Spec[ConfigT, Controller]):
     needs_truth: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoggerSpec(Spec[ConfigT, Logger]):
+    """The spec of a logger, which `gear attack`, `gear train` and `gear bench` use for `--log-to NAME`.
+
+    `build` raises a `GearError` that names the package to install if the logger's tool is missing.
+    """
+
+
 AnySpec = Spec[Any, Any]
-Kind = Literal["task", "model", "attack", "defense", "controller", "metric"]
-KINDS: tuple[Kind, ...] = ("task", "model", "attack", "defense", "controller", "metric")
+Kind = Literal["task", "model", "attack", "defense", "controller", "metric", "logger"]
+KINDS: tuple[Kind, ...] = ("task", "model", "attack", "defense", "controller", "metric", "logger")
 SPEC_TYPES: dict[Kind, type[AnySpec]] = {
     "task": TaskSpec,
     "model": ModelSpec,
@@ -201,4 +210,5 @@ SPEC_TYPES: dict[Kind, type[AnySpec]] = {
     "defense": DefenseSpec,
     "controller": ControllerSpec,
     "metric": MetricSpec,
+    "logger": LoggerSpec,
 }

@@ -64,7 +64,7 @@ def name_of_task(written: JsonMapping[str, Any]) -> str:
 
 
 def build(plugin: PluginEntry, options: Node = NO_OPTIONS) -> Any:
-    """Builds a plugin's product (a task, model, attack, defense, controller or metric) from its options.
+    """Builds a plugin's product (a task, model, attack, defense, controller, metric or logger) from its options.
 
     Args:
         plugin: the plugin, from `find`.

@@ -43,4 +43,5 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.controllers.semseg",
     "gear.plugins.controllers.truth",
     "gear.plugins.controllers.blind",
+    "gear.plugins.loggers.tensorboard",
 )

@@ -21,6 +21,7 @@ HOOK_OF: dict[Kind, str] = {
     "defense": "gear_defenses",
     "controller": "gear_controllers",
     "metric": "gear_metrics",
+    "logger": "gear_loggers",
 }
 """Names of the hooks that return specs, by kind of plugin."""
 

@@ -15,7 +15,7 @@ from tests.docs.blocks import DOCS, ROOT, pages
 
 def test_there_is_a_page_for_every_kind_of_plugin() -> None:
     found = [path.stem for path in sorted((DOCS / "how-to").glob("write-a*.md"))]
-    kinds = ["controller", "defense", "metric", "model", "task"]
+    kinds = ["controller", "defense", "logger", "metric", "model", "task"]
     assert found == [*(f"write-a-{kind}" for kind in kinds), "write-an-attack"]
 
 

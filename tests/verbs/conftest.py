@@ -15,7 +15,7 @@ import pytest
 
 from gear.collecting.run import CollectReport
 from gear.contracts.hookspecs import hookimpl
-from gear.contracts.specs import AttackSpec, DefenseSpec, MetricSpec, ModelSpec
+from gear.contracts.specs import AttackSpec, DefenseSpec, LoggerSpec, MetricSpec, ModelSpec
 from gear.dataset.locks import dataset_lock
 from gear.measuring.gap.report import GapReport
 from gear.measuring.guard import Guard
@@ -87,7 +87,7 @@ def put_package(monkeypatch: pytest.MonkeyPatch, specs: Sequence[Any]) -> None:
     """Installs plugins as a third party's package, in place of one that was put before."""
     module = types.ModuleType("odd_package")
     hooks = {"gear_models": ModelSpec, "gear_attacks": AttackSpec, "gear_defenses": DefenseSpec}
-    for hook, kind in (hooks | {"gear_metrics": MetricSpec}).items():
+    for hook, kind in (hooks | {"gear_metrics": MetricSpec, "gear_loggers": LoggerSpec}).items():
         chosen = [spec for spec in specs if isinstance(spec, kind)]
         setattr(module, hook, hookimpl(lambda chosen=chosen: chosen, specname=hook))
     monkeypatch.setitem(sys.modules, "odd_package", module)

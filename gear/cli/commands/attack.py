@@ -6,6 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from gear.cli.device import add_device
+from gear.cli.log import add_log
 
 if TYPE_CHECKING:
     from gear.values.serial import Json
@@ -84,6 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random draws (0)")
     parser.add_argument("--allow-test-data", action="store_true", help="optimise on test splits too")
     parser.add_argument("--force", action="store_true", help="replace the results of another attack in --out")
+    add_log(parser)
     parser.add_argument(
         "--json", action="store_true", help="print attack.json; with --verify, both as attack and verify"
     )

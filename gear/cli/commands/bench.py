@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from gear.cli.engine import add_engine
 from gear.cli.flag_types import workers
+from gear.cli.log import add_log
 
 if TYPE_CHECKING:
     from gear.verbs.bench.plan import Step
@@ -56,6 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="KIND",
         help="also write records for a leaderboard into OUT/records; `attack` for an attack against rows of others",
     )
+    add_log(parser)
     parser.add_argument("--list", action="store_true", help="only print the commands of the benchmark")
     parser.add_argument("--json", action="store_true", help="print bench.json, or the steps, in place of the tables")
 

@@ -7,6 +7,7 @@ import re
 from typing import TYPE_CHECKING
 
 from gear.cli.flag_types import positive
+from gear.cli.log import add_log
 
 if TYPE_CHECKING:
     from gear.reporting.display import Display
@@ -86,6 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="settings",
         help="sets a key of the training config; options.KEY for options of the network; repeatable",
     )
+    add_log(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -18,6 +18,7 @@ from gear.dataset.json_text import dump_json
 from gear.dataset.plan import differences
 from gear.dataset.store import check_output
 from gear.measuring.patch_checks import is_picture
+from gear.measuring.run_log import clear_log
 from gear.values.errors import DatasetError, FieldError, OutdatedError, ReplaceableError
 from gear.values.regular_file import read_regular
 from gear.values.serial import Json, from_json
@@ -69,6 +70,7 @@ def begin(root: Path, plan: Json, *, force: bool) -> Json | None:
     if force:
         remove_files(root, [NOTES, CHECKPOINT, *(path.name for path in root.glob("patch_*.png"))])
         remove_tree(root, VERIFY)  # results of the rendered check of the deleted patches
+        clear_log(root)
     if finished.exists():
         there = _read_notes(finished)
         what = ", ".join(differences({key: there.get(key) for key in wanted}, wanted)[:3])

@@ -1,4 +1,4 @@
-"""Monitors a running attack: records curves, writes checkpoints, validates patches and stops early."""
+"""Monitors a running attack: records curves, logs them, writes checkpoints, validates patches and stops early."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from gear.values.errors import DatasetError, ReplaceableError
 from gear.values.progress import Progress
 from gear.values.regular_file import check_regular
 from gear.values.serial import from_json
+from gear.verbs.attack.run_log import AttackLog
 
 CHECKPOINT = "checkpoint.safetensors"
 SECONDS_BETWEEN = 20.0
@@ -50,6 +51,7 @@ class Recorder:
         patience: validations without improvement after which the attack stops; 0 for never.
         queries: largest number of forward passes, for attacks that count them.
         on_progress: called with the finished and the allowed number of steps, or of queries.
+        log: log of the attack; None for no log.
         curves: recorded values by name, one per step.
         judged: (step, harm) of every validation.
         best: the patches with the largest harm in a validation.
@@ -67,6 +69,7 @@ class Recorder:
     patience: int = 0
     queries: int | None = None
     on_progress: Progress = lambda done, total: None
+    log: AttackLog | None = None
     curves: dict[str, list[float]] = field(default_factory=dict)
     judged: list[tuple[int, float]] = field(default_factory=list)
     best: tuple[Patch, ...] | None = None
@@ -107,6 +110,8 @@ class Recorder:
         self.curves, self.judged = notes["curves"], [(int(step), float(harm)) for step, harm in notes["judged"]]
         self.done, self.seconds = notes["done"], notes["seconds"]
         self.best = kept or self.best
+        if self.log is not None:
+            self.log.begin(self.done)
         self.tell(notes["done"], notes.get("queries_left"))
         return {name.removeprefix("state/"): arrays[name] for name in arrays if name.startswith("state/")}
 
@@ -129,6 +134,10 @@ class Recorder:
             Whether the attack must stop, because validation no longer improves.
         """
         self.done = done
+        if self.log is not None:
+            self.log.step(done, values)
+            if self.log.has_figures_at(done):
+                self.log.patches(done, patches())
         for name, value in values.items():
             curve = self.curves.setdefault(name, [float("nan")] * (done - 1))
             curve += [float("nan")] * (done - 1 - len(curve)) + [float(value)]
@@ -175,6 +184,8 @@ class Recorder:
         if not state:
             return
         self.clock()
+        if self.log is not None:
+            self.log.flush()
         arrays: dict[str, Any] = {f"state/{name}": np.array(value, order="C") for name, value in state.items()}
         arrays |= {f"{BEST}{patch.name}": np.ascontiguousarray(patch.rgb) for patch in self.best or ()}
         notes = {
@@ -196,6 +207,8 @@ class Recorder:
     def _validate(self, done: int, patches: tuple[Patch, ...]) -> None:
         assert self.judge is not None
         harm = self.judge(patches)
+        if self.log is not None:
+            self.log.validated(done, harm)
         if not self.judged or _worth(harm) > max(_worth(value) for _, value in self.judged):
             self.best = patches
         self.judged.append((done, harm))

@@ -6,7 +6,6 @@ import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import cv2
 import numpy as np
 from safetensors.numpy import save as to_bytes
 
@@ -16,9 +15,7 @@ from gear.dataset.json_text import dump_json
 from gear.formats.png import encode_rgb
 from gear.values.frames import UInt8Image
 from gear.values.serial import Json
-
-SHOWN_PX = 1024
-"""Largest width in pixels of a picture in `figures/samples.png`; at 2048 pixels the file would have 14 MB."""
+from gear.verbs.attack.curve_titles import HELD_OUT, curve_title
 
 BLUE, RED, GREY = "#1f5fa8", "#b3402a", "0.55"
 
@@ -46,7 +43,8 @@ def as_picture(patch: Patch) -> UInt8Image:
 def write_curves(
     root: Path, title: str, curves: Mapping[str, Sequence[float]], judged: Sequence[tuple[int, float]]
 ) -> None:
-    """Writes `figures/curves.png`: every recorded value over the steps, and the harm on the validation samples.
+    """Writes `figures/curves.png`: every recorded value over the steps, and the
+    objective on the validation samples. Titles state which direction is better.
 
     Args:
         root: the patch folder.
@@ -67,10 +65,10 @@ def write_curves(
         values = np.asarray(curves[name], np.float64)
         axis.plot(np.arange(1, len(values) + 1), values, color=GREY, lw=0.6)
         axis.plot(*_smoothed(values), color=BLUE, lw=1.4)
-        axis.set_title(name, fontsize=8)
+        axis.set_title(_in_two_lines(curve_title(name)), fontsize=8)
     if judged:
         axes[-1].plot(*np.transpose(judged), "o-", color=RED, ms=3)
-        axes[-1].set_title("harm on validation samples", fontsize=8)
+        axes[-1].set_title(_in_two_lines(curve_title(HELD_OUT)), fontsize=8)
     for axis in axes:
         axis.tick_params(labelsize=7)
         axis.set_xlabel("step", fontsize=7)
@@ -80,26 +78,19 @@ def write_curves(
     write_whole(root, "figures/curves.png", data.getvalue())
 
 
-def write_samples(root: Path, pairs: Sequence[tuple[UInt8Image, UInt8Image]]) -> None:
-    """Writes `figures/samples.png`, one row per sample: the picture without patches and the picture with patches.
-
-    Pictures wider than `SHOWN_PX` are resized.
+def write_samples(root: Path, figure: UInt8Image) -> None:
+    """Writes `figures/samples.png`: samples without and with patches, with predictions and ground truth.
 
     Args:
         root: the patch folder.
-        pairs: (H, W, 3) uint8 pictures of each sample, without and with patches.
+        figure: (H, W, 3) uint8 RGB.
     """
-    rows = [np.concatenate([_shown(picture) for picture in pair], axis=1) for pair in pairs]
-    if rows:
-        write_whole(root, "figures/samples.png", encode_rgb(np.ascontiguousarray(np.concatenate(rows))))
+    write_whole(root, "figures/samples.png", encode_rgb(figure))
 
 
-def _shown(picture: UInt8Image) -> UInt8Image:
-    height, width = picture.shape[:2]
-    if width <= SHOWN_PX:
-        return picture
-    size = (SHOWN_PX, max(1, round(height * SHOWN_PX / width)))
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+def _in_two_lines(title: str) -> str:
+    """Returns a title with the direction on a line of its own."""
+    return title.replace(" (", "\n(")
 
 
 def _smoothed(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -110,7 +110,7 @@ def attack_scenes(
     Raises:
         GearError: an error that the user can correct; the message is one line. All other scenes were attacked.
     """
-    arguments |= {name: tuple(arguments.get(name, ())) for name in ("settings", "model_settings")}
+    arguments |= {name: tuple(arguments.get(name, ())) for name in ("settings", "model_settings", "log_settings")}
     request = AttackRequest(
         data=as_tuple(data),
         models=(model,) if isinstance(model, str) else tuple(model),

@@ -31,6 +31,8 @@ class AttackRequest:
         score_weight, mask_weight: weights of the loss terms that lower the defense's score and its mask.
         allow_test_data: whether `test` splits are accepted.
         force: whether results of an earlier attack in `out` are deleted first.
+        log_to, log_settings: name of a logger plugin, None for no log, and its `KEY=VALUE` options. Patches do not
+            depend on them.
 
     Raises:
         GearError: a number is out of range.
@@ -54,6 +56,8 @@ class AttackRequest:
     mask_weight: float = 1.0
     allow_test_data: bool = False
     force: bool = False
+    log_to: str | None = None
+    log_settings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_seed(self.seed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import time
 from collections.abc import Iterable, Sequence
@@ -17,6 +18,7 @@ from gear.compositor.cache import Cache
 from gear.config.dump import to_plain
 from gear.contracts.attacks import Budget, Objective, Patch, WithObjective, WithTaskOptions
 from gear.contracts.defenses import ReportsFit
+from gear.contracts.loggers import LoggedRun
 from gear.contracts.models import Model
 from gear.dataset.files import sha256
 from gear.dataset.json_text import dump_json
@@ -24,11 +26,13 @@ from gear.dataset.locks import exclusive_lock
 from gear.measuring.guard import Guard
 from gear.measuring.guarded_model import weights_digest
 from gear.measuring.patch_checks import check_patches
+from gear.measuring.run_log import FOLDER, RunLog, choose_logger
 from gear.measuring.shown_size import size_note
 from gear.plugins.attacks.optimisation.model_group import Defended, device_name, members_of
 from gear.plugins.attacks.optimisation.objectives import default_objective
 from gear.plugins.build import blamed, build, traced
 from gear.plugins.catalogue import PluginEntry
+from gear.plugins.text import one_line
 from gear.reporting.display import displayed
 from gear.values.errors import GearError, PluginError
 from gear.values.progress import Callbacks, Progress, Warn
@@ -42,6 +46,7 @@ from gear.verbs.attack.monitor import Recorder
 from gear.verbs.attack.outputs import as_picture, write_curves, write_patches, write_samples
 from gear.verbs.attack.report import AttackReport
 from gear.verbs.attack.request import AttackRequest
+from gear.verbs.attack.run_log import AttackLog, figure_of
 from gear.verbs.attack.scenes import Scenes
 
 Paths = str | Path | Sequence[str | Path]
@@ -94,6 +99,8 @@ def attack(
     mask_weight: float = 1.0,
     allow_test_data: bool = False,
     force: bool = False,
+    log_to: str | None = None,
+    log_settings: Iterable[str] = (),
     progress: bool = False,
     on_progress: Progress | None = None,
     on_fit_progress: Progress | None = None,
@@ -127,6 +134,9 @@ def attack(
         mask_weight: weight of the term that lowers the defense's mask on the patch; 0 for no such term.
         allow_test_data: whether `test` splits are accepted as training data.
         force: whether patches and results of an earlier attack in `out` are deleted first.
+        log_to: name of a logger plugin, such as `tensorboard`, which logs curves and figures in `out/log`; None for no
+            log. The patches do not depend on it.
+        log_settings: `KEY=VALUE` texts for the logger's options.
         progress: shows a progress bar.
         on_progress: called after every step with the finished and the allowed steps, or queries if these are limited.
         on_fit_progress: called after every calibration sample that the defense reads for the first time.
@@ -155,6 +165,8 @@ def attack(
         mask_weight=mask_weight,
         allow_test_data=allow_test_data,
         force=force,
+        log_to=log_to,
+        log_settings=tuple(log_settings),
     )
     callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
     with displayed(callbacks, "attack", progress=progress, unit=unit_of(request)) as shown:
@@ -179,6 +191,7 @@ def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
     Raises:
         GearError: an error that the user can correct; the message is one line.
     """
+    logger = choose_logger(request.log_to, request.log_settings)
     job = resolve(request, callbacks.on_fit_progress)
     _warn(job, callbacks.on_warning)
     product, root = build(job.found, job.options), Path(request.out)
@@ -187,19 +200,26 @@ def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
     with exclusive_lock(root, callbacks.on_warning):
         there = begin(root, plan, force=request.force)
         if there is not None:
+            if logger is not None:
+                callbacks.on_warning(f"{root}: the patches were there already, so that nothing is logged")
             return AttackReport(out=root, patches=read_patches(root), facts=there, made=False)
-        with traced(_asked(job), "forward"):
+        names = ", ".join(one.found.spec.name for one in job.models)
+        title = f"{request.attack} on {names}"
+        run = LoggedRun(verb="attack", title=title, folder=root / FOLDER)
+        log = RunLog(logger, run, callbacks.on_warning)
+        with contextlib.closing(log), traced(_asked(job), "forward"):
             calibration_s, fits = _calibrated(network, callbacks.on_warning)
-            made = _optimised(job, product, network, root, plan, callbacks.on_progress)
+            made = _optimised(job, product, network, plan, callbacks.on_progress, log)
             facts = _facts(job, network, plan, made) | {
                 "calibration_seconds": round(calibration_s, 3),
                 "defense_fit": fits,
             }
-        names = ", ".join(one.found.spec.name for one in job.models)
-        write_curves(root, f"{request.attack} on {names}", made.recorder.curves, made.recorder.judged)
-        write_samples(root, made.optimised_on.pairs(made.patches))
-        write_patches(root, made.patches, facts)
-        tidy(root)
+            write_curves(root, title, made.recorder.curves, made.recorder.judged)
+            _write_figure(job, network, made, root, callbacks.on_warning)
+            write_patches(root, made.patches, facts)
+            tidy(root)
+            if made.recorder.log is not None:
+                made.recorder.log.finish(made.steps_done, made.patches, facts["achieved"])
     return AttackReport(out=root, patches=made.patches, facts=facts, made=True)
 
 
@@ -223,8 +243,18 @@ def _asked(job: Job) -> list[PluginEntry]:
     return [one.found for one in (*job.models, job.guard.defense) if one is not None]
 
 
-def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, on_progress: Progress) -> _Made:
-    """Runs the attack and checks its result.
+def _write_figure(job: Job, network: Model, made: _Made, root: Path, on_warning: Warn) -> None:
+    """Writes the figure of samples with predictions; a task or a network that cannot draw them gets a warning."""
+    try:
+        figure = figure_of(job.datasets[0].task, network, made.optimised_on, made.patches)
+    except Exception as error:  # a task or a network of another package
+        on_warning(f"{root}: no figure of samples ({one_line(error)})")
+    else:
+        write_samples(root, figure)
+
+
+def _optimised(job: Job, product: Any, network: Model, plan: Json, on_progress: Progress, log: RunLog) -> _Made:
+    """Runs the attack in the folder of its log, and checks its result.
 
     Raises:
         PluginError: the attack breaks its contract.
@@ -239,7 +269,7 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
     settings = product.settings(optimised_on.samples[0]) if isinstance(product, WithTaskOptions) else job.config
     objective, held_objective = make(optimised_on.samples[0]), make(optimised_on.samples[0])
     recorder = Recorder(
-        root=root,
+        root=log.root,
         key=sha256(dump_json(plan)),
         steps=job.steps,
         judge=(lambda patches: held.harm(network, held_objective, patches)) if job.validation else None,
@@ -247,6 +277,14 @@ def _optimised(job: Job, product: Any, network: Model, root: Path, plan: Json, o
         patience=job.patience,
         queries=job.queries,
         on_progress=on_progress,
+        log=AttackLog(
+            log,
+            config=plan,
+            every=job.every,
+            network=network,
+            scenes=held if job.validation else optimised_on,
+            task=job.datasets[0].task,
+        ),
     )
     recorder.tell(0)
     with blamed(job.found, "optimise"), traced(_asked(job), "forward"):

@@ -21,7 +21,6 @@ from gear.plugins.attacks.optimisation.model_group import Defended, members_of
 from gear.plugins.attacks.optimisation.objectives import counted, defense_terms
 from gear.readers import Kept, all_of
 from gear.values.errors import GearError
-from gear.values.frames import UInt8Image
 from gear.verbs.attack.data import JoinedCompositor
 
 RANDOM_PX = (32, 64)
@@ -32,7 +31,7 @@ PICTURES = "defense_pictures"
 
 KEPT_BYTES = 2 << 30
 SHOWN = 3
-"""Number of samples in `figures/samples.png` and in the checks of gradients."""
+"""Number of samples in the checks of gradients."""
 
 
 class Scenes:
@@ -164,14 +163,3 @@ class Scenes:
                 found = torch.autograd.grad(value, asked, retain_graph=True, allow_unused=True)
             sizes[name] = max((float(one.abs().max()) for one in found if one is not None), default=0.0)
         return sizes
-
-    def pairs(self, patches: Sequence[Patch]) -> list[tuple[UInt8Image, UInt8Image]]:
-        """Returns a few samples as (picture without patches, picture with patches), each (H, W, 3) uint8 RGB."""
-        tensors = [torch.from_numpy(patch.rgb.copy()).permute(2, 0, 1) for patch in patches]
-        found = []
-        for index in np.linspace(0, len(self.samples) - 1, min(SHOWN, len(self.samples))).astype(int).tolist():
-            view, picture = next(iter(self.samples[index].images.items()))
-            with torch.no_grad():
-                shown = self.compositor.compose(tensors, [index], view)[0].permute(1, 2, 0)
-            found.append((picture, (shown * 255 + 0.5).to(torch.uint8).cpu().numpy()))
-        return found

@@ -22,6 +22,7 @@ class BenchRequest:
         device: device of the networks; None for that of the config.
         workers, engine, address: number of workers, name of the engine that runs them, and address of its cluster.
         in_subprocess: whether a single worker runs in a process of its own.
+        log_to, log_settings: name of a logger plugin, None for no log, and its `KEY=VALUE` options.
         record: whether records for a leaderboard are written; a text sets their kind.
 
     Raises:
@@ -37,6 +38,8 @@ class BenchRequest:
     engine: str = DEFAULT
     address: str | None = None
     record: Kind | bool = False
+    log_to: str | None = None
+    log_settings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.workers != "auto" and self.workers < 1:

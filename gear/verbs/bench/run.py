@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import math
@@ -18,6 +19,7 @@ from gear.config.nodes import Node, parse_file
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.executors import Executor, Needs
+from gear.contracts.loggers import LoggedRun
 from gear.contracts.specs import AttackSpec
 from gear.dataset.executors.engines import DEFAULT, open_engine
 from gear.dataset.files import clear_scratch, write_whole
@@ -26,6 +28,7 @@ from gear.dataset.locks import exclusive_lock
 from gear.dataset.store import check_output
 from gear.leaderboard.record import Kind
 from gear.measuring.plugin_selection import check_optics
+from gear.measuring.run_log import FOLDER, RunLog, choose_logger
 from gear.networks.runtime import has_cuda
 from gear.reporting.display import displayed
 from gear.values.errors import GearError
@@ -42,6 +45,7 @@ from gear.verbs.bench.plan import Plan, PlannedEvaluation, Step
 from gear.verbs.bench.recording import write_records
 from gear.verbs.bench.report import COLUMNS, BenchReport, Metric, Result, SceneMetric, TaskResult
 from gear.verbs.bench.request import BenchRequest
+from gear.verbs.bench.run_log import log_report, with_log
 from gear.verbs.bench.scenes import calibration_scene, located, measured_scenes
 from gear.verbs.bench.schedule import OnStep, run_steps
 from gear.verbs.bench.table import text
@@ -63,6 +67,8 @@ def bench(
     workers: Workers = 1,
     in_subprocess: bool = False,
     record: Kind | bool = False,
+    log_to: str | None = None,
+    log_settings: Iterable[str] = (),
     progress: bool = False,
     on_step: OnStep | None = None,
     on_progress: Progress | None = None,
@@ -89,6 +95,9 @@ def bench(
         in_subprocess: whether a single worker runs in a process of its own. Each collection in the calling process
             keeps about 20 MB, so True is better for large benches; a script then needs `if __name__ == "__main__":`.
         record: whether records for a leaderboard are written into `records`; a name (`attack`) sets their kind.
+        log_to: name of a logger plugin, such as `tensorboard`: attacks log their curves in the folders of their
+            patches, and the results are logged in `out/log`; None for no log.
+        log_settings: `KEY=VALUE` texts for the logger's options.
         progress: shows a progress bar.
         on_step: called with a step, its number (from 1) and the number of steps: before each step, or after each step
             if several are carried out at the same time.
@@ -110,6 +119,8 @@ def bench(
         engine=engine,
         address=address,
         record=record,
+        log_to=log_to,
+        log_settings=tuple(log_settings),
     )
     callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
     with displayed(callbacks, "bench", progress=progress) as shown:
@@ -127,14 +138,17 @@ def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | Non
     Raises:
         GearError: an error that the user can correct; the message is one line.
     """
+    logger = choose_logger(request.log_to, request.log_settings)
     plan, root = prepared(request), Path(request.out)
     if plan.config.sweep is not None:
         raise GearError(f"{request.config}: sweeps {plan.config.sweep.key}; gear.sweep runs it, or say sweep=")
     config = to_yaml(plan.config).encode()
-    with exclusive_lock(root, callbacks.on_warning):
+    run = LoggedRun(verb="bench", title=request.name, folder=root / FOLDER)
+    log = RunLog(logger, run, callbacks.on_warning)
+    with exclusive_lock(root, callbacks.on_warning), contextlib.closing(log):
         if not (root / CONFIG).exists():  # an existing config belongs to the existing reports
             write_whole(root, CONFIG, config)
-        steps = list(plan.steps())
+        steps = with_log(list(plan.steps()), request)
         carried_out = _scheduled if request.is_scheduled else _in_turn
         report = _report(plan, root, request, carried_out(steps, root, request, callbacks, on_step))
         write_whole(root, CONFIG, config)
@@ -142,6 +156,7 @@ def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | Non
         if request.record:
             kind = None if request.record is True else request.record
             write_records(report, plan, request.name, kind)
+        log_report(log, report)
     return report
 
 

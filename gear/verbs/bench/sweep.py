@@ -109,6 +109,8 @@ def sweep(
     device: str | None = None,
     workers: Workers = 1,
     in_subprocess: bool = False,
+    log_to: str | None = None,
+    log_settings: Iterable[str] = (),
     progress: bool = False,
     on_step: OnStep | None = None,
     on_progress: Progress | None = None,
@@ -127,6 +129,7 @@ def sweep(
         device: device of the networks; overrides the config.
         workers: number of workers of each benchmark, or `auto`.
         in_subprocess: whether a single worker runs in a process of its own.
+        log_to, log_settings: logger of each benchmark, as in `gear.bench`.
         progress: shows a progress bar.
         on_step: called with each step of each benchmark, its number (from 1) and the number of steps.
         on_progress: called after every sample of a step, or after every step of an attack.
@@ -136,8 +139,9 @@ def sweep(
         GearError: an error that the user can correct; the message is one line.
     """
     request = BenchRequest(
-        config=config, out=out, settings=tuple(settings), device=device, workers=workers, in_subprocess=in_subprocess
-    )
+        config=config, out=out, settings=tuple(settings), device=device, workers=workers, in_subprocess=in_subprocess,
+        log_to=log_to, log_settings=tuple(log_settings),
+    )  # fmt: skip
     callbacks = Callbacks.of(on_progress=on_progress, on_warning=on_warning)
     with displayed(callbacks, "bench", progress=progress) as shown:
         return run_sweep(request, shown, on_step)

@@ -22,7 +22,7 @@ from gear.dataset.json_text import dump_json, load_json
 from gear.dataset.locks import exclusive_lock
 from gear.dataset.store import check_output
 from gear.measuring.text_table import number_table
-from gear.values.errors import DatasetError, FieldError
+from gear.values.errors import DatasetError, FieldError, GearError
 from gear.values.progress import Callbacks
 from gear.values.serial import Json
 from gear.verbs.bench.chart import TRUETYPE, UNDATED
@@ -178,6 +178,8 @@ def run_times(
     Raises:
         GearError: an error that the user can correct; the message is one line.
     """
+    if request.log_to is not None:
+        raise GearError(f"{request.config}: measures times, and has nothing to log; leave --log-to out")
     root, config = Path(request.out), times_of(request)
     check_output(root, "write the times into a folder of its own")
     seconds: dict[str, tuple[float, ...]] = {}

@@ -34,6 +34,7 @@ USE: dict[Kind, str] = {
     "controller": "Use it: name it in a config of `gear drive`, `drivers: {mine: {controller: {{name}}}}`; `gear drive"
     " my.yml --out DIR` drives with it.",
     "metric": "Use it: `gear evaluate --model NAME --data DIR --report {{name}}` adds its columns to an evaluation.",
+    "logger": "Use it: `gear attack`, `gear train` and `gear bench` log their runs with `--log-to {{name}}`.",
 }
 
 
@@ -41,7 +42,7 @@ def new_package(kind: str, name: str, *, out: str | Path = ".") -> Path:
     """Writes a complete small Python package for a plugin: code, tests, README and licence.
 
     Args:
-        kind: `task`, `model`, `attack`, `defense`, `controller` or `metric`.
+        kind: `task`, `model`, `attack`, `defense`, `controller`, `metric` or `logger`.
         name: name of the plugin, such as `my_blur`; hyphens are replaced by underscores.
         out: existing or new folder in which the package's folder `gear-<kind>-<name>` is created.
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from gear.contracts.specs import TaskSpec
 from gear.dataset.files import write_whole
 from gear.verbs.train.checkpoint import TrainingState
+from gear.verbs.train.run_log import metric_title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +22,7 @@ BLUE, RED, GREEN = "#1f5fa8", "#b3402a", "#2f7d4f"
 
 def write_curves(root: Path, spec: TaskSpec, progress: TrainingState, title: str) -> None:  # type: ignore[type-arg]
     """Writes `curves.png`: training and validation loss on the left, the task's metric and the learning rate on
-    the right.
+    the right. The axes state which direction is better.
 
     Args:
         root: folder of the training.
@@ -43,7 +44,7 @@ def write_curves(root: Path, spec: TaskSpec, progress: TrainingState, title: str
     _line(left, losses, color=BLUE, label="training")
     steps = [entry["step"] for entry in progress.validations]
     left.plot(steps, [entry["loss"] for entry in progress.validations], "o-", color=RED, ms=3, label="validation")
-    left.set(xlabel="step", ylabel="loss")
+    left.set(xlabel="step", ylabel=metric_title("loss", spec))
     left.grid(alpha=0.3)
     left.legend(frameon=False, fontsize=8)
 
@@ -51,7 +52,7 @@ def write_curves(root: Path, spec: TaskSpec, progress: TrainingState, title: str
         values = [entry.get(spec.metric, float("nan")) for entry in progress.validations]
         right.plot(steps, values, "o-", color=GREEN, ms=3)
         right.axvline(progress.best_step, color=GREEN, lw=0.8, ls=":")
-    right.set(xlabel="step", ylabel=spec.metric)
+    right.set(xlabel="step", ylabel=metric_title(spec.metric, spec))
     right.grid(alpha=0.3)
     if progress.steps:
         rate = right.twinx()

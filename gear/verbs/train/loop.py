@@ -30,6 +30,7 @@ from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.feed import Feed
 from gear.verbs.train.optimise import Buffers, RunningMean, clip_gradients, optimiser_of, rate_share
 from gear.verbs.train.results import check_kept, is_kept, write_weights
+from gear.verbs.train.run_log import TrainLog
 from gear.verbs.train.validate import rank, total, validate
 
 NOTE_EVERY = 10
@@ -63,6 +64,7 @@ class Parts:
         adversary: makes adversarial patches before every pass; None without adversarial training.
         root: folder of the results.
         plan: everything on which the weights depend, as JSON; a checkpoint is resumed only if its plan is equal.
+        log: log of the training.
     """
 
     spec: TaskSpec[Any]
@@ -76,6 +78,7 @@ class Parts:
     adversary: Adversary | None
     root: Path
     plan: Json
+    log: TrainLog
 
 
 OnStep = Callable[[TrainingState, float, dict[str, float] | None], None]
@@ -131,6 +134,7 @@ class Training:
             DatasetError: a training is resumed and the file of its best weights is missing; raised before the first
                 step.
         """
+        self._parts.log.begin(self.progress)
         _train_mode(self._parts.model, True)
         _train_mode(self._parts.twin, False)
         if self.progress.best_step == self.progress.step and not is_kept(self._parts.root, self.progress):
@@ -153,6 +157,8 @@ class Training:
         while not self._is_over:
             with self._timed():
                 self._step(next(batches))
+            if self.progress.steps and self.progress.steps[-1]["step"] == self.progress.step:
+                self._parts.log.noted(self.progress)
             if self._is_time_to_validate:
                 self._validate()
             elif self.progress.elapsed_s - self._saved_s > CHECKPOINT_EVERY_S:
@@ -170,6 +176,7 @@ class Training:
         with self._timed(), seeded(int(derive_rng(self._config.seed, "patches", position.epoch).integers(2**31))):
             self._parts.twin.module().load_state_dict(self._mean.state)
             adversary.refresh(self._parts.twin, position.epoch)
+        self._parts.log.patches(self.progress, adversary)
 
     @property
     def _is_over(self) -> bool:
@@ -253,6 +260,7 @@ class Training:
         is_better = rank(metrics, parts.spec) > best or not progress.validations
         entry = {"step": progress.step, "elapsed_s": progress.elapsed_s, "took_s": spent[0], **metrics}
         progress.validations.append(entry)
+        parts.log.validated(progress, metrics, parts.twin, parts.views, parts.validation)
         progress.worse = 0 if is_better else progress.worse + 1
         if is_better:
             progress.best_step = progress.step
@@ -275,6 +283,7 @@ class Training:
         write_weights(self._parts.root, weights)
 
     def _save(self) -> None:
+        self._parts.log.flush()
         extra = self._parts.adversary.state() if self._parts.adversary is not None else {}
         checkpoint.save(
             self._parts.root, self._parts.plan, self.progress, self._module, self._mean, self._optimiser, extra

@@ -25,6 +25,8 @@ class TrainRequest:
         adversarial: attack plugin that makes patches during the training; None for none.
         settings: `KEY=VALUE` texts for further keys of `TrainConfig`.
         allow_test_data: whether `test` splits are accepted.
+        log_to, log_settings: name of a logger plugin, None for no log, and its `KEY=VALUE` options. Weights do not
+            depend on them.
 
     Raises:
         GearError: there are no data.
@@ -47,6 +49,8 @@ class TrainRequest:
     adversarial: str | None = None
     settings: tuple[str, ...] = ()
     allow_test_data: bool = False
+    log_to: str | None = None
+    log_settings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.data:
@@ -79,8 +83,8 @@ class TrainRequest:
         """Values of flags of `gear train`, for the command line that repeats this training, by name such as
         `time_budget`. Flags that were not given are None or False.
 
-        Data and output folders, `--device` and `--workers` are not included; `--set` and `--adversarial` are in
-        `config_settings`.
+        Data and output folders, `--device`, `--workers` and `--log-to` are not included; `--set` and `--adversarial`
+        are in `config_settings`.
         """
         return {
             "epochs": self.epochs,

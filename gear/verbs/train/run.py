@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gear.config.dump import to_plain
+from gear.contracts.loggers import LoggedRun
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.files import clear_scratch
 from gear.dataset.locks import exclusive_lock
@@ -16,6 +18,7 @@ from gear.dataset.reading import scenes_of
 from gear.dataset.store import check_output
 from gear.measuring.appearance_hash import PLANNED, appearance_of
 from gear.measuring.plugin_selection import Chosen, check_camera
+from gear.measuring.run_log import FOLDER, RunLog, choose_logger
 from gear.networks.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import PluginEntry
@@ -33,6 +36,7 @@ from gear.verbs.train.feed import Feed
 from gear.verbs.train.loop import OnStep, Parts, Training
 from gear.verbs.train.request import TrainRequest
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, known, metrics_of, packed, write_history
+from gear.verbs.train.run_log import TrainLog
 from gear.verbs.train.sizes import picture_scale, without_empty_margins
 from gear.verbs.train.starting import (
     build_network,
@@ -104,6 +108,8 @@ def train(
     adversarial: str | None = None,
     settings: Iterable[str] = (),
     allow_test_data: bool = False,
+    log_to: str | None = None,
+    log_settings: Iterable[str] = (),
     progress: bool = False,
     on_step: OnStep | None = None,
     on_progress: Progress | None = None,
@@ -126,6 +132,9 @@ def train(
         settings: `KEY=VALUE` texts for any key of `TrainConfig`, such as `augmentation.flip=0`; options of the network
             are `options.KEY`.
         allow_test_data: whether `test` splits are accepted as training data.
+        log_to: name of a logger plugin, such as `tensorboard`, which logs curves and figures in `out/log`; None for no
+            log. The weights do not depend on it.
+        log_settings: `KEY=VALUE` texts for the logger's options.
         progress: shows a progress bar.
         on_step: called after every step and every validation, with the state of the training.
         on_progress: called after every step; with a time budget the number of all steps is an estimate.
@@ -152,6 +161,8 @@ def train(
         adversarial=adversarial,
         settings=tuple(settings),
         allow_test_data=allow_test_data,
+        log_to=log_to,
+        log_settings=tuple(log_settings),
     )
     callbacks = Callbacks.of(on_progress=on_progress, on_warning=on_warning)
     with displayed(callbacks, "train", progress=progress, unit="step") as shown:
@@ -171,16 +182,19 @@ def run_train(request: TrainRequest, callbacks: Callbacks, on_step: OnStep | Non
         GearError: an error that the user can correct; the message is one line.
     """
     prepare()
+    logger = choose_logger(request.log_to, request.log_settings)
     origin = _origin(request, callbacks)
     found, spec, root = origin.model, origin.spec, Path(request.out)
-    parts = _parts(origin, root, callbacks)
-    with exclusive_lock(root, callbacks.on_warning):
+    title = f"{found.spec.name} on {request.task}"
+    log = RunLog(logger, LoggedRun(verb="train", title=title, folder=root / FOLDER), callbacks.on_warning)
+    parts = _parts(origin, root, callbacks, log)
+    with exclusive_lock(root, callbacks.on_warning), contextlib.closing(log):
         clear_scratch(root)
         training = Training(
             parts, origin.config, on_step=with_progress(on_step, callbacks), pack=partial(packed, origin)
         )
         state = training.run()
-        write_curves(root, spec, state, f"{found.spec.name} on {request.task}")
+        write_curves(root, spec, state, title)
         write_history(root, origin, state)
         clear_scratch(root)
     best = next(entry for entry in state.validations if entry["step"] == state.best_step)
@@ -274,7 +288,7 @@ def trainable(plugin: PluginEntry, task: str) -> Any:
     return spec.recipe
 
 
-def _parts(origin: Origin, root: Path, callbacks: Callbacks) -> Parts:
+def _parts(origin: Origin, root: Path, callbacks: Callbacks, log: RunLog) -> Parts:
     found, config = origin.model, origin.config
     model = build_network(found, config, precision=config.precision)
     started = (
@@ -304,9 +318,10 @@ def _parts(origin: Origin, root: Path, callbacks: Callbacks) -> Parts:
             device=device_of(config.device),
             cache_bytes=int(limit / 4),
         )
+    plan, task = _plan(origin), origin.training.datasets[0].task
     return Parts(
         spec=origin.spec,
-        task=origin.training.datasets[0].task,
+        task=task,
         found=found,
         model=model,
         twin=twin,
@@ -321,7 +336,8 @@ def _parts(origin: Origin, root: Path, callbacks: Callbacks) -> Parts:
         ),
         adversary=adversary,
         root=root,
-        plan=_plan(origin),
+        plan=plan,
+        log=TrainLog(log, plan, origin.spec, task),
     )
 
 

@@ -17,6 +17,7 @@ from gear.values.errors import GearError, ReplaceableError
 from gear.verbs.bench.carry_out import VERBS
 from gear.verbs.bench.plan import Step
 from gear.verbs.bench.report import BenchReport
+from tests.plugins.loggers.reading import read_log
 from tests.verbs.bench.conftest import FEW, callbacks
 
 pytestmark = pytest.mark.usefixtures("plugins")
@@ -46,7 +47,7 @@ class Looks:
 
 def test_the_whole_way_and_again(tmp_path: Path, written: Callable[..., Path]) -> None:
     config, out, looks = written(), tmp_path / "out", Looks()
-    report = gear.bench(config, out=out, **callbacks(looks))
+    report = gear.bench(config, out=out, log_to="tensorboard", **callbacks(looks))
     assert looks.steps[0] == "1/37 collect" and looks.steps[-1] == "37/37 evaluate"
     assert looks.lessons and looks.done
     (task,) = report.tasks
@@ -60,6 +61,9 @@ def test_the_whole_way_and_again(tmp_path: Path, written: Callable[..., Path]) -
     assert all(pool.samples == 4 for one in task.results for pool in one.evaluation.pools)
     _check_metrics(report)
     _check_files(out, report)
+    logs = list((out / "patches").rglob("log/events.*"))
+    assert len(logs) == len(list((out / "patches").rglob("attack.json"))) > 0
+    assert len(read_log(out / "log").pictures) == sum(len(one.evaluation.rows) for one in task.results)
 
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*.png")}
     texts = [(out / name).read_bytes() for name in ("bench.json", "table.txt", "report.html", "figures/semseg.pdf")]
@@ -94,7 +98,7 @@ def _check_metrics(report: BenchReport) -> None:
 
 def _check_files(out: Path, report: BenchReport) -> None:
     assert sorted(path.name for path in out.iterdir()) == [
-        "bench.csv", "bench.json", "bench.yml", "data", "evaluations", "figures", "metrics.csv", "metrics.json",
+        "bench.csv", "bench.json", "bench.yml", "data", "evaluations", "figures", "log", "metrics.csv", "metrics.json",
         "patches", "report.html", "table.txt", "tables",
     ]  # fmt: skip
     written: Any = json.loads((out / "bench.json").read_text())

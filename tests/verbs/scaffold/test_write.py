@@ -45,7 +45,7 @@ def test_a_package_is_whole(kind: str, tmp_path: Path) -> None:
     ("kind", "use"),
     [("task", "gear collect --task my_thing"), ("model", "--model my_thing"), ("defense", "--defense my_thing"),
      ("attack", "gear attack --attack my_thing"), ("metric", "--report my_thing"),
-     ("controller", "controller: my_thing")],
+     ("controller", "controller: my_thing"), ("logger", "--log-to my_thing")],
 )  # fmt: skip
 def test_its_readme_says_how_gear_uses_it(kind: str, use: str, tmp_path: Path) -> None:
     assert use in (new_package(kind, "my_thing", out=tmp_path) / "README.md").read_text()
@@ -82,6 +82,7 @@ def test_a_plugin_that_is_there_is_not_written_again(tmp_path: Path) -> None:
         ("model", "tensor"),
         ("metric", "evaluator"),
         ("controller", "action"),
+        ("logger", "run"),
     ],
 )
 def test_its_classes_take_no_name_that_it_uses(kind: str, name: str, tmp_path: Path) -> None:
@@ -139,6 +140,7 @@ PAGES = {
     "attack": "how-to/write-an-attack.md",
     "metric": "how-to/write-a-metric.md",
     "controller": "how-to/write-a-controller.md",
+    "logger": "how-to/write-a-logger.md",
 }
 
 

@@ -1,0 +1,1 @@
+"""gear's own loggers, one per module, for `--log-to`."""

@@ -1,0 +1,142 @@
+"""Logs a training (`--log-to`): losses, learning rate, metrics, and predictions on validation samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+
+from gear.contracts.specs import TaskSpec
+from gear.contracts.tasks import Task
+from gear.measuring.run_log import RunLog
+from gear.measuring.sample_figures import ShownPictures, ShownSample, sample_figure
+from gear.networks.runtime import seeded
+from gear.reporting.directions import with_direction
+from gear.values.frames import UInt8Image
+from gear.values.serial import Json
+from gear.verbs.train.adversary import Adversary
+from gear.verbs.train.checkpoint import TrainingState
+from gear.verbs.train.validate import LOSS
+
+SAMPLES = 3
+"""Number of validation samples in a figure."""
+
+FIGURE = "validation samples (close to the ground truth is better)"
+"""Name of the figure of samples."""
+
+
+def metric_title(name: str, spec: TaskSpec[Any]) -> str:
+    """Returns the name of a validation metric with its direction, which is known for the loss and for the metric by
+    which the training chooses among checkpoints.
+
+    Args:
+        name: name of the metric.
+        spec: spec of the task.
+    """
+    known = {LOSS: True} | ({spec.metric: spec.lower_is_better} if spec.metric else {})
+    return with_direction(name, lower_is_better=known.get(name))
+
+
+class TrainLog:
+    """The log of a training."""
+
+    def __init__(self, log: RunLog, config: Json, spec: TaskSpec[Any], task: Task[Any, Any]) -> None:
+        """Prepares the log.
+
+        Args:
+            log: the log of the run.
+            config: everything on which the weights depend, as JSON.
+            spec, task: spec of the task, and the task.
+        """
+        self._log, self._config, self._spec, self._task = log, config, spec, task
+
+    def begin(self, state: TrainingState) -> None:
+        """Opens the log.
+
+        Args:
+            state: state of the training, new or from a checkpoint.
+        """
+        self._log.begin(state.step, self._config)
+
+    def noted(self, state: TrainingState) -> None:
+        """Logs mean loss and learning rate of the last steps, which are the last entry of the history.
+
+        Args:
+            state: state of the training.
+        """
+        point = state.steps[-1]
+        self._log.scalar(f"training/{with_direction(LOSS, lower_is_better=True)}", point["loss"], state.step)
+        self._log.scalar("training/learning rate", point["rate"], state.step)
+
+    def validated(
+        self,
+        state: TrainingState,
+        metrics: dict[str, float],
+        network: Any,
+        views: Sequence[str],
+        samples: Sequence[Any],
+    ) -> None:
+        """Logs the metrics of a validation, and predictions on some of its samples.
+
+        Args:
+            state: state of the training.
+            metrics: metrics by name, with the loss.
+            network: the network that was validated.
+            views: names of the cameras whose pictures the network uses.
+            samples: the validation samples.
+        """
+        titled = {f"validation/{metric_title(name, self._spec)}": value for name, value in metrics.items()}
+        self._log.scalars(titled, state.step)
+        self._log.pictures(state.step, lambda: {FIGURE: figure_of(self._task, network, views, samples)})
+
+    def patches(self, state: TrainingState, adversary: Adversary) -> None:
+        """Logs the newest patches of an adversarial training.
+
+        Args:
+            state: state of the training.
+            adversary: the pool of patches.
+        """
+
+        def newest() -> dict[str, UInt8Image]:
+            pool = adversary.state()
+            last = max(pool).partition(".")[0]
+            shown = {key.partition(".")[2]: patch for key, patch in pool.items() if key.partition(".")[0] == last}
+            return {f"patches/patch_{int(number)}": _as_bytes(patch) for number, patch in shown.items()}
+
+        self._log.pictures(state.step, newest)
+
+    def flush(self) -> None:
+        """Makes the logger store all entries; called before a checkpoint is written."""
+        self._log.flush()
+
+
+def figure_of(task: Task[Any, Any], network: Any, views: Sequence[str], samples: Sequence[Any]) -> UInt8Image:
+    """Draws some samples: picture, prediction and ground truth.
+
+    The random generators of torch have the same state afterwards.
+
+    Args:
+        task: task of the samples.
+        network: the network, in eval mode.
+        views: names of the cameras whose pictures the network uses.
+        samples: samples, of which some are drawn, evenly spaced.
+
+    Returns:
+        (H, W, 3) uint8 RGB.
+    """
+    rows: list[ShownSample] = []
+    with seeded(0), torch.no_grad():
+        for index in np.unique(np.linspace(0, len(samples) - 1, SAMPLES).round().astype(int)).tolist():
+            sample = samples[index]
+            prediction = network.predict({name: sample.images[name] for name in views})
+            shown = ShownPictures(caption=sample.record.scene, images=sample.images, predictions={"": prediction})
+            rows.append((sample, [shown]))
+    return sample_figure(task, rows)
+
+
+def _as_bytes(patch: torch.Tensor) -> UInt8Image:
+    """Converts a (3, h, w) patch in 0..1 to (h, w, 3) uint8."""
+    levels = (patch.clamp(0, 1) * 255).round().to(torch.uint8)
+    return np.ascontiguousarray(levels.permute(1, 2, 0).cpu().numpy())
