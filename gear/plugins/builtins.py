@@ -23,6 +23,7 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.defenses.zmask",
     "gear.plugins.defenses.hyperneuron",
     "gear.plugins.defenses.fpda",
+    "gear.plugins.defenses.jedi",
     "gear.plugins.defenses.lgs",
     "gear.plugins.defenses.jpeg",
     "gear.plugins.defenses.median",

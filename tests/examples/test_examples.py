@@ -71,7 +71,7 @@ def test_all_are_found_and_the_broken_ones_are_named(home: Path) -> None:
     names = {(p["kind"], p["name"], p["package"]) for p in facts["plugins"]}
     assert {
         ("defense", "jpeg_tv", "gear-defense-jpeg-tv"),
-        ("defense", "jedi", "gear-defense-jedi"),
+        ("defense", "local_entropy", "gear-defense-local-entropy"),
         ("task", "panoptic", "gear-task-panoptic"),
         ("model", "transformers_semseg", "gear-model-transformers"),
         ("model", "transformers_depth", "gear-model-transformers"),
@@ -112,12 +112,12 @@ def test_a_foreign_task_gets_everything(home: Path) -> None:
     assert cv2.imread(str(home / "empty/sheet.png")).std() > 20
     gear(home, "defend", "data", "--defense", "jpeg_tv", "--out", "jpeg_tv")
     eager = ("--set", "patch_mean=[3.5, 4.0, 4.3]")  # a small rendered board is calmer than the paper's photographs
-    gear(home, "defend", "data", "--defense", "jedi", *eager, "--out", "jedi")
-    folder = home / "empty/jedi/defense/debug"
+    gear(home, "defend", "data", "--defense", "local_entropy", *eager, "--out", "local_entropy")
+    folder = home / "empty/local_entropy/defense/debug"
     scores = json.loads((folder / "scores.json").read_text())["scores"]
     for index in range(2):
         name = f"images/debug/{index:06d}.png"
-        roots = (data, home / "empty/jpeg_tv", home / "empty/jedi")
+        roots = (data, home / "empty/jpeg_tv", home / "empty/local_entropy")
         before, smooth, filled = (cv2.imread(str(root / name)) for root in roots)
         assert smooth.shape == before.shape and (smooth != before).mean() > 0.2
         mask = cv2.imread(str(folder / f"masks/{index:06d}_left.png"), cv2.IMREAD_UNCHANGED) > 0
@@ -133,7 +133,7 @@ def test_foreign_models_defenses_and_tasks_have_their_rows(home: Path) -> None:
         gear(home, "collect", "--task", task, *common, "--patch", patch, "--out", f"rows/{task}-{patch}")
     network = ("--model", "ddrnet23_slim", "--set", "weights=none", "--data", "rows/semseg-none", "rows/semseg-random")
     found = {}
-    for defense in (None, "jpeg_tv", "jedi"):
+    for defense in (None, "jpeg_tv", "local_entropy"):
         guard = ("--defense", defense) if defense else ()
         words = (*network, *guard, "--report", "boundary_iou", "--json")
         found[defense] = json.loads(gear(home, "evaluate", *words))
@@ -141,12 +141,14 @@ def test_foreign_models_defenses_and_tasks_have_their_rows(home: Path) -> None:
         assert [row["samples"] for row in found[defense]["rows"]] == [2, 2]
         assert (home / f"empty/evaluations/semseg/ddrnet23_slim{'+' if defense else ''}{defense or ''}").is_dir()
     cost = {name: one["rows"][1]["cost"]["defense_s"] for name, one in found.items()}
-    assert cost[None] == 0 and cost["jpeg_tv"] > 0 and cost["jedi"] > 0
+    assert cost[None] == 0 and cost["jpeg_tv"] > 0 and cost["local_entropy"] > 0
     assert {one["model"]["weights_sha256"] for one in found.values()} == {found[None]["model"]["weights_sha256"]}
-    assert found["jedi"]["differences"][0]["auroc"] is not None
+    assert found["local_entropy"]["differences"][0]["auroc"] is not None
     baseline = ("--model", "panoptic_parts", "--set", "weights=none", "--data", "rows/panoptic-random")
-    text = gear(home, "evaluate", *baseline, "--defense", "jedi", "--report", "outside_patch", "--out", "panoptic")
-    assert text.startswith("panoptic: panoptic_parts guarded by jedi\n") and "outside_patch.pq" in text
+    text = gear(
+        home, "evaluate", *baseline, "--defense", "local_entropy", "--report", "outside_patch", "--out", "panoptic"
+    )
+    assert text.startswith("panoptic: panoptic_parts guarded by local_entropy\n") and "outside_patch.pq" in text
     (folder,) = (path.parent for path in (home / "empty/panoptic").glob("*/predictions"))
     results = json.loads((folder / "predictions/panoptic.json").read_text())["annotations"]
     assert [one["image_id"] for one in results] == [1, 2]

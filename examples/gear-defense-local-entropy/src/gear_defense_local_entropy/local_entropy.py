@@ -19,15 +19,15 @@ from gear.values.frames import UInt8Image
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from gear_defense_jedi import JediConfig
+    from gear_defense_local_entropy import LocalEntropyConfig
 
 Bool = npt.NDArray[np.bool_]
 
 
-class Jedi(PerPicture):
+class LocalEntropy(PerPicture):
     """Detects areas of high local entropy and fills them in."""
 
-    def __init__(self, config: JediConfig) -> None:
+    def __init__(self, config: LocalEntropyConfig) -> None:
         self.config = config
 
     def clean(self, picture: UInt8Image) -> tuple[UInt8Image, Mask | None]:
@@ -40,7 +40,7 @@ class Jedi(PerPicture):
 
     def clean_tensor(self, pictures: Tensor) -> Tensor:
         """Raises an error: no gradient passes the search for windows."""
-        raise ValueError("jedi has no gradient; attack it by queries")
+        raise ValueError("local_entropy has no gradient; attack it by queries")
 
     def suspicious(self, picture: UInt8Image) -> Bool:
         """(H, W) bool, True where a patch is detected."""

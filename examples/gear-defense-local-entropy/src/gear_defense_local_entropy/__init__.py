@@ -1,4 +1,4 @@
-"""jedi: finds patches by their local entropy, after Jedi (Tarchoun et al., CVPR 2023)."""
+"""local_entropy: finds patches by their local entropy, after Jedi (Tarchoun et al., CVPR 2023)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JediConfig:
-    """Options of jedi. The defaults are the paper's, measured on photographs, for its three window sizes.
+class LocalEntropyConfig:
+    """Options of local_entropy. The defaults are the paper's, measured on photographs, for its three window sizes.
 
     Attributes:
         patch_mean, patch_std: entropy of patches in bits, for the small, middle and large windows.
@@ -40,17 +40,17 @@ class JediConfig:
                 raise FieldError(name, f"must be above 0, got {getattr(self, name)}")
 
 
-def build(config: JediConfig) -> Defense:
+def build(config: LocalEntropyConfig) -> Defense:
     """Imports OpenCV when the defense is asked for."""
-    from gear_defense_jedi.jedi import Jedi
+    from gear_defense_local_entropy.local_entropy import LocalEntropy
 
-    return Jedi(config)
+    return LocalEntropy(config)
 
 
 spec = DefenseSpec(
-    name="jedi",
+    name="local_entropy",
     summary="Finds patches by local entropy at three scales and fills them in.",
-    config=JediConfig,
+    config=LocalEntropyConfig,
     build=build,
     outputs=frozenset({"images", "mask", "score"}),
     gradient="none",
@@ -58,6 +58,6 @@ spec = DefenseSpec(
 
 
 @hookimpl
-def gear_defenses() -> list[DefenseSpec[JediConfig]]:
+def gear_defenses() -> list[DefenseSpec[LocalEntropyConfig]]:
     """Called by gear, which finds this module through the entry point in pyproject.toml."""
     return [spec]

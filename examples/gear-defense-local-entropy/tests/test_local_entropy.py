@@ -7,15 +7,15 @@ import pytest
 from gear.testing.defense_contract import DefenseContract, noisy_patch, street_picture
 from gear.values.errors import FieldError
 
-from gear_defense_jedi import JediConfig, spec
-from gear_defense_jedi.jedi import Jedi, entropies, sides
+from gear_defense_local_entropy import LocalEntropyConfig, spec
+from gear_defense_local_entropy.local_entropy import LocalEntropy, entropies, sides
 
 
-class TestJedi(DefenseContract):
+class TestLocalEntropy(DefenseContract):
     spec = spec
 
 
-class TestJediOnOddSizes(DefenseContract):
+class TestLocalEntropyOnOddSizes(DefenseContract):
     spec = spec
     size_px = (83, 41)
     views = ("left",)
@@ -44,7 +44,7 @@ def test_window_sizes_are_the_papers() -> None:
 
 def test_it_finds_the_patch_and_spares_the_street() -> None:
     patched, area = noisy_patch(street_picture(256, 144, 1), 1)
-    cleaned, mask = Jedi(JediConfig()).clean(patched)
+    cleaned, mask = LocalEntropy(LocalEntropyConfig()).clean(patched)
     assert mask is not None
     assert mask[area].mean() > 0.9
     assert mask[~area].mean() < 0.1
@@ -55,4 +55,4 @@ def test_it_finds_the_patch_and_spares_the_street() -> None:
 @pytest.mark.parametrize("options", [{"least_share": 1.0}, {"grow_px": -1}, {"patch_mean": (0.0, 1.0, 1.0)}])
 def test_absurd_options_are_refused(options: dict[str, float]) -> None:
     with pytest.raises(FieldError, match=next(iter(options))):
-        JediConfig(**options)  # type: ignore[arg-type]
+        LocalEntropyConfig(**options)  # type: ignore[arg-type]

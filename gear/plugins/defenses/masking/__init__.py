@@ -1,0 +1,1 @@
+"""What defenses share that locate patches in a picture and replace the located pixels: Jedi, PAD, SAC."""

@@ -1,0 +1,16 @@
+"""The overlap of masks over pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gear.plugins.defenses.masking.mask_iou import MaskIou
+
+
+def test_pixels_of_all_pictures_count_together() -> None:
+    total = MaskIou()
+    assert total.value == 0
+    total.update(np.array([[True, True, False]]), np.array([[True, False, False]]))
+    total.update(np.array([[True, False, False]]), np.array([[True, True, True]]))
+    assert total.value == pytest.approx(2 / 5)
