@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from gear.measuring.gap.report import GapReport
     from gear.plugins.datasets import Dataset, Twins, open_dataset, open_twins
     from gear.values.errors import GearError
+    from gear.verbs.attack.drives.run import attack_drive
     from gear.verbs.attack.per_scene import attack_scenes
     from gear.verbs.attack.report import AttackReport
     from gear.verbs.attack.run import attack
@@ -75,6 +76,7 @@ __all__ = [
     "VerifyReport",
     "ViewReport",
     "attack",
+    "attack_drive",
     "attack_scenes",
     "average_weights",
     "bench",
@@ -129,6 +131,7 @@ _HOME = {
     "VerifyReport": "gear.verbs.verify.report",
     "ViewReport": "gear.view.write",
     "attack": "gear.verbs.attack.run",
+    "attack_drive": "gear.verbs.attack.drives.run",
     "attack_scenes": "gear.verbs.attack.per_scene",
     "bench": "gear.verbs.bench.run",
     "build_leaderboard": "gear.verbs.leaderboard.build",

@@ -8,6 +8,9 @@ import argparse
 from collections.abc import Sequence
 from typing import Any
 
+DEVICE = "device="
+"""Beginning of the model option that the flag sets."""
+
 
 def add_device(parser: argparse.ArgumentParser, settings: str) -> None:
     """Adds the flag `--device` to a parser. Its value is appended as `device=VALUE` to the argument that
@@ -21,6 +24,19 @@ def add_device(parser: argparse.ArgumentParser, settings: str) -> None:
         default=argparse.SUPPRESS,
         help="device of the model: auto takes a GPU if there is one (auto)",
     )
+
+
+def device_of(settings: Sequence[str]) -> tuple[str | None, list[str]]:
+    """Separates the value of the flag `--device` from other model options.
+
+    Args:
+        settings: `KEY=VALUE` texts, to which the flag appends `device=VALUE`.
+
+    Returns:
+        The last device, None without one, and the other options.
+    """
+    devices = [text.removeprefix(DEVICE) for text in settings if text.startswith(DEVICE)]
+    return (devices[-1] if devices else None), [text for text in settings if not text.startswith(DEVICE)]
 
 
 class _AsSetting(argparse.Action):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from gear.camera.pipeline import CameraPipeline
 from gear.camera.reflection import MirrorView, Reflection
@@ -32,6 +32,14 @@ from gear.world.weather.air import camera_pipeline
 from gear.world.weather.mirror_view import render_mirror_view
 from gear.world.weather.night import night_of
 from gear.world.world import World
+
+
+class Planner(Protocol):
+    """Decides the scenes of samples."""
+
+    def plan(self, index: int) -> SceneRecord:
+        """The scene record of the sample `index`, which depends only on the index."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -80,7 +88,7 @@ class Session:
         job: the collection job.
         plugin, task: plugin of the task, and the task built from it.
         world: the compiled world of the scene.
-        planner: draws the scene record of each sample.
+        planner: decides the scene record of each sample.
         renderer: renderer of the world.
         pipeline: camera pipeline, which turns renders into pictures.
     """
@@ -89,7 +97,7 @@ class Session:
     plugin: PluginEntry
     task: Task[Any, Any]
     world: World
-    planner: ScenePlanner
+    planner: Planner
     renderer: Renderer
     pipeline: CameraPipeline
 

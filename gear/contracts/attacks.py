@@ -213,6 +213,17 @@ class WithObjective(Protocol):
 
 
 @runtime_checkable
+class SampleWithObjective(Protocol):
+    """A sample that brings its own objective, such as a drive in the closed loop; attacks without gradients maximise
+    it in place of the objective of a task.
+    """
+
+    def own_objective(self) -> Objective:
+        """The objective of all attacks on this sample."""
+        ...
+
+
+@runtime_checkable
 class WithTaskOptions(Protocol):
     """An attack whose options depend on the task, such as its learning rate."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,9 @@ from gear.collecting.lookup import Named, look_up
 from gear.collecting.patch_sources import PatchSet, resolve_patch
 from gear.config.collection import CollectionConfig
 from gear.config.dump import to_plain
-from gear.config.nodes import Mapping, Place, Scalar
-from gear.config.overrides import merged
+from gear.config.load import find_config
+from gear.config.nodes import Mapping, Place, Scalar, parse_file
+from gear.config.overrides import merged, with_overrides
 from gear.config.reader import located_errors, read_node
 from gear.contracts.specs import ControllerSpec, ModelSpec
 from gear.contracts.tasks import NO_PATCH
@@ -225,6 +226,20 @@ class Drives:
         place = f"{Path(run.town).stem}-{Path(run.scene).stem}"
         name = f"{run.scenario}-{run.speed_kmh:g}kmh-{place}-s{run.seed}-{run.twin}-{digest}"
         return f"{RUNS}/{run.driver}/{_safe(name)}"
+
+
+def read_drive_config(config: str | Path, settings: Iterable[str] = ()) -> DriveConfig:
+    """Reads a drive config.
+
+    Args:
+        config: name or path of the config.
+        settings: `KEY=VALUE` texts that replace its values.
+
+    Raises:
+        GearError: the config does not exist, or cannot be read; the message is one line.
+    """
+    node = with_overrides(parse_file(find_config("drive", str(config))), settings, DriveConfig)
+    return read_node(DriveConfig, node)
 
 
 def plan_drives(config: DriveConfig, root: Path, device: str | None = None) -> Drives:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from gear.collecting.job import Job, resolve
 from gear.collecting.lookup import look_up
+from gear.collecting.patch_sources import PatchSet
 from gear.collecting.session import Session, open_session
 from gear.contracts.executors import MOST_FAILURES, Outcome, Report
 from gear.contracts.rendering import RendererInfo
@@ -22,7 +23,7 @@ from gear.dataset.sealed_json import DamagedError, load_sealed, sealed_json
 from gear.dataset.whole_tree import whole_tree
 from gear.driving.drives import Cast, DriveRun, Drives
 from gear.driving.log import log_bytes, log_hash
-from gear.driving.loop import Sight, Wheel, drive
+from gear.driving.loop import Sight, Watch, Wheel, drive
 from gear.driving.measures import Measures, measure
 from gear.driving.simulation import DriveSimulation
 from gear.driving.start import Draw
@@ -91,8 +92,15 @@ class _Place:
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
-class _Workshop:
-    """The place and the network that were opened last; runs are ordered so that they rarely change."""
+class Workshop:
+    """The place and the network that were opened last; runs are ordered so that they rarely change.
+
+    Attributes:
+        drives: the study.
+        place_key, place: what decides the open place, and the place; None before the first drive.
+        open_places: closes the open place.
+        model_key, model: driver whose network is loaded, and the network with its defense; None without one.
+    """
 
     drives: Drives
     place_key: tuple[str, str, str] | None = None
@@ -134,7 +142,7 @@ class _Workshop:
         if cast.model is None:
             return None
         if self.model is None or self.model_key != cast.label:
-            self.model = GuardedModel(cast.model, _guard(cast), seed=self.drives.config.seed)
+            self.model = GuardedModel(cast.model, guard_of_cast(cast), seed=self.drives.config.seed)
             self.model_key = cast.label
         return self.model
 
@@ -159,7 +167,8 @@ def with_any_number(scene: SceneSpec) -> SceneSpec:
     )
 
 
-def _guard(cast: Cast) -> OpenedGuard:
+def guard_of_cast(cast: Cast) -> OpenedGuard:
+    """The defense of the driver `cast` with its calibration data; an empty guard without a defense."""
     if cast.defense is None or cast.model is None:
         return OpenedGuard()
     driver = cast.driver
@@ -181,7 +190,7 @@ def drive_all(drives: Drives, indices: Iterator[int], report: Report) -> None:
     Raises:
         GearError: a file cannot be written.
     """
-    shop = _Workshop(drives=drives)
+    shop = Workshop(drives=drives)
     in_row = 0
     with shop.open_places, Claims(drives.root, CLAIMS) as claims, single_thread(drives):
         for index in indices:
@@ -196,7 +205,7 @@ def drive_all(drives: Drives, indices: Iterator[int], report: Report) -> None:
                 return
 
 
-def _outcome(shop: _Workshop, index: int) -> Outcome:
+def _outcome(shop: Workshop, index: int) -> Outcome:
     """Makes one drive, unless it is there.
 
     Raises:
@@ -213,17 +222,64 @@ def _outcome(shop: _Workshop, index: int) -> Outcome:
         return Outcome(index=index, kind="failed", error=text, trace=trace, is_final=is_final)
 
 
-def _made(shop: _Workshop, run: DriveRun) -> bool:
+def _made(shop: Workshop, run: DriveRun) -> bool:
     """Makes a drive and writes its folder; returns False if it is there already."""
     drives = shop.drives
-    cast = drives.casts[run.driver]
     place = shop.place_of(run)
     patch = drives.patch(run, 0 if place.session is None else len(place.session.world.faces))
     folder = drives.folder(run, patch)
     identity = drives.identity(run, patch)
     if read_result(drives.root, folder, identity, with_video=drives.has_video(run)) is not None:
         return False
-    model, sight = shop.model_of(cast), None
+    video = Video(run.caption) if drives.has_video(run) else None
+    done = drive_once(shop, run, patch, None if video is None else video.watch)
+    data = log_bytes(done.log)
+    result = DriveResult(
+        run=run,
+        measures=measure(done.log),
+        log_sha256=log_hash(data),
+        patch=patch.label,
+        weights_sha256=None if done.model is None else done.model.weights_sha256,
+        renderer=None if place.job is None else place.job.renderer,
+        open_loop=done.open_loop,
+        open_loop_metric=_main_metric(place.session),
+    )
+    content = sealed_json({"identity": identity, "result": to_json(result)})
+    shown = {} if video is None else {VIDEO: video.mp4()}
+    _write(drives.root, folder, {LOG: data, **shown, RESULT: content})
+    return True
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class DoneDrive:
+    """A drive that has just been made.
+
+    Attributes:
+        log: its log, as `gear.driving.loop.drive` returns it.
+        model: the network with its defense; None without one.
+        open_loop: metrics of the predictions in all frames, by name; empty if they were not evaluated.
+    """
+
+    log: list[Json]
+    model: GuardedModel | None
+    open_loop: dict[str, float | None]
+
+
+def drive_once(shop: Workshop, run: DriveRun, patch: PatchSet, watch: Watch | None = None) -> DoneDrive:
+    """Makes one drive and writes nothing.
+
+    Args:
+        shop: the open place and network; they are opened if another drive was made before.
+        run: the drive.
+        patch: the patch that its scene shows.
+        watch: called in every frame with the state, the pictures, the prediction and the action; None for nothing.
+
+    Raises:
+        GearError: the place has no room for the scenario, or code of another package failed.
+    """
+    drives, cast = shop.drives, shop.drives.casts[run.driver]
+    place, model = shop.place_of(run), shop.model_of(cast)
+    sight = None
     if place.session is not None and place.job is not None:
         session = replace(place.session, job=replace(place.session.job, patch=patch))
         is_evaluated = drives.config.open_loop and model is not None
@@ -231,23 +287,9 @@ def _made(shop: _Workshop, run: DriveRun) -> bool:
         sight = Sight(session=session, rig=session.task.rig(), model=model, evaluator=evaluator)
     wheel = Wheel(plugin=cast.controller.found, controller=build(cast.controller.found, cast.controller.options))
     draw = Draw(name=run.scenario, scenario=drives.scenario(run), speed_mps=run.speed_kmh / 3.6, seed=run.seed)
-    video = Video(run.caption) if drives.has_video(run) else None
-    log = drive(place.simulation, draw, wheel, sight, None if video is None else video.watch)
-    data = log_bytes(log)
-    result = DriveResult(
-        run=run,
-        measures=measure(log),
-        log_sha256=log_hash(data),
-        patch=patch.label,
-        weights_sha256=None if model is None else model.weights_sha256,
-        renderer=None if place.job is None else place.job.renderer,
-        open_loop={} if sight is None or sight.evaluator is None else known_json(sight.evaluator.result()),
-        open_loop_metric=_main_metric(place.session),
-    )
-    content = sealed_json({"identity": identity, "result": to_json(result)})
-    shown = {} if video is None else {VIDEO: video.mp4()}
-    _write(drives.root, folder, {LOG: data, **shown, RESULT: content})
-    return True
+    log = drive(place.simulation, draw, wheel, sight, watch)
+    open_loop = {} if sight is None or sight.evaluator is None else known_json(sight.evaluator.result())
+    return DoneDrive(log=log, model=model, open_loop=open_loop)
 
 
 def _main_metric(session: Session | None) -> str:

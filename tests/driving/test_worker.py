@@ -19,7 +19,7 @@ from gear.values.serial import to_json
 
 
 def test_a_place_that_fails_to_open_is_opened_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    shop: Any = worker._Workshop(drives=cast("Any", SimpleNamespace(casts={"a": SimpleNamespace(task="")})))
+    shop: Any = worker.Workshop(drives=cast("Any", SimpleNamespace(casts={"a": SimpleNamespace(task="")})))
     opened: list[str] = []
 
     def open_place(self: Any, run: Any, cast: Any) -> Any:
@@ -28,7 +28,7 @@ def test_a_place_that_fails_to_open_is_opened_anew(monkeypatch: pytest.MonkeyPat
         opened.append(run.town)
         return f"place {len(opened)}"
 
-    monkeypatch.setattr(worker._Workshop, "_opened", open_place)
+    monkeypatch.setattr(worker.Workshop, "_opened", open_place)
     good, broken = (SimpleNamespace(driver="a", town=town, scene="s") for town in ("good", "broken"))
     assert shop.place_of(good) == shop.place_of(good) == "place 1"
     with pytest.raises(GearError, match="is broken"):

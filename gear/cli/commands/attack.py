@@ -17,6 +17,7 @@ EXAMPLE = """examples:
   gear attack --model ddrnet23_slim --data data/b01 --out patches/b01
   gear attack --model ddrnet23_slim --data data/b01 --set target=sky --set source_class=road --out patches/road_to_sky
   gear attack --model ddrnet23_slim_depth --attack carla_gear --steps 5100 --data data/depth --out patches/paper
+  gear attack --drive quick --drive-set 'scenarios={stopped_lead: [40]}' --queries 200 --out patches/crash
   gear attack --model ddrnet23_slim --attack square --queries 5000 --data data/b01 --out patches/black-box
   gear attack --model ddrnet23_slim --data data/b01 --data data/b02 --data data/b01-sunset --out patches/universal
   gear attack --model ddrnet23_slim --per-scene --engine-workers 4 --data data/train --out patches
@@ -33,18 +34,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from gear.cli.engine import add_engine, add_engine_workers
 
     parser.epilog = EXAMPLE
-    parser.add_argument("--model", required=True, action="append", metavar="NAME", help="model plugin; repeatable")
-    parser.add_argument(
-        "--data", required=True, action="append", metavar="DIR", help="dataset with probes, or DIR:SPLIT; repeatable"
-    )
+    parser.add_argument("--model", action="append", metavar="NAME", help="model plugin; repeatable")
+    parser.add_argument("--data", action="append", metavar="DIR", help="dataset with probes, or DIR:SPLIT; repeatable")
+    _add_drive(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the patches")
-    parser.add_argument("--attack", default="scene_specific", metavar="NAME", help="attack plugin (scene_specific)")
+    parser.add_argument("--attack", metavar="NAME", help="attack plugin (scene_specific; with --drive square)")
     parser.add_argument("--steps", type=int, metavar="N", help="most optimisation steps (300; with --queries no limit)")
     parser.add_argument(
         "--queries",
         type=int,
         metavar="N",
-        help="most forward passes of the model, for attacks without gradients",
+        help="most forward passes of the model, for attacks without gradients; with --drive most tried patches (100)",
     )
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="an option of the attack"
@@ -89,6 +89,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print attack.json; with --verify, both as attack and verify"
     )
+
+
+def _add_drive(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags of attacks on the closed loop."""
+    parser.add_argument(
+        "--drive", metavar="CONFIG", help="attack the drives of a drive config, in place of --model and --data"
+    )
+    parser.add_argument(
+        "--driver", metavar="NAME", help="with --drive: the attacked driver (the only one with cameras)"
+    )
+    parser.add_argument(
+        "--drive-set", metavar="KEY=VALUE", action="append", default=[], dest="drive_settings",
+        help="with --drive: sets a key of the drive config; repeatable",
+    )  # fmt: skip
+    parser.add_argument(
+        "--redrive", type=int, metavar="N", help="with --drive: steps after which the drives are made anew (100)"
+    )
+    parser.add_argument(
+        "--frames", type=int, metavar="N", help="with --drive: frames of the drives to optimise on, with gradients (60)"
+    )
+    parser.add_argument(
+        "--held-out", type=int, metavar="N",
+        help="with --drive: seeds per situation at which the patches are judged; 0 for none (3)",
+    )  # fmt: skip
 
 
 def _add_defense(parser: argparse.ArgumentParser) -> None:
@@ -138,6 +162,15 @@ def run(args: argparse.Namespace) -> int:
     from gear.verbs.attack.run import run_attack, unit_of
     from gear.verbs.attack.verify import check_held_out
 
+    if args.drive is not None:
+        return attack_drives(args)
+    if args.model is None or args.data is None:
+        raise GearError("name a model and its data with --model and --data, or drives with --drive")
+    of_drives = (args.driver, args.drive_settings or None, args.held_out, args.redrive, args.frames)
+    if any(one is not None for one in of_drives):
+        raise GearError(
+            "--driver, --drive-set, --held-out, --redrive and --frames are for drives; add --drive, or leave them out"
+        )
     if args.verify is not None:
         check_held_out(args.data, args.verify, args.val)
     elif args.town is not None or args.scenes is not None:
@@ -157,6 +190,43 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(report.facts, indent=2) if args.json else report.summary())
     if args.verify is not None:
         check_rendered(args, request, report.facts)
+    return 0
+
+
+OF_PICTURES = (
+    "model", "data", "model_settings", "defense", "defense_settings", "calibration", "calibration_patched",
+    "val", "every", "patience", "verify", "town", "scenes", "per_scene", "engine", "address", "engine_workers",
+    "compositor", "score_weight", "mask_weight", "allow_test_data",
+)  # fmt: skip
+"""Flags of attacks on pictures, which an attack on drives does not take."""
+
+
+def attack_drives(args: argparse.Namespace) -> int:
+    """Runs an attack on the closed loop (`--drive`), prints the result and returns exit code 0.
+
+    Args:
+        args: arguments of the command line.
+    """
+    import json
+
+    from gear.cli.device import device_of
+    from gear.cli.requests import request_of
+    from gear.reporting.display import Display
+    from gear.values.errors import GearError
+    from gear.verbs.attack.drives.request import DriveAttackRequest
+    from gear.verbs.attack.drives.run import run_attack_drive, unit_of_drives
+
+    device, args.model_settings = device_of(args.model_settings)
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    given = [name for name in OF_PICTURES if getattr(args, name) != parser.get_default(name)]
+    if given:
+        flag = given[0].removesuffix("_settings").replace("_", "-")
+        raise GearError(f"--{flag} is for attacks on pictures; with --drive, the drive config names what is attacked")
+    request = request_of(DriveAttackRequest, args, device=device)
+    with Display("attack", unit=unit_of_drives(request)) as display:
+        report = run_attack_drive(request, display.callbacks)
+    print(json.dumps(report.facts, indent=2) if args.json else report.summary())
     return 0
 
 

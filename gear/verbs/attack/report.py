@@ -11,6 +11,9 @@ from gear.reporting.progress_text import plural, rate_text
 from gear.values.resources import data_dir
 from gear.values.serial import Json
 
+TWIN_NAMES = {"none": "no patch", "random": "random patches", "patch": "these patches"}
+"""Names of the twins of a drive in the summary."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class AttackReport:
@@ -38,7 +41,7 @@ class AttackReport:
         ]
         if self.facts["stopped"]:
             lines.append(f"ended early: {self.facts['stopped']}")
-        lines += self._achieved()
+        lines += [*self._achieved(), *self._held_out()]
         if (
             self.facts["gradient_check"] is not None
             and self.facts["gradient_check"]["measured_change"] < 0.5 * self.facts["gradient_check"]["predicted_change"]
@@ -67,4 +70,30 @@ class AttackReport:
                 samples = f"{found['samples']:g} {name} {plural('sample', found['samples'])}"
                 values = f"{found['random']:.4g} with random patches, {found['patch']:.4g} with these"
                 lines.append(f"objective on {samples}: {values}")
+        return lines
+
+    def _held_out(self) -> list[str]:
+        """Returns the result of the held-out drives, if the attack was on drives: one line per twin, and one with the
+        paired test.
+        """
+        found = self.facts.get("held_out")
+        if not found:
+            return []
+        lines = []
+        for twin, one in found["twins"].items():
+            words = [f"{one['crashes']} of {one['drives']} crashed"]
+            if one["interval"] is not None:
+                words[0] += " (95 % interval {:.0f} to {:.0f} %)".format(*(100 * end for end in one["interval"]))
+            if one["phantoms"]:
+                words.append(f"{one['phantoms']} braked hard for nothing")
+            if one["least_ttc_s"] is not None:
+                words.append(f"mean least time to collision {one['least_ttc_s']:.2f} s")
+            if one["least_distance_m"] is not None:
+                words.append(f"mean least distance {one['least_distance_m']:.2f} m")
+            lines.append(f"held-out drives, {TWIN_NAMES[twin]}: {', '.join(words)}")
+        against = found["against"]["random"]
+        lines.append(
+            f"crashes with these patches only: {against['only_here']}, with random patches only:"
+            f" {against['only_there']}, McNemar's exact p {against['p']:.3f}"
+        )
         return lines

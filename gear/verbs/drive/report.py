@@ -3,66 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
+from gear.driving.statistics import Paired, Rate, compared, mean_known
 from gear.driving.worker import DriveResult
-from gear.measuring.intervals import CONFIDENCE, Interval
 from gear.values.serial import Json, to_json
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rate:
-    """A share of drives with its exact interval.
-
-    Attributes:
-        count, total: number of drives with the property, and of all drives.
-        interval: 95 % interval of Clopper and Pearson (Biometrika 1934); None without drives.
-    """
-
-    count: int
-    total: int
-    interval: Interval | None
-
-    @staticmethod
-    def of(flags: Iterable[bool]) -> Rate:
-        """The share of the values True among `flags`, one flag per drive, with its exact interval."""
-        from scipy import stats
-
-        values = list(flags)
-        if not values:
-            return Rate(count=0, total=0, interval=None)
-        exact = stats.binomtest(sum(values), len(values)).proportion_ci(CONFIDENCE, method="exact")
-        return Rate(count=sum(values), total=len(values), interval=(float(exact.low), float(exact.high)))
-
-    @property
-    def value(self) -> float:
-        """The share; NaN without drives."""
-        return self.count / self.total if self.total else math.nan
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Paired:
-    """The comparison of a twin with another twin over the same situations.
-
-    Attributes:
-        other: name of the other twin.
-        pairs: number of situations that both have driven.
-        only_here, only_there: situations in which only this twin, or only the other twin, crashed.
-        p: two-sided p of McNemar's exact test: how often chance alone gives crashes as unequal as these.
-        braking_delay_s: mean delay of the first braking, over situations in which both braked; None without any.
-        score: mean difference of the driving score, this twin minus the other one.
-    """
-
-    other: str
-    pairs: int
-    only_here: int
-    only_there: int
-    p: float
-    braking_delay_s: float | None
-    score: float
+from gear.verbs.drive.foretelling import MetricLoss, auroc, metric_losses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,6 +71,7 @@ class DriveReport:
         failed: drives that could not be made: title of the drive, and the reason.
         facts: config and versions, as JSON.
         free: names of the scenarios without anything in the way.
+        errors: drivers whose task's main metric is an error, so that a larger value is worse.
     """
 
     out: Path
@@ -129,6 +79,16 @@ class DriveReport:
     failed: tuple[tuple[str, str], ...]
     facts: Json
     free: frozenset[str] = frozenset()
+    errors: frozenset[str] = frozenset()
+
+    def losses(self) -> dict[str, list[MetricLoss]]:
+        """The metric lost by each drive with a patch, beside its outcome, by driver; drivers whose predictions were not
+        evaluated are left out.
+        """
+        found: dict[str, list[MetricLoss]] = {}
+        for one in metric_losses(self.results, self.errors):
+            found.setdefault(one.driver, []).append(one)
+        return found
 
     def rows(self) -> list[Row]:
         """One row for each driver, scenario and twin, and one for each driver and twin over all scenarios that are not
@@ -141,13 +101,18 @@ class DriveReport:
         return self._grouped(lambda one: (one.run.driver, ALL, one.run.twin, one.run.speed_kmh), with_free=False)
 
     def as_json(self) -> Json:
-        """The report as JSON, with the keys `facts`, `rows`, `by_speed`, `drives` (run, measures and hashes of each
-        drive) and `failed` (`drive` and `problem`).
+        """The report as JSON, with the keys `facts`, `rows`, `by_speed`, `foretelling` (by driver: `auroc`, and the
+        metric lost by each drive with a patch), `drives` (run, measures and hashes of each drive) and `failed` (`drive`
+        and `problem`).
         """
         return {
             "facts": self.facts,
             "rows": [_known(to_json(row)) for row in self.rows()],
             "by_speed": [_known(to_json(row)) for row in self.by_speed()],
+            "foretelling": {
+                driver: {"auroc": auroc(losses), "drives": [to_json(one) for one in losses]}
+                for driver, losses in self.losses().items()
+            },
             "drives": [to_json(one) for one in self.results],
             "failed": [{"drive": title, "problem": problem} for title, problem in self.failed],
         }
@@ -186,57 +151,18 @@ def _row(
         twin=twin,
         speed_kmh=speed_kmh,
         crashes=Rate.of(one.is_crash for one in measures),
-        impact_mps=_mean(one.impact_mps for one in measures),
-        least_distance_m=_mean(one.least_distance_m for one in measures),
-        least_ttc_s=_mean(one.least_ttc_s for one in measures),
+        impact_mps=mean_known(one.impact_mps for one in measures),
+        least_distance_m=mean_known(one.least_distance_m for one in measures),
+        least_ttc_s=mean_known(one.least_ttc_s for one in measures),
         phantoms=Rate.of(one.phantom_brakings > 0 for one in measures),
         off_road=Rate.of(one.off_road_share > 0 for one in measures),
-        lateral_peak_m=_mean(one.lateral_peak_m for one in measures) or 0.0,
-        jerk_rms_mps3=_mean(one.jerk_rms_mps3 for one in measures) or 0.0,
-        score=_mean(one.score for one in measures) or 0.0,
-        open_loop=_mean(one.open_loop.get(one.open_loop_metric) for one in here),
+        lateral_peak_m=mean_known(one.lateral_peak_m for one in measures) or 0.0,
+        jerk_rms_mps3=mean_known(one.jerk_rms_mps3 for one in measures) or 0.0,
+        score=mean_known(one.score for one in measures) or 0.0,
+        open_loop=mean_known(one.open_loop.get(one.open_loop_metric) for one in here),
         open_loop_metric=here[0].open_loop_metric,
         paired=tuple(paired),
     )
-
-
-def compared(here: Sequence[DriveResult], there: Sequence[DriveResult], other: str) -> Paired:
-    """Compares two twins over the situations that both have driven.
-
-    McNemar's test in its exact form: of the situations in which only one of the twins crashed, each is equally likely
-    to be either's (McNemar, Psychometrika 1947).
-
-    Args:
-        here: drives of one twin.
-        there: drives of the other twin.
-        other: name of the other twin.
-
-    Returns:
-        Numbers of the pairs, the p value of the test, and the mean differences of braking delay and score, first twin
-        minus other twin.
-    """
-    from scipy import stats
-
-    twins = {one.run.situation: one.measures for one in there}
-    pairs = [(one.measures, twins[one.run.situation]) for one in here if one.run.situation in twins]
-    only_here = sum(a.is_crash and not b.is_crash for a, b in pairs)
-    only_there = sum(b.is_crash and not a.is_crash for a, b in pairs)
-    unequal = only_here + only_there
-    delays = [a.braking_s - b.braking_s for a, b in pairs if a.braking_s is not None and b.braking_s is not None]
-    return Paired(
-        other=other,
-        pairs=len(pairs),
-        only_here=only_here,
-        only_there=only_there,
-        p=float(stats.binomtest(only_here, unequal, 0.5).pvalue) if unequal else 1.0,
-        braking_delay_s=_mean(delays),
-        score=_mean(a.score - b.score for a, b in pairs) or 0.0,
-    )
-
-
-def _mean(values: Iterable[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return sum(known) / len(known) if known else None
 
 
 def _known(value: Json) -> Json:

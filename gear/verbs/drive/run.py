@@ -13,11 +13,9 @@ from gear.collecting.job import versions
 from gear.collecting.patch_sources import PatchSet
 from gear.collecting.workers import Workers, fitting_workers
 from gear.config.dump import to_plain, to_yaml
-from gear.config.load import find_config
-from gear.config.nodes import parse_file
-from gear.config.overrides import with_overrides
-from gear.config.reader import read_node
 from gear.contracts.executors import Executor, Needs, Outcome
+from gear.contracts.specs import TaskSpec
+from gear.contracts.tasks import NO_PATCH
 from gear.dataset.claims import clear_claims
 from gear.dataset.executors.engines import DEFAULT, open_executor
 from gear.dataset.files import clear_scratch, write_whole
@@ -25,14 +23,15 @@ from gear.dataset.guarded_paths import remove_empty_folders
 from gear.dataset.json_text import dump_json
 from gear.dataset.layout import split_folder
 from gear.dataset.store import check_output
-from gear.driving.config import DriveConfig
-from gear.driving.drives import RUNS, DriveRun, Drives, patches_of, plan_drives
+from gear.driving.drives import RUNS, DriveRun, Drives, patches_of, plan_drives, read_drive_config
 from gear.driving.worker import CLAIMS, UNREADABLE, DriveResult, drive_all, read_log, read_result
+from gear.plugins.build import find
 from gear.reporting.display import displayed
 from gear.values.counted import counted
 from gear.values.errors import DatasetError, GearError
 from gear.values.progress import Callbacks, Progress, Warn
 from gear.verbs.drive.chart import chart
+from gear.verbs.drive.foretelling import metric_of
 from gear.verbs.drive.page import page
 from gear.verbs.drive.report import DriveReport
 from gear.verbs.drive.request import DriveRequest
@@ -114,8 +113,7 @@ def prepared(request: DriveRequest) -> Drives:
     """
     root = Path(request.out)
     check_output(root, "write the drives into a folder of their own")
-    node = with_overrides(parse_file(find_config("drive", str(request.config))), request.settings, DriveConfig)
-    return plan_drives(read_node(DriveConfig, node), root.absolute(), request.device)
+    return plan_drives(read_drive_config(request.config, request.settings), root.absolute(), request.device)
 
 
 def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
@@ -144,6 +142,7 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
         failed=tuple(failed),
         facts={"config": to_plain(drives.config), "versions": versions()},
         free=frozenset(name for name, one in drives.library.scenarios.items() if one.is_free),
+        errors=frozenset(label for label, cast in drives.casts.items() if cast.task and _is_error(cast.task)),
     )
     for name, data in (
         ("drives.csv", _csv(report)),
@@ -162,6 +161,12 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
             " run the same command again, which makes only what is missing"
         )
     return report
+
+
+def _is_error(task: str) -> bool:
+    """Whether the main metric of a task is an error, so that a larger value is worse."""
+    spec = find("task", task).spec
+    return isinstance(spec, TaskSpec) and spec.lower_is_better
 
 
 def _executor(request: DriveRequest) -> Executor:
@@ -246,17 +251,28 @@ def _figures(drives: Drives, results: list[DriveResult]) -> list[tuple[str, byte
 
 
 def _csv(report: DriveReport) -> bytes:
-    """One line per drive: what it is, its measures, the hash of its log."""
+    """One line per drive: what it is, its measures, the delay of its first braking against the twin `none`, the metric
+    over its pictures, and the hash of its log.
+    """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     first = report.results[0]
     names = [field.name for field in dataclasses.fields(first.run)]
     measured = [field.name for field in dataclasses.fields(first.measures)]
-    writer.writerow([*names, "patch", *measured, "log_sha256"])
+    further = ["braking_delay_s", "open_loop_metric", "open_loop", "log_sha256"]
+    writer.writerow([*names, "patch", *measured, *further])
+    clean = {
+        (one.run.driver, one.run.situation): one.measures.braking_s
+        for one in report.results
+        if one.run.twin == NO_PATCH
+    }
     for one in report.results:
+        before, after = clean.get((one.run.driver, one.run.situation)), one.measures.braking_s
+        delay_s = None if before is None or after is None else after - before
         values = [getattr(one.measures, name) for name in measured]
-        writer.writerow(
-            [*(getattr(one.run, name) for name in names), one.patch, *("" if v is None else v for v in values),
-             one.log_sha256]
-        )  # fmt: skip
+        row = [
+            *(getattr(one.run, name) for name in names), one.patch, *values, delay_s, one.open_loop_metric,
+            metric_of(one), one.log_sha256,
+        ]  # fmt: skip
+        writer.writerow(["" if value is None else value for value in row])
     return out.getvalue().encode()

@@ -9,10 +9,11 @@ import pytest
 
 from gear.driving.drives import DriveRun
 from gear.driving.measures import Measures
+from gear.driving.statistics import Rate, compared, mean_difference
 from gear.driving.worker import DriveResult
 from gear.verbs.drive.page import page, table
-from gear.verbs.drive.report import DriveReport, Rate, compared
-from gear.verbs.drive.table import cells, rate, speed_cells, text
+from gear.verbs.drive.report import DriveReport
+from gear.verbs.drive.table import DEFINITIONS, cells, paired_cells, rate, speed_cells, text
 
 MEASURES = Measures(
     ending="time",
@@ -57,6 +58,7 @@ def study() -> DriveReport:
         failed=(("a <drive>", "no place"),),
         facts={},
         free=frozenset({"free_road"}),
+        errors=frozenset({"depth"}),
     )
 
 
@@ -93,7 +95,35 @@ def test_the_tables() -> None:
     ]  # fmt: skip
     assert rows[2][head.index("open loop")] == "rmse_m 1.700", "seven of ten crashed, with twice the error"
     assert speed_cells(study())[3][4] == "70 % [35, 93]"
-    assert "not made: a <drive>: no place" in text(study())
+    shown = text(study())
+    assert "not made: a <drive>: no place" in shown and "exact 95 % interval of Clopper and Pearson" in shown
+    head, *rows = paired_cells(study())
+    assert all(len(row) == len(head) for row in rows)
+    assert rows[0][:8] == ["depth", "stopped_lead", "random", "none", "10", "1", "0", "1.000"]
+    assert rows[2][2:9] == ["patch", "random", "10", "6", "0", "0.031", "+60 %"], "one scenario has no interval"
+    titles = {title for row in (cells(study())[0], speed_cells(study())[0], head) for title in row}
+    explained = " ".join([*DEFINITIONS, *DEFINITIONS.values()])
+    assert not {title for title in titles if title not in explained} - {
+        "driver", "scenario", "drives", "speed km/h", "against", "pairs",
+    }  # fmt: skip
+
+
+def test_differences_have_an_interval_over_scenarios() -> None:
+    scenarios = ("stopped_lead", "slower_lead", "cut_in", "standing_pedestrian")
+    here = [
+        result("patch", seed, is_crash=place < 2, scenario=name)
+        for place, name in enumerate(scenarios)
+        for seed in (0, 1)
+    ]
+    there = [result("none", seed, scenario=name) for name in scenarios for seed in (0, 1)]
+    paired = compared(here, there, "none")
+    assert paired.crash_difference == 0.5 and paired.score == pytest.approx(-0.25)
+    assert paired.crash_interval is not None and paired.score_interval is not None
+    low, high = paired.crash_interval
+    assert low == pytest.approx(0.5 - 3.182 * (1 / 12) ** 0.5, abs=1e-3), "Student's t over four scenarios"
+    assert high == pytest.approx(1.0 - low)
+    assert mean_difference([None, None], [1, 2]) == (None, None)
+    assert mean_difference([2.0, None, 2.0], [1, 2, 3]) == (2.0, None)
 
 
 def test_the_page_escapes_names_and_has_no_scripts() -> None:
@@ -101,4 +131,5 @@ def test_the_page_escapes_names_and_has_no_scripts() -> None:
     assert '<a href="videos/%22a%22.mp4">a &lt;video&gt;</a>' in shown
     assert "a &lt;title&gt;" in shown and "data:image/svg+xml;base64,PHN2Zy8+" in shown
     assert "a &lt;drive&gt;" in shown and "<script" not in shown and "70 % [35, 93]" in shown
+    assert "foretells crashes: 1.00 (20 drives with a patch, 8 crashed)" in shown and "the columns mean" in shown
     assert table([["a", "b"], ["x", "1"], ["x", "2"]], 2).count(">x<") == 1

@@ -18,7 +18,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from gear.contracts.attacks import HarmObjective, Objective, Term
+from gear.contracts.attacks import HarmObjective, Objective, SampleWithObjective, Term
 from gear.contracts.models import Model
 from gear.formats import rle
 from gear.formats.cityscapes import IGNORED_TRAIN_ID, LABELS
@@ -38,8 +38,11 @@ def default_objective(sample: Any) -> Objective:
     """Returns the objective of an untargeted attack, chosen by the ground truth of `sample`.
 
     `SemsegObjective` for samples with `label_ids`, `DepthObjective` for samples with `depth_m`, and otherwise
-    `LossObjective`, which maximises all losses of the model.
+    `LossObjective`, which maximises all losses of the model. A sample that brings its own objective
+    (`SampleWithObjective`) decides itself.
     """
+    if isinstance(sample, SampleWithObjective):
+        return sample.own_objective()
     kind = kind_of(sample)
     if kind == "semseg":
         return SemsegObjective()

@@ -1,0 +1,159 @@
+"""Statistics over drives: exact intervals of shares, and paired tests between twins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gear.driving.worker import DriveResult
+from gear.measuring.intervals import CONFIDENCE, LEFT_OUT, Interval, is_constant, jackknife_interval, leave_one_out
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rate:
+    """A share of drives with its exact interval.
+
+    Attributes:
+        count, total: number of drives with the property, and of all drives.
+        interval: 95 % interval of Clopper and Pearson (Biometrika 1934); None without drives.
+    """
+
+    count: int
+    total: int
+    interval: Interval | None
+
+    @staticmethod
+    def of(flags: Iterable[bool]) -> Rate:
+        """The share of the values True among `flags`, one flag per drive, with its exact interval."""
+        from scipy import stats
+
+        values = list(flags)
+        if not values:
+            return Rate(count=0, total=0, interval=None)
+        exact = stats.binomtest(sum(values), len(values)).proportion_ci(CONFIDENCE, method="exact")
+        return Rate(count=sum(values), total=len(values), interval=(float(exact.low), float(exact.high)))
+
+    @property
+    def value(self) -> float:
+        """The share; NaN without drives."""
+        return self.count / self.total if self.total else math.nan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paired:
+    """The comparison of a twin with another twin over the same situations.
+
+    Attributes:
+        other: name of the other twin.
+        pairs: number of situations that both have driven.
+        only_here, only_there: situations in which only this twin, or only the other twin, crashed.
+        p: two-sided p of McNemar's exact test: how often chance alone gives crashes as unequal as these.
+        crash_difference: difference of the shares of crashes, this twin minus the other one.
+        crash_interval: its interval (`mean_difference`).
+        least_ttc_difference_s: mean difference of the least time to collision; None if none was approached in both.
+        least_ttc_interval: its interval.
+        braking_delay_s: mean delay of the first braking, over situations in which both braked; None without any.
+        braking_interval: its interval.
+        score: mean difference of the driving score, this twin minus the other one.
+        score_interval: its interval.
+    """
+
+    other: str
+    pairs: int
+    only_here: int
+    only_there: int
+    p: float
+    crash_difference: float
+    crash_interval: Interval | None
+    least_ttc_difference_s: float | None
+    least_ttc_interval: Interval | None
+    braking_delay_s: float | None
+    braking_interval: Interval | None
+    score: float
+    score_interval: Interval | None
+
+
+def compared(here: Sequence[DriveResult], there: Sequence[DriveResult], other: str) -> Paired:
+    """Compares two twins over the situations that both have driven.
+
+    McNemar's test in its exact form: of the situations in which only one of the twins crashed, each is equally likely
+    to be either's (McNemar, Psychometrika 1947).
+
+    Args:
+        here: drives of one twin.
+        there: drives of the other twin.
+        other: name of the other twin.
+
+    Returns:
+        Numbers of the pairs, the p value of the test, and the mean differences of braking delay and score, first twin
+        minus other twin.
+    """
+    from scipy import stats
+
+    twins = {one.run.situation: one.measures for one in there}
+    both = [one for one in here if one.run.situation in twins]
+    pairs = [(one.measures, twins[one.run.situation]) for one in both]
+    clusters = [one.run.situation[:4] for one in both]
+    only_here = sum(a.is_crash and not b.is_crash for a, b in pairs)
+    only_there = sum(b.is_crash and not a.is_crash for a, b in pairs)
+    unequal = only_here + only_there
+    crash, crash_interval = mean_difference([float(a.is_crash) - float(b.is_crash) for a, b in pairs], clusters)
+    ttc_s, ttc_interval = mean_difference([_less(a.least_ttc_s, b.least_ttc_s) for a, b in pairs], clusters)
+    delay_s, delay_interval = mean_difference([_less(a.braking_s, b.braking_s) for a, b in pairs], clusters)
+    score, score_interval = mean_difference([a.score - b.score for a, b in pairs], clusters)
+    return Paired(
+        other=other,
+        pairs=len(pairs),
+        only_here=only_here,
+        only_there=only_there,
+        p=float(stats.binomtest(only_here, unequal, 0.5).pvalue) if unequal else 1.0,
+        crash_difference=crash or 0.0,
+        crash_interval=crash_interval,
+        least_ttc_difference_s=ttc_s,
+        least_ttc_interval=ttc_interval,
+        braking_delay_s=delay_s,
+        braking_interval=delay_interval,
+        score=score or 0.0,
+        score_interval=score_interval,
+    )
+
+
+def _less(here: float | None, there: float | None) -> float | None:
+    return None if here is None or there is None else here - there
+
+
+def mean_difference(
+    values: Sequence[float | None], clusters: Sequence[Hashable]
+) -> tuple[float | None, Interval | None]:
+    """The mean of paired differences, with its 95 % interval by the jackknife (`gear.measuring.intervals`).
+
+    The interval is over scenarios: all seeds of a scenario at one speed and place are left out together, because they
+    are not independent.
+
+    Args:
+        values: difference of each situation; None where it is not known.
+        clusters: scenario, speed and place of each situation.
+
+    Returns:
+        The mean over the known values, None without any; and the interval, None for fewer than two clusters, or if
+        the mean does not change when a cluster is left out.
+    """
+    known = [(value, cluster) for value, cluster in zip(values, clusters, strict=True) if value is not None]
+    if not known:
+        return None, None
+    numbers = np.array([value for value, _ in known])
+    rows = leave_one_out([cluster for _, cluster in known])
+    replicates = np.array([numbers[row[row != LEFT_OUT]].mean() for row in rows])
+    mean = float(numbers.mean())
+    if not len(replicates) or is_constant(replicates):
+        return mean, None
+    return mean, jackknife_interval(mean, replicates)
+
+
+def mean_known(values: Iterable[float | None]) -> float | None:
+    """The mean of the values that are not None; None if there are none."""
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if known else None
