@@ -9,7 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from gear.driving.worker import DriveResult
-from gear.measuring.intervals import CONFIDENCE, LEFT_OUT, Interval, is_constant, jackknife_interval, leave_one_out
+from gear.measuring.intervals import (
+    CONFIDENCE,
+    LEFT_OUT,
+    REAL,
+    Interval,
+    is_constant,
+    jackknife_interval,
+    leave_one_out,
+)
+
+SHARES = (-1.0, 1.0)
+"""Range of the difference of two shares."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,10 +111,10 @@ def compared(here: Sequence[DriveResult], there: Sequence[DriveResult], other: s
     only_here = sum(a.is_crash and not b.is_crash for a, b in pairs)
     only_there = sum(b.is_crash and not a.is_crash for a, b in pairs)
     unequal = only_here + only_there
-    crash, crash_interval = mean_difference([float(a.is_crash) - float(b.is_crash) for a, b in pairs], clusters)
+    crash, crash_interval = mean_difference([float(a.is_crash) - float(b.is_crash) for a, b in pairs], clusters, SHARES)
     ttc_s, ttc_interval = mean_difference([_less(a.least_ttc_s, b.least_ttc_s) for a, b in pairs], clusters)
     delay_s, delay_interval = mean_difference([_less(a.braking_s, b.braking_s) for a, b in pairs], clusters)
-    score, score_interval = mean_difference([a.score - b.score for a, b in pairs], clusters)
+    score, score_interval = mean_difference([a.score - b.score for a, b in pairs], clusters, SHARES)
     return Paired(
         other=other,
         pairs=len(pairs),
@@ -126,7 +137,7 @@ def _less(here: float | None, there: float | None) -> float | None:
 
 
 def mean_difference(
-    values: Sequence[float | None], clusters: Sequence[Hashable]
+    values: Sequence[float | None], clusters: Sequence[Hashable], limits: Interval = REAL
 ) -> tuple[float | None, Interval | None]:
     """The mean of paired differences, with its 95 % interval by the jackknife (`gear.measuring.intervals`).
 
@@ -136,6 +147,7 @@ def mean_difference(
     Args:
         values: difference of each situation; None where it is not known.
         clusters: scenario, speed and place of each situation.
+        limits: smallest and largest possible difference, to which the interval is clipped.
 
     Returns:
         The mean over the known values, None without any; and the interval, None for fewer than two clusters, or if
@@ -150,7 +162,7 @@ def mean_difference(
     mean = float(numbers.mean())
     if not len(replicates) or is_constant(replicates):
         return mean, None
-    return mean, jackknife_interval(mean, replicates)
+    return mean, jackknife_interval(mean, replicates, limits)
 
 
 def mean_known(values: Iterable[float | None]) -> float | None:

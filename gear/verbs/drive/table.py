@@ -60,15 +60,18 @@ def text(report: DriveReport) -> str:
     Args:
         report: results of the study.
     """
-    parts = ["\n".join(number_table(cells(report))), "\n".join(number_table(speed_cells(report)))]
-    paired = paired_cells(report)
-    if len(paired) > 1:
-        parts.append("\n".join(number_table(paired)))
+    tables = [(cells(report), 3), (speed_cells(report), 3), (paired_cells(report), 4)]
+    parts = ["\n".join(number_table(_joined(rows, named))) for rows, named in tables if len(rows) > 1]
     parts += ["\n".join(foretold(report))] * bool(report.losses())
     parts.append("\n".join(f"{title}: {meaning}" for title, meaning in DEFINITIONS.items()))
     if report.failed:
         parts.append("\n".join([f"not made: {title}: {problem}" for title, problem in report.failed]))
     return "\n\n".join(parts) + "\n"
+
+
+def _joined(rows: list[list[str]], named: int) -> list[list[str]]:
+    """Rows whose first `named` cells are joined into one, which is repeated in each block of a wide table."""
+    return [[" ".join(row[:named]), *row[named:]] for row in rows]
 
 
 def foretold(report: DriveReport) -> list[str]:
