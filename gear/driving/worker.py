@@ -66,6 +66,7 @@ class DriveResult:
         measures: its measures.
         log_sha256: hash of its log; equal drives have equal hashes.
         patch: label of the patch that the scene showed.
+        patch_sha256: hash of the patch's pictures; empty without a patch.
         weights_sha256: hash of the network's weights; None without a network.
         renderer: the renderer with its driver and device; None where nothing was rendered.
         open_loop: metrics of the predictions in all frames of the drive, by name; empty if they were not evaluated.
@@ -76,6 +77,7 @@ class DriveResult:
     measures: Measures
     log_sha256: str
     patch: str
+    patch_sha256: str = ""
     weights_sha256: str | None = None
     renderer: RendererInfo | None = None
     open_loop: dict[str, float | None] = field(default_factory=dict)
@@ -239,6 +241,7 @@ def _made(shop: Workshop, run: DriveRun) -> bool:
         measures=measure(done.log),
         log_sha256=log_hash(data),
         patch=patch.label,
+        patch_sha256=patch.digest,
         weights_sha256=None if done.model is None else done.model.weights_sha256,
         renderer=None if place.job is None else place.job.renderer,
         open_loop=done.open_loop,

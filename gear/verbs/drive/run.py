@@ -260,7 +260,7 @@ def _csv(report: DriveReport) -> bytes:
     names = [field.name for field in dataclasses.fields(first.run)]
     measured = [field.name for field in dataclasses.fields(first.measures)]
     further = ["braking_delay_s", "open_loop_metric", "open_loop", "log_sha256"]
-    writer.writerow([*names, "patch", *measured, *further])
+    writer.writerow([*names, "patch", "patch_sha256", *measured, *further])
     clean = {
         (one.run.driver, one.run.situation): one.measures.braking_s
         for one in report.results
@@ -271,8 +271,8 @@ def _csv(report: DriveReport) -> bytes:
         delay_s = None if before is None or after is None else after - before
         values = [getattr(one.measures, name) for name in measured]
         row = [
-            *(getattr(one.run, name) for name in names), one.patch, *values, delay_s, one.open_loop_metric,
-            metric_of(one), one.log_sha256,
+            *(getattr(one.run, name) for name in names), one.patch, one.patch_sha256, *values, delay_s,
+            one.open_loop_metric, metric_of(one), one.log_sha256,
         ]  # fmt: skip
         writer.writerow(["" if value is None else value for value in row])
     return out.getvalue().encode()

@@ -7,14 +7,17 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import gear
 from gear.cli.main import main
+from gear.collecting.patch_sources import digest_of
 from gear.contracts.executors import Outcome
 from gear.dataset.guarded_paths import remove_tree
 from gear.driving import worker
 from gear.driving.drives import DriveRun
+from gear.formats.png import encode_rgb
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError
 from gear.verbs.drive.report import DriveReport
@@ -90,21 +93,29 @@ def test_hashes_do_not_depend_on_workers(config: Path, report: DriveReport, tmp_
 @pytest.mark.slow
 def test_a_driver_with_a_camera_drives_the_same_twins(config: Path, tmp_path: Path) -> None:
     """A controller that ignores its pictures drives equally with every patch, and equally without pictures."""
+    paint = np.full((4, 8, 3), (200, 30, 30), np.uint8)
+    (tmp_path / "paint.png").write_bytes(encode_rgb(paint))
+    eyes = f"{{controller: blind, task: depth, options: {{width_px: 256, height_px: 96}}, patch: {tmp_path}/paint.png}}"
     settings = [
-        "drivers={eyes: {controller: blind, task: depth, options: {width_px: 256, height_px: 96}}}",
+        f"drivers={{eyes: {eyes}}}",
         "scenarios={stopped_lead: [40]}",
-        "twins=[none, random]",
+        "twins=[none, patch]",
         "video=true",
     ]
     pytest.importorskip("av")
-    found = gear.drive(config, out=tmp_path, settings=settings)
-    videos = list((tmp_path / "drives").glob("*/*/video.mp4"))
+    out = tmp_path / "out"
+    found = gear.drive(config, out=out, settings=settings)
+    videos = list((out / "drives").glob("*/*/video.mp4"))
     assert len(videos) == 2 and all(video.stat().st_size > 5000 for video in videos)
-    together = list((tmp_path / "videos").glob("eyes/*.mp4"))
-    shown = (tmp_path / "report.html").read_text()
+    together = list((out / "videos").glob("eyes/*.mp4"))
+    shown = (out / "report.html").read_text()
     assert len(together) == 1 and f'href="videos/eyes/{together[0].name}"' in shown and "data:image/svg+xml" in shown
     assert len(set(hashes(found))) == 1 and len(found.results) == 2
-    assert [one.patch for one in found.results] == ["none", "random"]
+    digest = digest_of([paint])
+    assert [one.patch for one in found.results] == ["none", f"paint-{digest[:8]}"]
+    assert [one.patch_sha256 for one in found.results] == ["", digest]
+    lines = csv.DictReader((out / "drives.csv").read_text().splitlines())
+    assert [line["patch_sha256"] for line in lines] == ["", digest]
     assert found.results[0].renderer is not None
 
 

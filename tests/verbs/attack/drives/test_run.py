@@ -41,6 +41,9 @@ def test_the_attack_finds_the_patch_that_crashes_the_car(magenta_blind: Path, tm
     assert used[0] == (0, QUERIES) and (QUERIES, QUERIES) in used and used[-1] == (3, 3)
     assert "held-out drives, these patches: 1 of 1 crashed" in report.summary()
     assert report.facts["data"][0]["scene"] == "tiny/board"
+    seen: list[tuple[int, int]] = []
+    gear.drive(out / "held_out/drive.yml", out=out / "held_out", on_progress=lambda *done: seen.append(done))
+    assert seen[0] == (3, 3), "the report of the held-out drives drives nothing again"
     again = attacked(magenta_blind, out)
     assert not again.made and np.array_equal(again.patches[0].rgb, report.patches[0].rgb)
     with pytest.raises(GearError, match="made with other settings"):
