@@ -252,6 +252,9 @@ def _sample_findings(
                 yield Finding(path=relative, problem="damaged", detail="it is not the sidecar that the manifest names")
             else:
                 files = dict(sidecar.files)
+                if listed not in ({}, files):
+                    detail = f"its hashes of sample {index} are not those of the sidecar"
+                    yield Finding(path=manifest_path(check.split), problem="damaged", detail=detail)
         except DatasetError as error:
             yield Finding(path=relative, problem="damaged", detail=error.problem.partition(";")[0])
     check.known |= files.keys()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import subprocess
 import sys
@@ -142,3 +143,14 @@ def test_completion_knows_every_command_and_its_flags(shell: str, capsys: pytest
     assert main(["completion", shell]) == 0
     script = capsys.readouterr().out
     assert all(name in script for name in COMMANDS) and "--calibration-patched" in script
+
+
+@pytest.mark.parametrize(
+    ("command", "needed"), [("evaluate", "--model m"), ("train", "--task t --model m --out o --val v --val w")]
+)
+def test_a_repeated_flag_of_datasets_keeps_all_of_them(command: str, needed: str) -> None:
+    parser = argparse.ArgumentParser()
+    importlib.import_module(f"gear.cli.commands.{command}").add_arguments(parser)
+    for _ in range(2):
+        given = parser.parse_args([*needed.split(), "--data", "a", "b", "--data", "c"])
+        assert given.data == ["a", "b", "c"] and getattr(given, "val", ["v", "w"]) == ["v", "w"]

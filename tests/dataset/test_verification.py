@@ -1,7 +1,8 @@
-"""Checks of a split whose plan names many more samples than there are."""
+"""Checks of a split whose plan names many more samples than there are, or whose manifest names other hashes."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -33,3 +34,16 @@ def test_a_sidecar_of_any_number_costs_no_memory(tmp_path: Path, monkeypatch: py
     (folder / "samples/000001.json").rename(folder / "samples/999999999999.json")
     check = check_split(tmp_path, "test")
     assert check.broken_samples == {1, 2, 3, 999999999999}
+
+
+def test_a_manifest_with_other_hashes_than_the_sidecars_is_damaged(tmp_path: Path) -> None:
+    fill(tmp_path, plan(samples=2))
+    manifest = tmp_path / "gear/test/manifest.json"
+    content = json.loads(manifest.read_text())
+    assert not check_split(tmp_path, "test").findings
+    name = next(iter(content["samples"][1]["files"]))
+    content["samples"][1]["files"][name] = "0" * 64
+    manifest.write_text(json.dumps(content))  # in another layout, so the seal is none
+    (found,) = check_split(tmp_path, "test").findings
+    assert (found.path, found.problem) == ("gear/test/manifest.json", "damaged")
+    assert found.detail == "its hashes of sample 1 are not those of the sidecar"

@@ -29,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--data",
         required=True,
         nargs="+",
+        action="extend",
         metavar="DIR",
         help="datasets of the model's task, also twins; DIR:SPLIT, or a folder of datasets",
     )

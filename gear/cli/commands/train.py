@@ -43,9 +43,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLE
     parser.add_argument("--task", required=True, metavar="NAME", help="task plugin; gear plugins --kind task")
     parser.add_argument("--model", required=True, metavar="NAME", help="model plugin; gear plugins --kind model")
-    parser.add_argument("--data", required=True, nargs="+", metavar="DIR", help="datasets to train on")
+    parser.add_argument("--data", required=True, nargs="+", action="extend", metavar="DIR", help="datasets to train on")
     parser.add_argument(
-        "--val", nargs="+", default=[], metavar="DIR", help="datasets to validate on (a share of --data)"
+        "--val",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="DIR",
+        help="datasets to validate on (a share of --data)",
     )
     parser.add_argument("--out", required=True, metavar="DIR", help="folder of the results")
     length = parser.add_mutually_exclusive_group()
