@@ -21,7 +21,7 @@ td.better { color: #007000; } td.same { color: #0000b0; } pre { white-space: pre
   @page { size: A4 landscape; margin: 10mm; } body { max-width: none; margin: 0; padding: 0; font-size: 10px; }
   .wide { overflow: visible; } table { width: 100%; font-size: 7px; } td.grey { print-color-adjust: exact; }
   th, td { white-space: normal; padding: .15rem .25rem; overflow-wrap: anywhere; } h2, h3 { break-after: avoid; }
-  tr, figure, img { break-inside: avoid; }
+  tr, figure, img { break-inside: avoid; } .row img { max-width: 64mm; }
 }
 """
 

@@ -1,5 +1,5 @@
-"""The report of a benchmark as one self-contained HTML page: tables, charts, and pictures of the patches in the
-scenes.
+"""The report of a benchmark as one self-contained HTML page: tables, charts, predictions, and pictures of the patches
+in the scenes.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-import cv2
 import numpy as np
 
 from gear.config.dump import to_yaml
@@ -20,10 +19,11 @@ from gear.formats.png import decode_rgb
 from gear.plugins.datasets import open_dataset
 from gear.reporting.html_table import Cell, Link, html_table, safe
 from gear.reporting.report_page import report_page
-from gear.values.frames import UInt8Image
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.paper_page import paper_table
-from gear.verbs.bench.paper_tables import paper_tables
+from gear.verbs.bench.paper_tables import paper_tables, scenes_of
+from gear.verbs.bench.pictures.figure import figure
+from gear.verbs.bench.pictures.predictions import predictions
 from gear.verbs.bench.plan import Plan, Weather
 from gear.verbs.bench.report import BenchReport, TaskResult
 from gear.verbs.bench.scenes import Scene
@@ -31,8 +31,8 @@ from gear.verbs.bench.table import columns, legend, title
 from gear.verbs.bench.validation import TaskPlugins
 from gear.verbs.evaluate.page import PAGE
 
-PICTURE_PX, PATCH_PX, QUALITY = 560, 220, 82
-"""Width of pictures and width of patches in pixels, and JPEG quality of both."""
+PICTURE_PX, PATCH_PX = 560, 220
+"""Width of pictures and width of patches in pixels."""
 
 
 def page(report: BenchReport, plan: Plan) -> str:
@@ -59,7 +59,7 @@ def page(report: BenchReport, plan: Plan) -> str:
             drawn = base64.b64encode(chart(task, "svg")).decode()
             name = safe(f"bars of {task.metric.title} by network, defense and patch")
             parts.append(f'<p><img alt="{name}" src="data:image/svg+xml;base64,{drawn}"></p>')
-        parts += [_scenes(task, report.out), *_pictures(plan, task_plugins)]
+        parts += [_scenes(task, report.out), *predictions(task, scenes_of(report)), *_pictures(plan, task_plugins)]
     parts += [paper_table(table) for table in paper_tables(report)]
     parts.append(f"<h2>Config</h2><pre>{safe(to_yaml(plan.config))}</pre>")
     return report_page(report.title, parts)
@@ -109,7 +109,7 @@ def _pictures(plan: Plan, task_plugins: TaskPlugins) -> Iterable[str]:
             name = plan.name(model, defense)
             figures.append(_shown(plan, task_plugins, scene, weather, name, number, f"with the patch against {name}"))
             figures += [
-                _figure(decode_rgb(read_bytes(path)), f"{path.stem} against {name}", PATCH_PX)
+                figure(decode_rgb(read_bytes(path)), f"{path.stem} against {name}", PATCH_PX)
                 for path in sorted(plan.patch(task_plugins, scene, name).glob("patch_*.png"))
             ]
         yield f'<h3>{safe(f"{scene.label}, {weather.label}")}</h3><div class="row">{"".join(figures)}</div>'
@@ -119,19 +119,4 @@ def _shown(
     plan: Plan, task_plugins: TaskPlugins, scene: Scene, weather: Weather, patch: str, number: int, caption: str
 ) -> str:
     images = open_dataset(plan.pictures(task_plugins, scene, weather, patch))[number].images
-    return _figure(next(iter(images.values())), caption, PICTURE_PX)
-
-
-def _figure(pixels: UInt8Image, caption: str, width_px: int) -> str:
-    height, width = pixels.shape[:2]
-    size = (width_px, max(1, round(height * width_px / width)))
-    way = cv2.INTER_AREA if width > width_px else cv2.INTER_NEAREST
-    small = cv2.resize(pixels, size, interpolation=way)[..., ::-1]
-    done, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
-    if not done:
-        raise ValueError(f"cannot encode a picture of shape {pixels.shape}")
-    encoded = base64.b64encode(data.tobytes()).decode()
-    return (
-        f'<figure><img width="{size[0]}" height="{size[1]}" alt="{safe(caption)}" '
-        f'src="data:image/jpeg;base64,{encoded}"><figcaption>{safe(caption)}</figcaption></figure>'
-    )
+    return figure(next(iter(images.values())), caption, PICTURE_PX)

@@ -116,7 +116,9 @@ def _check_files(out: Path, report: BenchReport) -> None:
     assert all(against in shown for shown in (page, (out / "table.txt").read_text()))
     assert "other pictures of a scene in each weather" in page, "a patch is made on those of all weathers together"
     patched = 2 * 2  # against two networks, alone and behind a defense that is looked through
-    assert page.count("<figure>") == (1 + patched * (1 + 1)) + (1 + patched * (1 + 2))  # scenes of one and two surfaces
+    predicted = 2 * 2 * (5 + 2 + 2 + 1)  # of two networks in two pictures: alone, behind blur (twice), behind fpda
+    scenes = (1 + patched * (1 + 1)) + (1 + patched * (1 + 2))  # of one and two surfaces
+    assert page.count("<figure>") == scenes + predicted + 1, "and one legend"
     assert "http" not in page.replace("http-equiv", "")
 
 

@@ -1,24 +1,27 @@
-"""Parts of the report page of a bench."""
+"""The report page of a bench: its predictions, and that it prints without losing columns."""
 
 from __future__ import annotations
 
-import base64
 import re
+from collections.abc import Callable
+from pathlib import Path
 
-import cv2
-import numpy as np
-
-from gear.verbs.bench.page import _figure
+from tests.verbs.bench.conftest import FEW
 
 
-def test_a_figure_holds_its_picture_at_the_given_width() -> None:
-    picture = np.zeros((40, 80, 3), np.uint8)
-    picture[..., 0] = 200  # red
-    text = _figure(picture, 'a "caption"', 20)
-    assert 'width="20" height="10"' in text
-    assert "a &quot;caption&quot;" in text
-    found = re.search(r"base64,([^\"]+)", text)
-    assert found is not None
-    decoded = cv2.imdecode(np.frombuffer(base64.b64decode(found[1]), np.uint8), cv2.IMREAD_COLOR)
-    assert decoded.shape == (10, 20, 3)
-    np.testing.assert_allclose(decoded[..., ::-1].mean((0, 1)), [200, 0, 0], atol=4)
+def test_predictions_stand_beside_the_tables(made: Callable[..., Path]) -> None:
+    page = (made(FEW) / "report.html").read_text()
+    start = page.index("Predictions of small, where its patch does most harm")
+    part = page[start : page.index("<h3>", start)]
+    captions = re.findall(r"<figcaption>(.*?)</figcaption>", part)
+    of_one = [
+        "without a patch", "predicted without a patch", "ground truth", "with the patch", "predicted with the patch",
+        "the patch after blur", "predicted with the patch behind blur",
+    ]  # fmt: skip
+    assert captions == [*of_one, *of_one, "colours of labels"]
+    chosen = re.findall(r"<p>(tiny-board, picture \d), miou ([\d.]+) to ([\d.]+)</p>", part)
+    assert len(chosen) == 2 and len({name for name, _, _ in chosen}) == 2
+    harms = [float(clean) - float(patched) for _, clean, patched in chosen]
+    assert harms == sorted(harms, reverse=True), "the picture that the patch harms most comes first"
+    sizes = [len(data) for data in re.findall(r'src="data:image/jpeg;base64,([^"]+)"', part)]
+    assert len(sizes) == len(captions) and max(sizes) < 60_000

@@ -1,0 +1,1 @@
+"""Pictures in the report page of a benchmark."""
