@@ -16,6 +16,10 @@ from .browser import Browser
 PAPER_PX = round(277 / 25.4 * 96)
 """Width of A4 landscape without its margins of 10 mm, in pixels of CSS."""
 
+RIGHT = """Math.max(...[...document.querySelectorAll('td, th, img')].map(
+  one => one.getBoundingClientRect().right + one.scrollWidth - one.clientWidth))"""
+"""Where the rightmost cell or picture ends, with what it does not show, in pixels of CSS."""
+
 
 @pytest.mark.parametrize("name", ["net", "ddrnet23_slim_depth_of_a_long_name"])
 def test_the_widest_table_fits_on_paper(browser: Browser, tmp_path: Path, name: str) -> None:
@@ -31,8 +35,7 @@ def test_the_widest_table_fits_on_paper(browser: Browser, tmp_path: Path, name: 
     browser._call("Emulation.setEmulatedMedia", media="print")
     browser._call("Emulation.setDeviceMetricsOverride", width=PAPER_PX, height=700, deviceScaleFactor=1, mobile=False)
     try:
-        right = browser.value("Math.max(...[...document.querySelectorAll('td, th, img')].map("
-                              "one => one.getBoundingClientRect().right + one.scrollWidth - one.clientWidth))")  # fmt: skip
+        right = browser.value(RIGHT)
         tops = browser.value("[...document.querySelectorAll('img')].map(one => one.getBoundingClientRect().top)")
     finally:
         browser._call("Emulation.setEmulatedMedia", media="")
