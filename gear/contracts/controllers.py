@@ -93,6 +93,8 @@ class Observation:
         prediction: prediction of the network in the format of its task; None for controllers without a network.
         views: (H, W, 3) uint8 pictures by camera name, before any defense; empty unless the spec says `needs_views`.
         obstacles: the true positions of all other road users; empty unless the spec says `needs_truth`.
+        red_light_m: true distance from the front of the car to the stop line of the red traffic light ahead; None
+            without one, and unless the spec says `needs_truth`.
     """
 
     time_s: float
@@ -105,6 +107,7 @@ class Observation:
     prediction: Any = None
     views: Mapping[str, UInt8Image] = field(default_factory=dict)
     obstacles: tuple[Obstacle, ...] = ()
+    red_light_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

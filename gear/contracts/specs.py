@@ -184,12 +184,16 @@ class ControllerSpec(Spec[ConfigT, Controller]):
     Attributes:
         tasks: names of the tasks whose predictions it reads; empty for a controller without a network.
         needs_views: whether it receives the pictures themselves, as a policy that drives end to end does.
-        needs_truth: whether it receives the true positions of all road users; only for comparisons.
+        needs_truth: whether it receives the true positions of all road users, and of red traffic lights; only for
+            comparisons.
+        reads_lights: whether it stops at red traffic lights. `gear drive` leaves scenarios with a red light out for
+            controllers that read a task but no lights, unless the config names the scenario.
     """
 
     tasks: tuple[str, ...] = ()
     needs_views: bool = False
     needs_truth: bool = False
+    reads_lights: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -77,7 +77,8 @@ class DriveConfig:
         drivers: drivers by name.
         towns: names of scenes, by town.
         scenarios: speeds of the ego car in km/h, by name of the scenario; an empty list means the speeds of the
-            library. Empty for all scenarios of the library.
+            library. Empty for all scenarios of the library; those with a red light are then left out for controllers
+            that read a task but no lights.
         library: name or path of the library of scenarios.
         twins: `none`, `random` and `patch`; drivers without cameras drive only `none`.
         repeats: number of drives of each driver, place, scenario, speed and twin, with different seeds.

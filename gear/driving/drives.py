@@ -282,6 +282,8 @@ def _runs(
         for town, scenes in config.towns.items():
             for scene in scenes:
                 for name, given in speeds.items():
+                    if library.scenarios[name].red_light and not config.scenarios and not _meets_lights(cast):
+                        continue
                     for speed_kmh in given or library.scenarios[name].speeds_kmh:
                         for number in range(config.repeats):
                             for twin in _twins(config, cast):
@@ -294,6 +296,13 @@ def _runs(
                                     seed=config.seed + number,
                                     twin=twin,
                                 )
+
+
+def _meets_lights(cast: Cast) -> bool:
+    """Whether a driver takes part in scenarios with a red light that the config does not name: it reads lights, or it
+    reads no task at all, like the blind driver and policies that drive end to end.
+    """
+    return cast.spec.reads_lights or not cast.spec.tasks
 
 
 def _twins(config: DriveConfig, cast: Cast) -> list[str]:

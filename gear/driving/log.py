@@ -36,7 +36,8 @@ class Danger:
             for a free corridor.
         ttc_s: time in seconds until the car would touch that road user; None if it is not approached.
         least_m: distance between the footprints of the ego car and of the nearest road user; None without road users.
-        is_hazard: whether a road user is in the lane or near it, so that braking is no phantom braking.
+        is_hazard: whether a road user is in the lane or near it, or a red light ahead, so that braking is no phantom
+            braking.
     """
 
     gap_m: float | None
@@ -57,7 +58,7 @@ def danger_of(situation: Situation, scripted: int | None) -> Danger:
     reach_m = observation.ego.speed_mps * HAZARD_S + 10.0
     gaps: list[tuple[float, float]] = []
     distances: list[float] = []
-    is_hazard = False
+    is_hazard = situation.red_light_m is not None and situation.red_light_m < reach_m
     for obstacle in observation.obstacles:
         outline_m = outline(obstacle)
         distances.append(_distance_m(outline_m, observation))
@@ -114,8 +115,9 @@ def frame_entry(
     Returns:
         Motion of the ego car (`ego` is x, y, z and yaw), its position on the route, the danger, and `actors` (id, x, y,
         yaw and speed of each other road user); with a decision also `command` (acceleration, steering angle) and
-        `notes`; with `with_tilt` also `tilt` (pitch, positive with the nose down, and roll, positive to the right).
-        Metres, seconds, radians.
+        `notes`; in a scenario with a red light also `red_light_m` (distance to the stop line, null beyond it) and
+        `ran_red_light`; with `with_tilt` also `tilt` (pitch, positive with the nose down, and roll, positive to the
+        right). Metres, seconds, radians.
     """
     ego, position = situation.ego, situation.position
     entry: dict[str, Any] = {
@@ -137,6 +139,8 @@ def frame_entry(
             for body, spawn in situation.spawns.items()
         ],
     }
+    if situation.red_light_m is not None or situation.ran_red_light:
+        entry |= {"red_light_m": situation.red_light_m, "ran_red_light": situation.ran_red_light}
     if with_tilt:
         rotation = situation.world_from_ego.rotation
         entry["tilt"] = [math.asin(-float(rotation[2, 0])), math.atan2(float(rotation[2, 1]), float(rotation[2, 2]))]

@@ -26,6 +26,9 @@ STANDING_GAP_M = 5.0
 PENALTIES = {"person": 0.5, "vehicle": 0.6, "static": 0.65}
 """CARLA's factors on the score for a collision, by what was hit (CARLA Autonomous Driving Leaderboard)."""
 
+RED_LIGHT_PENALTY = 0.7
+"""CARLA's factor on the score for running a red light."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measures:
@@ -46,7 +49,9 @@ class Measures:
         lateral_peak_m: largest distance of the car's middle from the centre line.
         jerk_peak_mps3, jerk_rms_mps3: largest and root mean square change of the acceleration.
         progress: driven share of the way that a perfect driver would drive, 0..1.
-        score: CARLA's driving score, 0..1: progress times the factors of collisions and of the way in the lane.
+        score: CARLA's driving score, 0..1: progress times the factors of collisions, of a red light that was run, and
+            of the way in the lane.
+        ran_red_light: whether the ego car passed the stop line of a red light.
     """
 
     ending: str
@@ -65,6 +70,7 @@ class Measures:
     jerk_rms_mps3: float
     progress: float
     score: float
+    ran_red_light: bool = False
 
 
 def measure(log: Sequence[Json]) -> Measures:
@@ -83,7 +89,8 @@ def measure(log: Sequence[Json]) -> Measures:
     arc_m = np.array([frame["s_m"] for frame in frames])
     off_share = _off_road_share(arc_m, np.abs(lateral) > np.array([f["lane_width_m"] / 2 for f in frames]))
     progress = _progress(head, frames)
-    factor = 1.0 if crash is None else PENALTIES[crash["kind"]]
+    ran_red_light = any(frame.get("ran_red_light", False) for frame in frames)
+    factor = (1.0 if crash is None else PENALTIES[crash["kind"]]) * (RED_LIGHT_PENALTY if ran_red_light else 1.0)
     return Measures(
         ending=end["ending"],
         is_crash=crash is not None,
@@ -101,6 +108,7 @@ def measure(log: Sequence[Json]) -> Measures:
         jerk_rms_mps3=float(np.sqrt(np.mean(jerk**2))),
         progress=progress,
         score=progress * factor * (1 - off_share),
+        ran_red_light=ran_red_light,
     )
 
 

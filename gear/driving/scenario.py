@@ -92,15 +92,16 @@ class Walker:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """One scenario: what the ego car meets. Without `lead` and `walker` the road is free.
+    """One scenario: what the ego car meets. Without `lead`, `walker` and `red_light` the road is free.
 
     Attributes:
         summary: description in one line.
         speeds_kmh: speeds of the ego car, km/h.
-        ttc_s: time to collision at the start of the drive, 1 to 10 s.
+        ttc_s: time to collision at the start of the drive, or time to the stop line, 1 to 10 s.
         duration_s: length of the drive, 1 to 120 s; it ends earlier when the car has crashed or stands.
         lead: a vehicle ahead.
         walker: a person on the road.
+        red_light: whether the next traffic light shows red.
     """
 
     summary: str = ""
@@ -109,6 +110,7 @@ class Scenario:
     duration_s: float = 10.0
     lead: Lead | None = field(default=None, metadata=WHOLE)
     walker: Walker | None = field(default=None, metadata=WHOLE)
+    red_light: bool = False
 
     def __post_init__(self) -> None:
         if not self.speeds_kmh:
@@ -122,11 +124,13 @@ class Scenario:
             raise FieldError("duration_s", f"must be 1 to 120 s, got {self.duration_s:g}")
         if self.lead is not None and self.walker is not None:
             raise FieldError("walker", "a scenario has a lead or a walker, not both")
+        if self.red_light and (self.lead is not None or self.walker is not None):
+            raise FieldError("red_light", "a scenario with a red light has no lead and no walker")
 
     @property
     def is_free(self) -> bool:
         """Whether nothing is in the way of the ego car."""
-        return self.lead is None and self.walker is None
+        return self.lead is None and self.walker is None and not self.red_light
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -48,11 +48,11 @@ LOST_M = 6.0
 """Distance from the centre line of the lane beyond which the car has left the road, metres."""
 
 PASSED_M = 10.0
-"""Distance beyond a walking or standing person at which the drive ends, metres."""
+"""Distance beyond a walking or standing person, or beyond a stop line, at which the drive ends, metres."""
 
 Ending = Literal["", "crash", "time", "stood", "passed", "off_road"]
-"""Why a drive ended: contact, end of its time, a standing car, a person who was passed, or a car that left the road; ""
-while it goes on.
+"""Why a drive ended: contact, end of its time, a standing car, a person or a red light that was passed, or a car that
+left the road; "" while it goes on.
 """
 
 
@@ -72,6 +72,9 @@ class Situation:
         path_m: (N, 2) centre line of the lane ahead, in the ego frame (x forward, y left).
         spawns: the other road users with their positions in the world, by name of their body.
         obstacles: the same road users with positions, sizes and velocities in the ego frame.
+        red_light_m: distance from the front of the car to the stop line of the red light ahead; None without one, and
+            after the car has passed the line.
+        ran_red_light: whether the car has passed the stop line of a red light.
         crash: the first contact; None without one.
         ending: why the drive has ended: `crash`, `time`, `stood`, `passed` or `off_road`; "" while it goes on.
     """
@@ -86,6 +89,8 @@ class Situation:
     path_m: Points
     spawns: Mapping[str, Spawn]
     obstacles: tuple[Obstacle, ...]
+    red_light_m: float | None = None
+    ran_red_light: bool = False
     crash: Crash | None = None
     ending: Ending = ""
 
@@ -108,7 +113,7 @@ class Situation:
             cameras: cameras of the rig.
             prediction: the network's prediction.
             views: pictures by camera name, for controllers that see them.
-            with_truth: whether the true positions of the road users are included.
+            with_truth: whether the true positions of the road users and of the red light are included.
         """
         return Observation(
             time_s=self.time_s,
@@ -121,6 +126,7 @@ class Situation:
             prediction=prediction,
             views=dict(views or {}),
             obstacles=self.obstacles if with_truth else (),
+            red_light_m=self.red_light_m if with_truth else None,
         )
 
 
@@ -306,6 +312,8 @@ class DriveSimulation:
     ) -> Situation:
         drive = self._drive
         assert drive is not None
+        red_light_m = drive.start.conflict_s_m - position.s_m if drive.draw.scenario.red_light else None
+        has_passed = red_light_m is not None and red_light_m < 0
         return Situation(
             frame=frame,
             time_s=frame * FRAME_S,
@@ -317,6 +325,8 @@ class DriveSimulation:
             path_m=drive.start.path.ahead(state, position.s_m),
             spawns=spawns,
             obstacles=tuple(_obstacle(state, drive.ids[body], spawn) for body, spawn in spawns.items()),
+            red_light_m=None if has_passed else red_light_m,
+            ran_red_light=has_passed,
         )
 
     def _crash(self, time_s: float, state: VehicleState, spawns: Mapping[str, Spawn], body: str | None) -> Crash:
@@ -337,7 +347,8 @@ class DriveSimulation:
             return "off_road"
         if drive.stood_s >= STOOD_S - 1e-9 and not drive.draw.scenario.is_free:
             return "stood"
-        if drive.start.walker is not None and now.position.s_m > drive.start.conflict_s_m + PASSED_M:
+        can_pass = drive.start.walker is not None or drive.draw.scenario.red_light
+        if can_pass and now.position.s_m > drive.start.conflict_s_m + PASSED_M:
             return "passed"
         return "time" if now.time_s >= drive.draw.scenario.duration_s - 1e-9 else ""
 

@@ -23,6 +23,7 @@ from gear.world.placement import PlacementSpace
 from gear.world.roads.lanes import LaneGraph
 from gear.world.roads.polyline import Polyline
 from gear.world.roads.routes import trace_back
+from gear.world.roads.traffic_lights import red_lanes, traffic_lights
 from gear.world.scene_spec import SceneSpec
 from gear.world.traffic.crowd import Crowd, RoadUsers
 from gear.world.traffic.ego_sampling import EgoSampler
@@ -110,7 +111,8 @@ class Start:
         path: the lanes that the ego car follows.
         s_m: arc length of the ego car's middle on the path.
         speed_mps: speed of the ego car at the start, and its desired speed.
-        conflict_s_m: arc length up to which a car that does nothing drives until it crashes; infinite on a free road.
+        conflict_s_m: arc length up to which a car that does nothing drives until it crashes, or until its front is at
+            the stop line of the red light; infinite on a free road.
         lead, walker: the scripted road user, if there is one.
     """
 
@@ -136,6 +138,7 @@ class StartSampler:
         """
         spawner = Spawner(world.lanes)
         self._world, self._space, self._lanes = world, space, world.lanes
+        self._red_lanes = red_lanes(world.lanes, traffic_lights(world.model, world.statics))
         self._sampler = EgoSampler(
             scene_name=world.scene_name,
             scene=world.scene,
@@ -158,8 +161,13 @@ class StartSampler:
             PlacementError: the scene has no place for the scenario; the message says why.
         """
         truck = self._world.scene.truck
-        if truck is not None and (what.scenario.walker or (what.scenario.lead and what.scenario.lead.cut_in)):
-            problem = f"scenario {what.name}: behind a truck there is no place for a person or a car that cuts in"
+        has_no_place = (
+            what.scenario.walker or what.scenario.red_light or (what.scenario.lead and what.scenario.lead.cut_in)
+        )
+        if truck is not None and has_no_place:
+            problem = (
+                f"scenario {what.name}: behind a truck there is no place for a person, a car that cuts in or a light"
+            )
             raise PlacementError(self._world.scene_name, f"{problem}; use a scene with boards")
         problems: Counter[str] = Counter()
         for attempt in range(TRIES):
@@ -181,7 +189,13 @@ class StartSampler:
         lane, view_s_m = self._sampler.spawner.lane_table.draw(self._sampler.places, rng)
         if self._lanes.lanes[lane].is_junction:
             return "in a junction"
-        way = trace_back(self._lanes, lane, view_s_m, max(0.0, scenario.ttc_s - IN_VIEW_TTC_S) * speed_mps, rng)
+        back_m = max(0.0, scenario.ttc_s - IN_VIEW_TTC_S) * speed_mps
+        if scenario.red_light:
+            line_m = self._stop_line_m(lane, view_s_m, scenario.ttc_s * speed_mps)
+            if line_m is None:
+                return "without a red light ahead"
+            back_m = view_s_m - (line_m - self._sampler.ego_type.front_m - scenario.ttc_s * speed_mps)
+        way = trace_back(self._lanes, lane, view_s_m, back_m, rng)
         if way is None:
             return "before the start of the road"
         names, s_m = way
@@ -192,6 +206,8 @@ class StartSampler:
         road_users = self._sampler.empty()
         ego = replace(self._sampler.ego_on_lane(road_users, names[0], s_m, rng), speed_mps=speed_mps)
         start = Start(road_users=road_users, path=path, s_m=s_m, speed_mps=speed_mps)
+        if scenario.red_light:
+            start = replace(start, conflict_s_m=s_m + scenario.ttc_s * speed_mps)
         scripted = self._scripted(start, scenario, rng)
         if isinstance(scripted, str):
             return scripted
@@ -201,6 +217,24 @@ class StartSampler:
             return problem
         road_users.keep_out.extend(_kept_free(start))
         return start
+
+    def _stop_line_m(self, lane: str, s_m: float, reach_m: float) -> float | None:
+        """Finds the first red light ahead.
+
+        Args:
+            lane: name of the lane of the position.
+            s_m: arc length of the position on that lane.
+            reach_m: largest distance from the position at which a light counts.
+
+        Returns:
+            Arc length of its stop line, straight on from the start of `lane`; None without a red light.
+        """
+        front_m, end_m = self._sampler.ego_type.front_m, 0.0
+        for name in straight_on(self._lanes, lane, s_m + reach_m):
+            end_m += self._lanes.lanes[name].line.length_m
+            if name in self._red_lanes and s_m + front_m < end_m <= s_m + front_m + reach_m:
+                return end_m
+        return None
 
     def _scripted(self, start: Start, scenario: Scenario, rng: np.random.Generator) -> tuple[Start, list[Spawn]] | str:
         """Adds the scripted road user; returns a problem where there is no place for it."""

@@ -97,8 +97,8 @@ class DriveEnv(gymnasium.Env[Arrays, npt.NDArray[np.float32]]):
 
         Returns:
             The observation, the reward, whether the drive was lost (a crash, or off the road), whether it ended
-            otherwise, and information: `time_s`, `s_m`, `lateral_m`, `ending`, and after a crash `impact_mps` and
-            `crash_kind`.
+            otherwise, and information: `time_s`, `s_m`, `lateral_m`, `ending`, `ran_red_light`, and after a crash
+            `impact_mps` and `crash_kind`.
 
         Raises:
             GearError: `reset` was not called.
@@ -173,6 +173,7 @@ def _facts(situation: Situation) -> dict[str, Any]:
         "s_m": situation.position.s_m,
         "lateral_m": situation.position.lateral_m,
         "ending": situation.ending,
+        "ran_red_light": situation.ran_red_light,
     }
     if situation.crash is not None:
         facts |= {"impact_mps": situation.crash.impact_mps, "crash_kind": situation.crash.kind}

@@ -33,7 +33,8 @@ class DriveSettings:
         patch: `none`, `random`, a picture, a patch folder, or the name of an installed patch; it needs a camera.
         weather: name of a weather preset.
         scenarios: name of a scenario library, or path of its YAML.
-        scenario: name of a scenario; empty to draw one of the library in each episode.
+        scenario: name of a scenario; empty to draw one of the library in each episode, without those that have a red
+            light.
         speed_kmh: speed of the ego car at the start, and its desired speed; 0 to draw one of the scenario's.
         dynamics: model of the ego car's motion: `kinematic` for the bicycle, `mujoco` for a car with four wheels and a
             suspension.
@@ -102,7 +103,8 @@ class DriveSettings:
         scenarios = load_scenarios(self.scenarios).scenarios
         if self.scenario and self.scenario not in scenarios:
             raise UnknownNameError("scenario", self.scenario, scenarios)
-        names = [self.scenario] if self.scenario else list(scenarios)
+        drawn = [name for name, one in scenarios.items() if not one.red_light]  # the numbers show no light
+        names = [self.scenario] if self.scenario else drawn
         pairs = [(name, speed_kmh) for name in names for speed_kmh in self._speeds_kmh(scenarios[name])]
         seed = int(rng.integers(MOST_SEED))
         for number in rng.permutation(len(pairs)):

@@ -53,6 +53,17 @@ def test_folders_differ_and_depend_on_all_that_decides_a_drive() -> None:
     assert str(TINY_TOWN.parent) not in "".join(first)
 
 
+def test_red_lights_are_left_out_for_those_who_read_none() -> None:
+    text = TEXT.replace("scenarios: {stopped_lead: [20, 40], free_road: []}\n", "")
+    text = text.replace("drivers:\n", "drivers:\n  depth: {controller: depth_baseline, model: ddrnet23_slim_depth}\n")
+    drives = planned(text)
+    met = {driver: {run.scenario for run in drives.runs if run.driver == driver} for driver in drives.casts}
+    assert "red_light" in met["truth"] and "red_light" in met["eyes"] and "stopped_lead" in met["depth"]
+    assert "red_light" not in met["depth"], "it reads a task and no lights"
+    named = planned(text + "scenarios: {red_light: [40]}\n")
+    assert {run.driver for run in named.runs} == set(named.casts), "a config may name the scenario"
+
+
 def test_dynamics_are_part_of_what_decides_a_drive() -> None:
     first, other = planned(), planned(TEXT + "dynamics: mujoco\n")
     run = first.runs[0]

@@ -11,7 +11,8 @@ from gear.values.errors import ConfigError, UnknownNameError
 def test_the_standard_scenarios() -> None:
     scenarios = load_scenarios("standard").scenarios
     assert set(scenarios) == {
-        "stopped_lead", "slower_lead", "cut_in", "crossing_pedestrian", "standing_pedestrian", "free_road",
+        "stopped_lead", "slower_lead", "cut_in", "crossing_pedestrian", "standing_pedestrian", "red_light",
+        "free_road",
     }  # fmt: skip
     assert [name for name, one in scenarios.items() if one.is_free] == ["free_road"]
     assert all(one.summary for one in scenarios.values())

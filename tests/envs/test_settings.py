@@ -26,7 +26,8 @@ def test_all_scenarios_and_speeds_are_drawn_once() -> None:
     scenarios = load_scenarios("standard").scenarios
     draws = list(DriveSettings().draws(np.random.Generator(np.random.PCG64(0))))
     pairs = {(draw.name, round(draw.speed_mps * 3.6, 6)) for draw in draws}
-    assert pairs == {(name, speed) for name, one in scenarios.items() for speed in one.speeds_kmh}
+    assert pairs == {(name, speed) for name, one in scenarios.items() if name != "red_light"
+                     for speed in one.speeds_kmh}  # fmt: skip
     assert len(draws) == len(pairs) and len({draw.seed for draw in draws}) == 1
     fixed = list(settings_of({"scenario": "free_road", "speed_kmh": 33}).draws(np.random.Generator(np.random.PCG64(0))))
     assert [(draw.name, draw.speed_mps) for draw in fixed] == [("free_road", pytest.approx(33 / 3.6))]

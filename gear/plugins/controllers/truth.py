@@ -1,4 +1,6 @@
-"""The controller with perfect perception, the ceiling of a comparison: it knows the true positions of road users."""
+"""The controller with perfect perception, the ceiling of a comparison: it knows the true positions of road users, and
+the red lights.
+"""
 
 from __future__ import annotations
 
@@ -27,14 +29,16 @@ class Truth(Baseline):
     """The baseline driver with the true positions of all road users, and their motion over the next seconds."""
 
     def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
-        """Returns the nearest road user that is in the corridor, or that will be there when the car arrives; None
-        without one.
+        """Returns the nearest road user that is in the corridor, or that will be there when the car arrives, or the
+        stop line of a red light if it is nearer; None without any.
 
         Args:
             observation: the frame with the true road users.
             corridor: the strip of road that the car needs, in the ego frame.
         """
         seen = [self._sighting(observation, corridor, obstacle) for obstacle in observation.obstacles]
+        if observation.red_light_m is not None:
+            seen.append(Sighting(gap_m=observation.red_light_m, speed_mps=0.0))
         return min((one for one in seen if one is not None), key=lambda one: one.gap_m, default=None)
 
     def _sighting(self, observation: Observation, corridor: Corridor, obstacle: Obstacle) -> Sighting | None:
@@ -78,10 +82,11 @@ def outline(obstacle: Obstacle) -> Points:
 
 spec = ControllerSpec(
     name="truth",
-    summary="Knows all road users and brakes for them: the ceiling of every comparison.",
+    summary="Knows all road users and red lights and brakes for them: the ceiling of every comparison.",
     config=BaselineConfig,
     build=Truth,
     needs_truth=True,
+    reads_lights=True,
 )
 
 

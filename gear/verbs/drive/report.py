@@ -27,6 +27,7 @@ class Row:
         least_ttc_s: mean of the least times to collision; None if nothing was approached.
         phantoms: share of drives with a phantom braking.
         off_road: share of drives that left the lane.
+        ran_red_light: share of drives that ran a red light.
         lateral_peak_m: mean of the largest distances from the centre line.
         jerk_rms_mps3: mean of the root mean square jerks.
         score: mean driving score.
@@ -45,6 +46,7 @@ class Row:
     least_ttc_s: float | None
     phantoms: Rate
     off_road: Rate
+    ran_red_light: Rate
     lateral_peak_m: float
     jerk_rms_mps3: float
     score: float
@@ -156,6 +158,7 @@ def _row(
         least_ttc_s=mean_known(one.least_ttc_s for one in measures),
         phantoms=Rate.of(one.phantom_brakings > 0 for one in measures),
         off_road=Rate.of(one.off_road_share > 0 for one in measures),
+        ran_red_light=Rate.of(one.ran_red_light for one in measures),
         lateral_peak_m=mean_known(one.lateral_peak_m for one in measures) or 0.0,
         jerk_rms_mps3=mean_known(one.jerk_rms_mps3 for one in measures) or 0.0,
         score=mean_known(one.score for one in measures) or 0.0,

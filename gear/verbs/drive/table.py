@@ -11,7 +11,7 @@ from gear.verbs.drive.report import DriveReport, Row
 
 TITLES = [
     "driver", "scenario", "twin", "drives", "crashes", "impact km/h", "least m", "least TTC s", "braking delay s",
-    "phantom", "left lane", "lateral m", "jerk", "score", "open loop",
+    "phantom", "left lane", "ran red", "lateral m", "jerk", "score", "open loop",
 ]  # fmt: skip
 
 SPEED_TITLES = [
@@ -38,10 +38,11 @@ DEFINITIONS = {
     "phantom": "share of the drives with hard braking (3 m/s² commanded over two frames) while no road user is in the"
     " lane or near it",
     "left lane": "share of the drives in which the middle of the car left its lane",
+    "ran red": "share of the drives in which the car passed the stop line of a red light",
     "lateral m": "mean of the largest distances from the centre line",
     "jerk": "mean of the root mean squares of the change of the acceleration, m/s³",
     "score": "mean of CARLA's driving score: driven share of the way, times 0.5 for hitting a person, 0.6 for a"
-    " vehicle, 0.65 for anything else, times the share of the way in the lane",
+    " vehicle, 0.65 for anything else, 0.7 for a red light that was run, times the share of the way in the lane",
     "open loop": "mean of the task's main metric over the pictures of each drive, against their ground truth",
     "only here, only there": "situations in which only this twin, or only the other one, crashed",
     "p": "two-sided p of McNemar's exact test: how often chance alone gives crashes as unequal as these",
@@ -174,6 +175,7 @@ def _cells(row: Row) -> list[str]:
         _delay(row),
         share(row.phantoms),
         share(row.off_road),
+        share(row.ran_red_light),
         f"{row.lateral_peak_m:.2f}",
         f"{row.jerk_rms_mps3:.1f}",
         f"{row.score:.2f}",

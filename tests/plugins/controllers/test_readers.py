@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -94,6 +95,15 @@ def walker(ahead_m: float, left_m: float, velocity_mps: tuple[float, float]) -> 
 def test_truth_measures_exactly() -> None:
     found = true_sighting(*obstacles_of([car(20.0)]))
     assert found == Sighting(gap_m=pytest.approx(20.0 - 2.1 - CAR.front_m), speed_mps=0.0)
+
+
+def test_truth_stops_for_a_red_light_and_for_what_is_nearer() -> None:
+    reader = truth.Truth(truth.BaselineConfig())
+    light = replace(straight_road(), red_light_m=20.0)
+    assert reader.nearest(light, Corridor.of(light)) == Sighting(gap_m=20.0, speed_mps=0.0)
+    queue = replace(straight_road(obstacles=obstacles_of([car(15.0)])), red_light_m=20.0)
+    nearer = reader.nearest(queue, Corridor.of(queue))
+    assert nearer is not None and nearer.gap_m < 15.0
 
 
 def test_truth_sees_who_will_step_into_the_lane() -> None:
