@@ -33,6 +33,9 @@ INPUTS = {
 IGNORED = {".md", ".pyc"}
 """Files on which no number depends."""
 
+UNSEEN = "dynamics/"
+"""Folder of `mjcf` that no picture shows: the physics of the ego car."""
+
 BEGIN, END = "<!-- states: written by docs/stale_results.py -->", "<!-- end of states -->"
 LINE = re.compile(r"^- \*\*Inputs:\*\* (.*)$", re.MULTILINE)
 STATE = re.compile(r"^- \*\*State:\*\* .*\n", re.MULTILINE)
@@ -43,7 +46,8 @@ def digest(folder: Path) -> str:
     """Eight hexadecimal digits of all files below a folder, by their names and git's hashes of their content."""
     entries = []
     for path in folder.rglob("*"):
-        if path.is_file() and path.suffix not in IGNORED:
+        is_unseen = path.relative_to(folder).as_posix().startswith(UNSEEN)
+        if path.is_file() and path.suffix not in IGNORED and not is_unseen:
             data = path.read_bytes()
             blob = hashlib.sha1(b"blob %d\0" % len(data) + data, usedforsecurity=False).hexdigest()
             entries.append((path.relative_to(folder).as_posix(), blob))
@@ -57,7 +61,8 @@ def digest_at(commit: str, folder: str) -> str:
         cwd=ROOT, capture_output=True, text=True, check=True,
     ).stdout  # fmt: skip
     lines = [line.split("\t") for line in listed.splitlines() if Path(line).suffix not in IGNORED]
-    return _digest_of([(path.removeprefix(f"{folder}/"), facts.split()[2]) for facts, path in lines])
+    entries = [(path.removeprefix(f"{folder}/"), facts.split()[2]) for facts, path in lines]
+    return _digest_of([entry for entry in entries if not entry[0].startswith(UNSEEN)])
 
 
 @functools.cache

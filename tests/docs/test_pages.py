@@ -96,6 +96,8 @@ def test_figures_are_stale_when_a_file_that_they_depend_on_changes(tmp_path: Pat
     assert len({first, second, digest(tmp_path)}) == 3
     (tmp_path / "town" / "b.xml").rename(tmp_path / "town" / "a.xml")
     (tmp_path / "town" / "a.xml").write_text("one")
+    (tmp_path / "dynamics").mkdir()
+    (tmp_path / "dynamics" / "car.xml").write_text("no picture shows it")
     assert digest(tmp_path) == first
 
 
