@@ -9,7 +9,7 @@ from gear.contracts.evaluation import DrawsPredictions, WithObjects
 from gear.contracts.legends import ColourNames, Legend, Rgb, WithLegends
 from gear.contracts.tasks import Sample, Task
 from gear.dataset.output_checks import check_previews
-from gear.plugins.tasks.common import category_colour, draw_box, draw_surfaces
+from gear.plugins.tasks.common import IGNORED_COLOUR, category_colour, draw_box, draw_surfaces
 from gear.values.frames import UInt8Image
 from gear.values.picture_objects import PictureObjects
 
@@ -41,7 +41,7 @@ def prediction_pictures(task: Task[Any, Any], sample: Sample, prediction: Any) -
     if isinstance(task, DrawsPredictions):
         return check_previews(task.prediction_preview(sample, prediction))
     if isinstance(task, WithObjects):
-        return {OBJECTS: _drawn(sample, task.picture_objects(sample, prediction))}
+        return {OBJECTS: _drawn(sample, task.picture_objects(sample, prediction), label_colours(task))}
     return {}
 
 
@@ -54,27 +54,39 @@ def picture_legends(task: Task[Any, Any]) -> dict[str, Legend]:
     """
     legends: dict[str, Legend] = dict(task.legends()) if isinstance(task, WithLegends) else {}
     if isinstance(task, WithObjects) and not isinstance(task, DrawsPredictions):
-        legends[OBJECTS] = ColourNames(entries=(("dashed: object of the ground truth", OBJECT_COLOUR),))
+        classes = tuple((name, rgb) for name, rgb in label_colours(task).items() if rgb != IGNORED_COLOUR)
+        legends[OBJECTS] = ColourNames(entries=(*classes, ("dashed: object of the ground truth", OBJECT_COLOUR)))
     return legends
 
 
-def label_colour(label: str) -> Rgb:
-    """Returns the colour of a class in pictures of detections, RGB bytes; it depends only on the name of the
-    class.
+def label_colours(task: Task[Any, Any]) -> dict[str, Rgb]:
+    """Returns the colours of classes by name, as the legends of the task's previews state them; empty if it has none.
+
+    Args:
+        task: any task.
+    """
+    legends = task.legends().values() if isinstance(task, WithLegends) else ()
+    return {name: rgb for legend in legends if isinstance(legend, ColourNames) for name, rgb in legend.entries}
+
+
+def label_colour(label: str, known: Mapping[str, Rgb]) -> Rgb:
+    """Returns the colour of a class in pictures of detections, RGB bytes; for a class without a known colour it
+    depends only on the name.
 
     Args:
         label: name of the class.
+        known: colours of classes by name, from `label_colours`.
     """
-    return category_colour(sum((place + 1) * ord(letter) for place, letter in enumerate(label)) % 180)
+    return known.get(label) or category_colour(sum((i + 1) * ord(letter) for i, letter in enumerate(label)) % 180)
 
 
-def _drawn(sample: Sample, found: PictureObjects) -> UInt8Image:
+def _drawn(sample: Sample, found: PictureObjects, colours: Mapping[str, Rgb]) -> UInt8Image:
     picture = sample.images[found.camera].copy()
     for thing in found.objects:
         draw_box(picture, _indices(thing.box_px), OBJECT_COLOUR, dashed=True)
     for one in sorted(found.detections, key=lambda one: one.score):
         if one.score >= SURE:
-            draw_box(picture, _indices(one.box_px), label_colour(one.label), f"{one.label} {one.score:.2f}")
+            draw_box(picture, _indices(one.box_px), label_colour(one.label, colours), f"{one.label} {one.score:.2f}")
     draw_surfaces(picture, sample, found.camera)
     return picture
 

@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 
 import gear
-from gear.plugins.prediction_pictures import label_colour, picture_legends, prediction_pictures
+from gear.contracts.legends import ColourNames
+from gear.plugins.prediction_pictures import label_colour, label_colours, picture_legends, prediction_pictures
 from gear.plugins.stored_evaluations import is_evaluation, open_evaluation
+from gear.plugins.tasks.common import category_colour
+from gear.plugins.tasks.stereo3d import COLOURS
 from gear.values.errors import DatasetError
 from gear.view.changes import picture_change
 from gear.view.sources import unique
@@ -167,11 +170,25 @@ def test_detections_are_drawn_where_they_are(twins: Any) -> None:
     given = dataset.task.picture_objects(sample, dataset.task.as_prediction(sample))
     for one in given.detections:
         left, _, right, bottom = (round(side) for side in one.box_px)
-        colour = np.array(label_colour(one.label))
+        colour = np.array(label_colour(one.label, label_colours(dataset.task)))
         edge = drawn[min(bottom, drawn.shape[0]) - 1, max(left, 0) : right]
         assert (edge == colour).all(axis=1).mean() > 0.5
     nothing = prediction_pictures(dataset.task, sample, ())["objects"]
-    assert not (nothing == np.array(label_colour(given.detections[0].label))).all(axis=2).any()
+    assert (
+        not (nothing == np.array(label_colour(given.detections[0].label, label_colours(dataset.task))))
+        .all(axis=2)
+        .any()
+    )
+
+
+def test_classes_have_the_colours_of_the_ground_truth_and_a_legend(write_dataset: Any) -> None:
+    for task, (name, rgb) in {"detect2d": ("person", category_colour(1)), "stereo3d": ("Car", COLOURS["Car"])}.items():
+        opened = gear.open_dataset(write_dataset(task, 1)).task
+        assert label_colour(name, label_colours(opened)) == rgb
+        legend = picture_legends(opened)["objects"]
+        assert isinstance(legend, ColourNames) and (name, rgb) in legend.entries
+        assert not {"ignored", "DontCare"} & {entry for entry, _ in legend.entries}
+    assert label_colour("odd", {}) == label_colour("odd", {"person": (1, 2, 3)})
 
 
 def test_labels_that_occur_twice_get_their_folders() -> None:

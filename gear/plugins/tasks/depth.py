@@ -282,7 +282,9 @@ class DepthTask:
         ticks = zip(places.tolist(), (f"{depth_m:g}" for depth_m in PREVIEW_DEPTHS_M), strict=True)
         return {
             "depth": ColourBar(
-                quantity="depth (m)", colours=tuple((int(r), int(g), int(b)) for r, g, b in colours), ticks=tuple(ticks)
+                quantity="depth (m), black: unknown",
+                colours=tuple((int(r), int(g), int(b)) for r, g, b in colours),
+                ticks=tuple(ticks),
             )
         }
 

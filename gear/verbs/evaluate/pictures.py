@@ -34,8 +34,8 @@ PICTURES = "pictures"
 CELL_WIDTH_PX, QUALITY = 560, 92
 """Width of a picture in a sheet in pixels, and JPEG quality of a sheet."""
 
-LABEL_LENGTH = 24
-"""Largest number of characters of a patch's label in a caption."""
+LABEL_LENGTH = 48
+"""Largest number of characters of a patch's label in a caption: the label of a shipped patch has 47."""
 
 CHANGE_COLOURS: dict[Change, tuple[int, int, int]] = {
     "hidden": (255, 60, 60), "misclassified": (255, 150, 20), "moved": (255, 225, 60), "invented": (60, 255, 170),
@@ -143,7 +143,8 @@ def _cells(
     """Returns the captioned pictures of one sample, line by line and from left to right."""
     sample, index = row.dataset[result.index], f"{result.index:06d}"
     drawn = _predicted(row, sample, result)
-    truths = check_previews(row.dataset.task.preview(sample))
+    other = sample if twin is None else twin.dataset[result.index]
+    truths = check_previews(row.dataset.task.preview(other))  # the same in the twin, on the picture of its line
     name = next(iter(drawn), next(iter(truths), ""))
     camera = name if name in sample.images else next(iter(sample.images))
     truth = truths.get(name, next(iter(truths.values()), None))
@@ -159,7 +160,6 @@ def _cells(
     if twin is None:
         lines[0] += true + guarded
     else:
-        other = twin.dataset[result.index]
         seen = _predicted(twin, other, twin.results[result.index])
         lines = [_line(f"{index}  without a patch", other.images[camera], seen) + true, lines[0] + guarded]
     return [[captioned(shown, text, CELL_WIDTH_PX) for text, shown in line] for line in lines]
