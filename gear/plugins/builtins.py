@@ -37,6 +37,7 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.attacks.rp2",
     "gear.plugins.attacks.thys",
     "gear.plugins.attacks.naturalistic",
+    "gear.plugins.attacks.ensemble",
     "gear.plugins.attacks.control",
     "gear.plugins.controllers.detect2d",
     "gear.plugins.controllers.stereo3d",

@@ -23,6 +23,7 @@ from gear.values.errors import FieldError, GearError
 
 if TYPE_CHECKING:
     from gear.contracts.attacks import Objective
+    from gear.plugins.attacks.optimisation.loop import Direction, Problem
     from gear.plugins.attacks.optimisation.parametrisation import Parametrisation
 
 CATEGORY_IDS = {name: number for number, name in CATEGORY_NAMES.items()}
@@ -114,7 +115,7 @@ class SceneSpecific:
         Returns:
             Patches named `patch_0`, `patch_1`, …, in the order of the scene's surfaces.
         """
-        from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures, unit_gradients
+        from gear.plugins.attacks.optimisation.loop import Problem, optimise_textures
 
         objective, settings = self.objective(dataset[0]), self.settings(dataset[0])
         check_seen(self._config.source_class, dataset)
@@ -122,12 +123,24 @@ class SceneSpecific:
         problem = Problem(model=model, dataset=dataset, compositor=compositor, settings=settings)
         return optimise_textures(
             problem,
-            unit_gradients(problem, objective, settings),
+            self.direction(problem, objective, settings),
             budget=budget,
             rng=rng,
             monitor=monitor,
             parametrisation=self.parametrisation(),
         )
+
+    def direction(self, problem: Problem, objective: Objective, settings: SceneSpecificConfig) -> Direction:
+        """Returns the function that computes the ascent direction of each step.
+
+        Args:
+            problem: the attacked model or group of models, the samples and the compositor.
+            objective: what the attack maximises.
+            settings: the attack's options with the learning rate of the task.
+        """
+        from gear.plugins.attacks.optimisation.loop import unit_gradients
+
+        return unit_gradients(problem, objective, settings)
 
     def parametrisation(self) -> Parametrisation | None:
         """The parameters from which textures are computed; None, because the pixels are free."""

@@ -18,6 +18,7 @@ from gear.contracts.models import Model
 from gear.plugins.attacks.optimisation.appearance import vary
 from gear.plugins.attacks.optimisation.checkpoint_state import check_saved
 from gear.plugins.attacks.optimisation.frozen_model import frozen
+from gear.plugins.attacks.optimisation.member_weights import balanced
 from gear.plugins.attacks.optimisation.model_group import members_of
 from gear.plugins.attacks.optimisation.objectives import all_terms, not_finite
 from gear.plugins.attacks.optimisation.parametrisation import Parametrisation, Pixels
@@ -268,25 +269,27 @@ def batch_of(step: int, count: int, size: int, seed: int) -> list[int]:
     return [int(index) for index in order[place * size : (place + 1) * size]]
 
 
-def unit_gradients(problem: Problem, objective: Objective, settings: Settings) -> Direction:
+def unit_gradients(problem: Problem, objective: Objective, settings: Settings, *, focus: float = 0.0) -> Direction:
     """Makes the ascent direction of the scene-specific attack, from the objective's and the regularisers'
     gradients.
 
     The gradient of each term is scaled to length 1 (with `per_term`) and multiplied by the term's weight; the sum is
     scaled to length 1 again. The gradients of the regularisers, scaled to the lengths in the settings, are subtracted.
+    With several networks and a `focus`, terms are also weighted by network (`balanced`).
 
     Args:
         problem: the attacked model or group, whose defenses add terms of their own.
         objective: objective of the attack, a sum of weighted terms.
         settings: lengths of the regularisers' gradients, and `per_term`.
+        focus: with several networks, how strongly those that are harmed least are favoured; 0 treats all alike.
     """
 
     def ascend(textures: Tensor, batch: PatchedBatch) -> tuple[Tensor, dict[str, float]]:
-        terms = {
-            prefix + name: term
+        by_member = {
+            prefix: all_terms(objective, member, batch.views, batch.samples, batch.indices)
             for prefix, member in members_of(problem.model).items()
-            for name, term in all_terms(objective, member, batch.views, batch.samples, batch.indices).items()
         }
+        terms = balanced(by_member, focus)
         values = {name: float(term.value.detach()) for name, term in terms.items()}
         total = torch.zeros_like(textures)
         if settings.per_term:
