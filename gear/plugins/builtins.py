@@ -24,6 +24,8 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.defenses.hyperneuron",
     "gear.plugins.defenses.fpda",
     "gear.plugins.defenses.jedi",
+    "gear.plugins.defenses.object_seeker",
+    "gear.plugins.defenses.sac",
     "gear.plugins.defenses.lgs",
     "gear.plugins.defenses.jpeg",
     "gear.plugins.defenses.median",

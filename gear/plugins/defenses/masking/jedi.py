@@ -5,7 +5,7 @@ It follows the authors' MATLAB code (jedi.m, autoencoder_train.m).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,6 @@ import numpy.typing as npt
 
 from gear.contracts.defenses import FitReport
 from gear.contracts.models import Model
-from gear.plugins.defenses.activations.twin_masks import patch_area
 from gear.plugins.defenses.masking import shape_autoencoder
 from gear.plugins.defenses.masking.entropy import (
     grey_levels,
@@ -28,7 +27,7 @@ from gear.plugins.defenses.masking.entropy import (
 from gear.plugins.defenses.masking.jedi_options import JediConfig
 from gear.plugins.defenses.masking.mask_and_fill import Located, MaskAndFill
 from gear.plugins.defenses.masking.mask_iou import MaskIou
-from gear.values.errors import GearError
+from gear.plugins.defenses.masking.visible_patches import visible_patches
 from gear.values.frames import UInt8Image
 
 if TYPE_CHECKING:
@@ -134,9 +133,7 @@ class Jedi(MaskAndFill):
         Raises:
             GearError: there are no pictures, clean and patched pictures show different scenes, or no patch is visible.
         """
-        pairs = list(_pairs(clean, patched, self._settings.max_pictures))
-        if not pairs:
-            raise GearError("no patch is seen in the patched calibration data: jedi has nothing to learn from")
+        pairs = list(visible_patches(clean, patched, self._settings.max_pictures, "jedi"))
         entropies = [_entropies(picture) for _, picture, _ in pairs]
         areas = [area for _, _, area in pairs]
         measured = _statistics([clean for clean, _, _ in pairs], entropies, areas)
@@ -251,28 +248,6 @@ class Jedi(MaskAndFill):
         kept = np.zeros(count, np.bool_)
         kept[1:] = stats[1:, cv2.CC_STAT_AREA] >= self._settings.least_share * mask.size
         return np.asarray(kept[labels], np.bool_)
-
-
-def _pairs(
-    clean: Sequence[Views], patched: Sequence[Views], most: int
-) -> Iterator[tuple[UInt8Image, UInt8Image, Located]]:
-    """Yields clean picture, patched picture and (H, W) area of the patch, where a patch is visible.
-
-    Raises:
-        GearError: the pictures are no twins.
-    """
-    if not len(clean) or len(patched) != len(clean):
-        raise GearError(
-            "jedi learns from patches: give --calibration-patched DIR, the twin of --calibration with patches (gear "
-            f"collect with the same seed and settings, and --patch random); got {len(clean)} clean samples, and "
-            f"{len(patched)} with patches"
-        )
-    for number in np.unique(np.linspace(0, len(clean) - 1, min(most, len(clean))).round().astype(int)):
-        without, with_patch = clean[int(number)], patched[int(number)]
-        for name, picture in with_patch.items():
-            area = patch_area(without[name], picture, int(number))
-            if area.any():
-                yield without[name], picture, area
 
 
 def _entropies(picture: UInt8Image) -> list[Floats]:
