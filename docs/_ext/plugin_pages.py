@@ -17,7 +17,7 @@ SPECS = (
 PROTOCOLS = (
     tasks.Task, tasks.Evaluator, models.Model, attacks.Attack, attacks.Compositor, attacks.Objective,
     attacks.HarmObjective, attacks.WithObjective, attacks.WithTaskOptions, attacks.WithInputFiles, models.Trainable,
-    models.BatchPredictor, defenses.Defense, defenses.FittedDefense,
+    models.BatchPredictor, defenses.Defense, defenses.FittedDefense, defenses.FitsInPhases,
     defenses.DifferentiableDetector, defenses.ReportsFit, controllers.Controller, loggers.Logger, loggers.RunLogger,
 )  # fmt: skip
 VALUES = (

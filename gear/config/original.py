@@ -10,6 +10,7 @@ import ast
 from pathlib import Path
 
 from gear.config.nodes import Mapping, Node, Place, Scalar, text_of
+from gear.config.renamed import unknown_key
 from gear.values.errors import ConfigError
 
 ORIGINAL_KEYS = frozenset(
@@ -62,8 +63,8 @@ def from_original(node: Mapping) -> Mapping:
     """
     for name, (place, _) in node.entries.items():
         if name not in ORIGINAL_KEYS:
-            known = ", ".join(sorted(ORIGINAL_KEYS))
-            raise place.error(name, f"unknown key in a CARLA-GeAR config (there are: {known})")
+            problem = unknown_key(name, sorted(ORIGINAL_KEYS)).replace("key", "key in a CARLA-GeAR config", 1)
+            raise place.error(name, problem)
     entries: dict[str, tuple[Place, Node]] = {}
 
     def keep(name: str, text: str, source: str) -> None:

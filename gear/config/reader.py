@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin
 
 from gear.config.nodes import Items, Mapping, Node, Place, Scalar
+from gear.config.renamed import unknown_key
 from gear.values.errors import DuplicateNameError, FieldError, PatchError, UnknownNameError
 from gear.values.serial import is_places_field, type_hints
 
@@ -138,9 +139,7 @@ def _read_dataclass(kind: Any, node: Node, key: str, default: Any) -> Any:
     places: dict[str, Place] = {}
     for name, (place, item) in mapping.entries.items():
         if name not in fields:
-            close = difflib.get_close_matches(name, fields, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(fields)}"
-            raise place.error(join(key, name), f"unknown key ({hint})")
+            raise place.error(join(key, name), unknown_key(name, fields))
         given[name] = _read(hints[name], item, join(key, name), _usual(fields[name], default))
         places[name] = item.place
         if get_origin(hints[name]) is dict and isinstance(item, Mapping):

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from gear.contracts.models import Model
 from gear.values.frames import UInt8Image
+from gear.values.progress import PhaseProgress
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -93,6 +94,31 @@ class Defense(Protocol):
 
         Args:
             model: the protected model.
+        """
+        ...
+
+
+@runtime_checkable
+class FitsInPhases(Protocol):
+    """A defense that reports the progress of its calibration, which takes long or has several phases."""
+
+    def fit_in_phases(
+        self,
+        clean: Sequence[Mapping[str, UInt8Image]],
+        patched: Sequence[Mapping[str, UInt8Image]],
+        model: Model | None,
+        rng: np.random.Generator,
+        on_phase: PhaseProgress,
+    ) -> Any:
+        """Calibrates the defense as `Defense.fit` does, and returns the same state. It is called instead of `fit`.
+
+        Args:
+            clean: samples without a patch, (H, W, 3) uint8 pictures by camera name.
+            patched: the same scenes with a patch; empty if the user gave none.
+            model: the protected model; None if the spec needs none.
+            rng: generator of all random choices.
+            on_phase: called after each step with the unit of the current phase, in the singular (`training step`), and
+                the numbers of finished and of all steps of this phase.
         """
         ...
 

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gear.contracts.defenses import Defense
+from gear.contracts.defenses import Defense, FitsInPhases
 from gear.contracts.models import Model
 from gear.contracts.tasks import NO_PATCH
 from gear.dataset.reading import Dataset, scenes_of
@@ -17,7 +17,7 @@ from gear.plugins.build import blamed
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
-from gear.values.progress import Progress
+from gear.values.progress import NO_CALLBACKS, Callbacks
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
 
@@ -31,12 +31,13 @@ class Calibration:
     Attributes:
         clean: dataset without patches; None without calibration data.
         patched: the same dataset with patches; None if the user gave only clean data.
-        on_fit_progress: called with (number of samples that the defense has read, total number of samples).
+        callbacks: its `on_fit_progress` is called with (number of samples that the defense has read, total number of
+            samples), and its `on_fit_phase` by defenses that report the phases of their calibration.
     """
 
     clean: Dataset[Any] | None = None
     patched: Dataset[Any] | None = None
-    on_fit_progress: Progress | None = None
+    callbacks: Callbacks = NO_CALLBACKS
 
     def fit(self, defense: Chosen, product: Defense, model: Model, cameras: Sequence[str], seed: int) -> Any:
         """Calibrates a defense for one model; this may take minutes.
@@ -60,14 +61,17 @@ class Calibration:
         read: set[tuple[int, int]] = set()
 
         def took(side: int, index: int) -> None:
-            read.add((side, index))
-            if self.on_fit_progress is not None:
-                self.on_fit_progress(len(read), sum(map(len, given)))
+            if (side, index) not in read:
+                read.add((side, index))
+                self.callbacks.on_fit_progress(len(read), sum(map(len, given)))
 
         clean, *others = (CalibrationViews(one, cameras, partial(took, side)) for side, one in enumerate(given))
         patched: Sequence[Views] = others[0] if others else ()
+        rng = derive_rng(seed, "calibrate", defense.found.spec.name)
         with blamed(defense.found, "fit"):
-            return product.fit(clean, patched, model, derive_rng(seed, "calibrate", defense.found.spec.name))
+            if isinstance(product, FitsInPhases):
+                return product.fit_in_phases(clean, patched, model, rng, self.callbacks.on_fit_phase)
+            return product.fit(clean, patched, model, rng)
 
     def facts(self) -> list[str | None]:
         """The content keys (hashes of everything that decides the bytes) of the clean and the patched dataset;
@@ -120,7 +124,7 @@ def opened_calibration(
     defense: str | None,
     *,
     flag: str = "--set ",
-    on_fit_progress: Progress | None = None,
+    callbacks: Callbacks = NO_CALLBACKS,
 ) -> Calibration:
     """Opens the calibration data of a defense and checks them.
 
@@ -129,7 +133,7 @@ def opened_calibration(
         models: models that the defense protects.
         defense: name of the defense.
         flag: the command-line flag that sets options of the models, for error messages.
-        on_fit_progress: called with (number of samples that the defense has read, total number of samples).
+        callbacks: called while the defense is calibrated, as in `Calibration`.
 
     Raises:
         GearError: a dataset cannot be read or does not fit a model, the two datasets are swapped, or there is no
@@ -146,7 +150,7 @@ def opened_calibration(
         for model in models:
             if dataset is not None:
                 check_model(model, dataset, flag)
-    pair = Calibration(clean=opened[0], patched=opened[1], on_fit_progress=on_fit_progress)
+    pair = Calibration(clean=opened[0], patched=opened[1], callbacks=callbacks)
     if pair.shows_patch and pair.patched is not None and _label(pair.patched) == NO_PATCH:
         raise GearError(f"{clean} shows a patch, {patched} none: --calibration and --calibration-patched are swapped")
     return pair

@@ -9,7 +9,7 @@ from pathlib import Path
 from gear.measuring.calibration import NOTHING, Calibration, opened_calibration
 from gear.measuring.plugin_selection import Chosen, check_defense, chosen_defense
 from gear.values.errors import GearError
-from gear.values.progress import Progress
+from gear.values.progress import NO_CALLBACKS, Callbacks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +80,7 @@ def open_guard(
     task: str,
     *,
     flag: str = "--set ",
-    on_fit_progress: Progress | None = None,
+    callbacks: Callbacks = NO_CALLBACKS,
 ) -> OpenedGuard:
     """Finds the plugin of a requested defense, opens its calibration data, and checks that they fit the models and
     the task.
@@ -90,7 +90,7 @@ def open_guard(
         models: models that the defense protects, one after the other.
         task: name of the dataset's task.
         flag: the command-line flag that sets options of the models, for error messages.
-        on_fit_progress: called with (number of samples that the defense has read, total number of samples).
+        callbacks: called while the defense is calibrated, as in `Calibration`.
 
     Raises:
         GearError: there is no such defense, an option does not fit, the data cannot be read, or the defense does not
@@ -106,7 +106,7 @@ def open_guard(
         models,
         guard.defense,
         flag=flag,
-        on_fit_progress=on_fit_progress,
+        callbacks=callbacks,
     )
     for model in models:
         check_defense(chosen, model, task, is_calibrated=calibration.clean is not None)

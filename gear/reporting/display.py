@@ -23,7 +23,10 @@ EVERY_S = 30.0
 """Seconds between two plain lines: half a minute, so a log has a line every minute even if the thread is delayed."""
 
 FIT_UNIT = "picture"
-"""Unit that the progress of a defense's calibration counts."""
+"""Unit that the progress of a defense's calibration counts if the defense reports no phases."""
+
+FIT = "fit"
+"""First word of the channels that show the calibration of a defense."""
 
 
 class _Backend(Protocol):
@@ -56,13 +59,23 @@ class Display:
             python: True for a call from Python, which may run in a notebook; False for the command line.
         """
         self._unit = unit
+        self._has_phases = False
         has_bars = sys.stderr.isatty() or (python and _is_notebook())
         self._backend: _Backend = _Bars(is_notebook=python) if has_bars else _Lines(verb)
         self.callbacks = Callbacks.of(
             on_progress=lambda done, total: self._backend.update("progress", self._unit, done, total),
-            on_fit_progress=lambda done, total: self._backend.update("fit", FIT_UNIT, done, total),
+            on_fit_progress=self._show_fit,
+            on_fit_phase=self._show_phase,
             on_warning=lambda line: self._backend.write(f"gear: note: {line}"),
         )
+
+    def _show_fit(self, done: int, total: int) -> None:
+        if not self._has_phases:
+            self._backend.update(FIT, FIT_UNIT, done, total)
+
+    def _show_phase(self, unit: str, done: int, total: int) -> None:
+        self._has_phases = True  # the defense counts the pictures that it reads itself
+        self._backend.update(f"{FIT} {unit}", unit, done, total)
 
     def write(self, line: str) -> None:
         """Prints a line without damaging a progress bar.
@@ -88,6 +101,7 @@ class Display:
             unit: unit, in the singular, that `on_progress` counts in this step.
         """
         self._unit = unit
+        self._has_phases = False
         self._backend.begin(title)
 
     def __enter__(self) -> Display:
@@ -217,7 +231,7 @@ class _Lines:
         head = f"gear {self._verb}: {self._title + ': ' if self._title else ''}"
         if self._pace is None:
             return f"{head}preparing since {duration_text(now_s - self._begun_s)}"
-        step = "calibrating the defense, " if self._channel == "fit" else ""
+        step = "calibrating the defense, " if self._channel.startswith(FIT) else ""
         return f"{head}{step}{progress_line(self._pace, now_s)}{', ' + self._detail if self._detail else ''}"
 
 

@@ -10,11 +10,19 @@ Progress = Callable[[int, int], None]
 finished; a total of 0 means unknown.
 """
 
+PhaseProgress = Callable[[str, int, int], None]
+"""Type of the progress callback of a job with several phases, called with (unit, done, total). The unit names what the
+phase counts, in the singular, such as `training step`.
+"""
+
 Warn = Callable[[str], None]
 """Type of the warning callback, called with one line about a setting that is allowed but may be unintended."""
 
 
 def _no_progress(done: int, total: int) -> None: ...
+
+
+def _no_phase(unit: str, done: int, total: int) -> None: ...
 
 
 def _no_warning(line: str) -> None: ...
@@ -27,11 +35,14 @@ class Callbacks:
     Attributes:
         on_progress: called after every sample, or after every step of an optimisation.
         on_fit_progress: called after every calibration sample that a defense reads for the first time.
+        on_fit_phase: called after every step of a phase, such as a training step, while a defense is calibrated that
+            reports its phases (`gear.contracts.defenses.FitsInPhases`).
         on_warning: called with a warning of one line; equal warnings are passed on once if the object was made by `of`.
     """
 
     on_progress: Progress = _no_progress
     on_fit_progress: Progress = _no_progress
+    on_fit_phase: PhaseProgress = _no_phase
     on_warning: Warn = _no_warning
 
     @classmethod
@@ -40,6 +51,7 @@ class Callbacks:
         *,
         on_progress: Progress | None = None,
         on_fit_progress: Progress | None = None,
+        on_fit_phase: PhaseProgress | None = None,
         on_warning: Warn | None = None,
     ) -> Callbacks:
         """Makes callbacks from the arguments of a verb; None stands for a callback that does nothing. A repeated
@@ -48,6 +60,7 @@ class Callbacks:
         Args:
             on_progress: gets the numbers of finished and of all items.
             on_fit_progress: gets the same numbers during the calibration of a defense.
+            on_fit_phase: gets the unit and the numbers of a phase of the calibration.
             on_warning: gets one line per warning.
         """
         warned: set[str] = set()
@@ -60,6 +73,7 @@ class Callbacks:
         return cls(
             on_progress=on_progress or _no_progress,
             on_fit_progress=on_fit_progress or _no_progress,
+            on_fit_phase=on_fit_phase or _no_phase,
             on_warning=warn_once,
         )
 
@@ -78,8 +92,21 @@ class Callbacks:
             self.on_fit_progress(done, total)
             others.on_fit_progress(done, total)
 
+        def both_phases(unit: str, done: int, total: int) -> None:
+            self.on_fit_phase(unit, done, total)
+            others.on_fit_phase(unit, done, total)
+
         def both_warnings(line: str) -> None:
             self.on_warning(line)
             others.on_warning(line)
 
-        return Callbacks(on_progress=both_progress, on_fit_progress=both_fit_progress, on_warning=both_warnings)
+        return Callbacks(
+            on_progress=both_progress,
+            on_fit_progress=both_fit_progress,
+            on_fit_phase=both_phases,
+            on_warning=both_warnings,
+        )
+
+
+NO_CALLBACKS = Callbacks()
+"""Callbacks that do nothing."""

@@ -38,6 +38,18 @@ def test_a_log_has_lines_also_before_the_first_report(capsys: pytest.CaptureFixt
     assert last.startswith("gear attack: 12 of 300 steps, ") and last.endswith("left, loss 0.5")
 
 
+def test_phases_of_a_calibration_are_shown_instead_of_its_pictures(capsys: pytest.CaptureFixture[str]) -> None:
+    with Display("evaluate") as shown:
+        shown.callbacks.on_fit_phase("clean picture", 80, 80)
+        shown.callbacks.on_fit_progress(80, 80)
+        shown.callbacks.on_fit_phase("training step", 0, 1750)
+        shown.callbacks.on_fit_phase("training step", 700, 1750)
+        shown.callbacks.on_fit_progress(80, 80)
+        line = wait_for(capsys, "training steps").splitlines()[-1]
+    assert line.startswith("gear evaluate: calibrating the defense, 700 of 1750 training steps, ")
+    assert " per second, " in line and line.endswith(" left")
+
+
 def test_a_step_of_several_has_its_title(capsys: pytest.CaptureFixture[str]) -> None:
     with Display("bench") as shown:
         shown.callbacks.on_progress(5, 6)

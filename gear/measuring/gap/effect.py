@@ -82,9 +82,7 @@ class Effect:
         assert request.model is not None
         chosen = chosen_model(request.model, request.model_settings)
         check_model(chosen, dataset)
-        guard = open_guard(
-            request.guard, [chosen], dataset.plan.task["name"], on_fit_progress=callbacks.on_fit_progress
-        )
+        guard = open_guard(request.guard, [chosen], dataset.plan.task["name"], callbacks=callbacks)
         learnt = guard.calibration
         for line in (size_note(chosen, dataset), *learnt.doubts(), learnt.note(dataset)):
             if line is not None:

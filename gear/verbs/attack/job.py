@@ -25,7 +25,7 @@ from gear.plugins.catalogue import PluginEntry
 from gear.plugins.datasets import root_and_split, roots_of
 from gear.readers import open_all
 from gear.values.errors import DatasetError, GearError
-from gear.values.progress import Progress
+from gear.values.progress import Callbacks
 from gear.values.serial import Json
 from gear.verbs.attack.data import check_joined
 from gear.verbs.attack.models import FLAG, check_attack, check_gradient, choose_models
@@ -112,13 +112,12 @@ class Job:
         }
 
 
-def resolve(request: AttackRequest, on_fit_progress: Progress) -> Job:
+def resolve(request: AttackRequest, callbacks: Callbacks) -> Job:
     """Opens and checks everything that a request names: datasets, models, defense and attack.
 
     Args:
         request: the arguments of `gear.attack`.
-        on_fit_progress: called with the number of processed and of all calibration pictures while the defense is
-            calibrated.
+        callbacks: called while the defense is calibrated.
 
     Raises:
         GearError: something does not exist, or two inputs do not fit together.
@@ -134,7 +133,7 @@ def resolve(request: AttackRequest, on_fit_progress: Progress) -> Job:
     config = read_node(found.spec.config, options, "")
     surfaces = len(datasets[0].sidecar(0).record.surfaces)
     spec = check_attack(found, models, task, surfaces, request.queries)
-    guard = open_guard(request.guard, models, task, flag=FLAG, on_fit_progress=on_fit_progress)
+    guard = open_guard(request.guard, models, task, flag=FLAG, callbacks=callbacks)
     check_gradient(guard.defense, spec)
     if {scenes_of(one) for one in datasets} & {scenes_of(one) for one in validation}:
         raise GearError("--data and --val hold the same samples; give --val another split")

@@ -35,7 +35,7 @@ from gear.plugins.catalogue import PluginEntry
 from gear.plugins.text import one_line
 from gear.reporting.display import displayed
 from gear.values.errors import GearError, PluginError
-from gear.values.progress import Callbacks, Progress, Warn
+from gear.values.progress import Callbacks, PhaseProgress, Progress, Warn
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
 from gear.verbs.attack.achieved import MOST_SAMPLES, compared, plain
@@ -104,6 +104,7 @@ def attack(
     progress: bool = False,
     on_progress: Progress | None = None,
     on_fit_progress: Progress | None = None,
+    on_fit_phase: PhaseProgress | None = None,
     on_warning: Warn | None = None,
 ) -> AttackReport:
     """Optimises adversarial patches for the surfaces of a scene; resumes an interrupted run.
@@ -140,6 +141,8 @@ def attack(
         progress: shows a progress bar.
         on_progress: called after every step with the finished and the allowed steps, or queries if these are limited.
         on_fit_progress: called after every calibration sample that the defense reads for the first time.
+        on_fit_phase: called with (unit, done, total) after every step of a phase of the calibration, such as a training
+            step, if the defense reports its phases.
         on_warning: called before the attack with lines on settings that may be unintended, such as pictures of another
             size than the model was trained on, or doubtful calibration data.
 
@@ -168,7 +171,9 @@ def attack(
         log_to=log_to,
         log_settings=tuple(log_settings),
     )
-    callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
+    callbacks = Callbacks.of(
+        on_progress=on_progress, on_fit_progress=on_fit_progress, on_fit_phase=on_fit_phase, on_warning=on_warning
+    )
     with displayed(callbacks, "attack", progress=progress, unit=unit_of(request)) as shown:
         return run_attack(request, shown)
 
@@ -192,7 +197,7 @@ def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
         GearError: an error that the user can correct; the message is one line.
     """
     logger = choose_logger(request.log_to, request.log_settings)
-    job = resolve(request, callbacks.on_fit_progress)
+    job = resolve(request, callbacks)
     _warn(job, callbacks.on_warning)
     product, root = build(job.found, job.options), Path(request.out)
     network = build_model(job.models, job.guard, job.seed, job.weights)

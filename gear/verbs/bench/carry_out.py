@@ -32,6 +32,7 @@ def carry_out(step: Step, root: Path, callbacks: Callbacks, *, changed: Mapping[
     keywords: dict[str, Any] = {"on_progress": callbacks.on_progress, "on_warning": callbacks.on_warning}
     if step.verb != "collect":
         keywords["on_fit_progress"] = callbacks.on_fit_progress
+        keywords["on_fit_phase"] = callbacks.on_fit_phase
     try:
         return _result(step, root, {**step.arguments, **(changed or {}), **keywords}, callbacks.on_warning)
     except ReplaceableError as error:

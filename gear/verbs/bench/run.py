@@ -32,7 +32,7 @@ from gear.measuring.run_log import FOLDER, RunLog, choose_logger
 from gear.networks.runtime import has_cuda
 from gear.reporting.display import displayed
 from gear.values.errors import GearError
-from gear.values.progress import Callbacks, Progress, Warn
+from gear.values.progress import Callbacks, PhaseProgress, Progress, Warn
 from gear.verbs.bench.all_metrics import COLUMNS as METRIC_COLUMNS
 from gear.verbs.bench.all_metrics import metric_records
 from gear.verbs.bench.carry_out import carry_out
@@ -73,6 +73,7 @@ def bench(
     on_step: OnStep | None = None,
     on_progress: Progress | None = None,
     on_fit_progress: Progress | None = None,
+    on_fit_phase: PhaseProgress | None = None,
     on_warning: Warn | None = None,
 ) -> BenchReport:
     """Compares networks and defenses over scenes and patches: collects pictures, makes patches and evaluates. Resumes
@@ -104,6 +105,8 @@ def bench(
         on_progress: called after every sample of a step, or after every step of an attack; if several steps are carried
             out at the same time, after each of them.
         on_fit_progress: called after every calibration sample that a defense reads for the first time.
+        on_fit_phase: called with (unit, done, total) after every step of a phase of the calibration, such as a training
+            step, if the defense reports its phases.
         on_warning: called with lines on settings that may be unintended, and on results that are made again.
 
     Raises:
@@ -122,7 +125,9 @@ def bench(
         log_to=log_to,
         log_settings=tuple(log_settings),
     )
-    callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
+    callbacks = Callbacks.of(
+        on_progress=on_progress, on_fit_progress=on_fit_progress, on_fit_phase=on_fit_phase, on_warning=on_warning
+    )
     with displayed(callbacks, "bench", progress=progress) as shown:
         return run_bench(request, shown, on_step)
 

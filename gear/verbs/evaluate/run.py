@@ -28,7 +28,7 @@ from gear.measuring.plugin_selection import chosen_model
 from gear.measuring.shown_size import size_note
 from gear.reporting.display import displayed
 from gear.values.errors import DatasetError
-from gear.values.progress import Callbacks, Progress, Warn
+from gear.values.progress import Callbacks, PhaseProgress, Progress, Warn
 from gear.values.serial import Json
 from gear.verbs.evaluate.alarm_notes import alarm_notes
 from gear.verbs.evaluate.compare import EvaluatedDataset, compared, drive_note, row_report, together
@@ -76,6 +76,7 @@ def evaluate(
     progress: bool = False,
     on_progress: Progress | None = None,
     on_fit_progress: Progress | None = None,
+    on_fit_phase: PhaseProgress | None = None,
     on_warning: Warn | None = None,
 ) -> EvaluateReport:
     """Evaluates a model, with or without a defense, on datasets of its task; resumes an interrupted run.
@@ -112,6 +113,8 @@ def evaluate(
         progress: shows a progress bar.
         on_progress: called after every sample; with an engine, first after every dataset.
         on_fit_progress: called after every calibration sample that the defense reads for the first time.
+        on_fit_phase: called with (unit, done, total) after every step of a phase of the calibration, such as a training
+            step, if the defense reports its phases.
         on_warning: called with one line per damaged prediction that is made again, and per problem of the defense's
             calibration.
 
@@ -135,7 +138,9 @@ def evaluate(
         pictures=pictures,
         pools=pools or {},
     )
-    callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
+    callbacks = Callbacks.of(
+        on_progress=on_progress, on_fit_progress=on_fit_progress, on_fit_phase=on_fit_phase, on_warning=on_warning
+    )
     with displayed(callbacks, "evaluate", progress=progress) as shown:
         return run_evaluate(request, shown)
 
@@ -155,7 +160,7 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
     datasets = opened(request.data, request.split, chosen, request.reports)
     check_pools(request.pools, [one.root for one in datasets])
     task, names = datasets[0].plan.task["name"], row_names(datasets)
-    guard = open_guard(request.guard, [chosen], task, on_fit_progress=callbacks.on_fit_progress)
+    guard = open_guard(request.guard, [chosen], task, callbacks=callbacks)
     root, learnt = request.folder(task), guard.calibration
     check_output(root, "write the evaluation into a folder of its own")
     guarded = GuardedModel(chosen, guard, seed=request.seed)

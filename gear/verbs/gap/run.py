@@ -10,7 +10,7 @@ from gear.measuring.gap.request import GapRequest
 from gear.measuring.gap.run import measure_gap
 from gear.measuring.guard import Guard
 from gear.reporting.display import displayed
-from gear.values.progress import Callbacks, Progress, Warn
+from gear.values.progress import Callbacks, PhaseProgress, Progress, Warn
 
 
 def gap(
@@ -34,6 +34,7 @@ def gap(
     progress: bool = False,
     on_progress: Progress | None = None,
     on_fit_progress: Progress | None = None,
+    on_fit_phase: PhaseProgress | None = None,
     on_warning: Warn | None = None,
 ) -> GapReport:
     """Compares composed patches (pasted into pictures) with the same patches rendered: in pixels and in their effect.
@@ -57,6 +58,8 @@ def gap(
         progress: shows a progress bar.
         on_progress: called after every sample.
         on_fit_progress: called after every calibration sample that the defense reads for the first time.
+        on_fit_phase: called with (unit, done, total) after every step of a phase of the calibration, such as a training
+            step, if the defense reports its phases.
         on_warning: called before anything is rendered with lines on settings that may be unintended, such as pictures
             of another size than the model was trained on, or doubtful calibration data.
 
@@ -78,6 +81,8 @@ def gap(
         out=out,
         seed=seed,
     )
-    callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_warning=on_warning)
+    callbacks = Callbacks.of(
+        on_progress=on_progress, on_fit_progress=on_fit_progress, on_fit_phase=on_fit_phase, on_warning=on_warning
+    )
     with displayed(callbacks, "gap", progress=progress) as shown:
         return measure_gap(request, shown)

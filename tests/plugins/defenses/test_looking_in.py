@@ -9,6 +9,7 @@ import pytest
 import torch
 from torch import nn
 
+from gear.contracts.defenses import FitsInPhases
 from gear.contracts.models import Model
 from gear.plugins.defenses import fpda, hyperneuron, zmask
 from gear.plugins.defenses.activations import mask_block
@@ -250,7 +251,14 @@ def test_zmask_looks_at_the_layers_that_tell_where_its_patches_are() -> None:
     """Noise averages out in the stem: that layer tells less than the trunk, and would drown it."""
     model = TinySegmenter(TinyConfig())
     defense = zmask.build(zmask.ZMaskConfig(**SMALL, false_alarms=0.1))  # type: ignore[arg-type]
-    state = defense.fit(samples(12, is_patched=False), samples(12, is_patched=True), model, derive_rng(SEED, "fit"))
+    assert isinstance(defense, FitsInPhases)
+    phases: dict[str, tuple[int, int]] = {}
+    twins = (samples(12, is_patched=False), samples(12, is_patched=True))
+    state = defense.fit_in_phases(
+        *twins, model, derive_rng(SEED, "fit"), lambda unit, *step: phases.update({unit: step})
+    )
+    assert list(phases) == ["clean picture", "layer comparison", "training pair", "training step", "clean score"]
+    assert all(done == total > 0 for done, total in phases.values())
     report = state.fit_report()
     assert "trunk" in state.layers.shallow
     assert report.values["loss"] < report.values["constant_loss"] and report.values["mask_iou"] > 0.3

@@ -13,6 +13,7 @@ from gear.contracts.models import Model
 from gear.networks.network import as_batch
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
+from gear.values.progress import Progress
 
 PAPERS_DEEPEST = "ct1"
 """Layer of BiSeNet that Z-Mask's supplement uses for detection, although `ct0` is deeper."""
@@ -110,12 +111,15 @@ def deepest(model: Model, views: Mapping[str, UInt8Image]) -> str:
     return min(reversed(names), key=lambda name: maps[name].shape[1] * maps[name].shape[2])
 
 
-def spread(items: Sequence[Any], max_count: int) -> Iterator[Any]:
-    """Returns at most `max_count` items of a sequence, evenly spaced, starting with the first.
+def spread(items: Sequence[Any], max_count: int, on_item: Progress) -> Iterator[Any]:
+    """Yields at most `max_count` items of a sequence, evenly spaced, starting with the first.
 
     Args:
-        items: the sequence.
+        items: the sequence; an item is read only when it is yielded.
         max_count: largest number of items, at least 1.
+        on_item: called after the use of each item with the numbers of used and of all yielded items.
     """
     count = min(max_count, len(items))
-    return (items[index * len(items) // count] for index in range(count))
+    for index in range(count):
+        yield items[index * len(items) // count]
+        on_item(index + 1, count)

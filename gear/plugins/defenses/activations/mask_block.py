@@ -11,6 +11,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from gear.values.progress import NO_CALLBACKS, Progress
+
 LEARNING_RATE, BATCH, CELLS = 0.01, 15, 4096
 NUMBERS = 8
 
@@ -85,7 +87,9 @@ class MaskBlock:
         return (deep * shallow * mask).sum() / (1 + mask.sum())
 
 
-def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> MaskBlock:
+def learn(
+    examples: Sequence[Example], steps: int, rng: np.random.Generator, on_step: Progress = NO_CALLBACKS.on_progress
+) -> MaskBlock:
     """Calibrates a fusion block with Adam on the cross-entropy with the true masks; initial parameters come from
     U(0, 1).
 
@@ -96,13 +100,14 @@ def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> 
         examples: training examples, at least one, all on the same grid.
         steps: number of steps, each over 15 pictures, or over all if there are fewer.
         rng: random generator of the initial parameters and of the subsets.
+        on_step: called with the numbers of finished and of all steps after every step.
     """
     numbers = torch.tensor(rng.uniform(0, 1, NUMBERS), dtype=torch.float32, requires_grad=True)
     optimiser = torch.optim.Adam([numbers], lr=LEARNING_RATE)
     shallow, deep, truth = _stacked(examples)
     count, cells = shallow.shape
     with torch.enable_grad():
-        for _ in range(steps):
+        for step in range(steps):
             rows = torch.from_numpy(rng.permutation(count)[:BATCH])[:, None]
             columns = torch.from_numpy(rng.integers(0, cells, (len(rows), min(cells, CELLS))))
             said = MaskBlock(numbers).mask(shallow[rows, columns], deep[rows, columns])
@@ -110,6 +115,7 @@ def learn(examples: Sequence[Example], steps: int, rng: np.random.Generator) -> 
             optimiser.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
             optimiser.step()
+            on_step(step + 1, steps)
     return MaskBlock(numbers.detach())
 
 

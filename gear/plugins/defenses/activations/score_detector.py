@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -24,6 +25,7 @@ from gear.plugins.defenses.activations.z_scores import (
 )
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
+from gear.values.progress import NO_CALLBACKS, PhaseProgress
 
 Views = Mapping[str, UInt8Image]
 
@@ -91,16 +93,44 @@ class Detector:
         Raises:
             GearError: there are too few pictures, they differ in size, or the model has no such feature map.
         """
+        return self.fit_in_phases(clean, patched, model, rng, NO_CALLBACKS.on_fit_phase)
+
+    def fit_in_phases(
+        self,
+        clean: Sequence[Views],
+        patched: Sequence[Views],
+        model: Model | None,
+        rng: np.random.Generator,
+        on_phase: PhaseProgress,
+    ) -> DetectorState:
+        """Calibrates the detector as `fit` does, and reports the progress of each phase.
+
+        Args:
+            clean, patched, model, rng: as in `fit`.
+            on_phase: called with the unit of the phase and the numbers of finished and of all steps.
+
+        Raises:
+            GearError: as in `fit`.
+        """
         assert model is not None
         if len(clean) < FOLDS:
             raise GearError(f"calibration needs at least {FOLDS} clean pictures; there are {len(clean)}")
         layer = self._layer or deepest(model, clean[0])
         folds = [range(first, len(clean), FOLDS) for first in range(FOLDS)]
-        parts = [moments(self._numbers(model, clean[i], layer) for i in fold) for fold in folds]
-        scores = []
+        read = itertools.count(1)
+
+        def features(index: int) -> Tensor:
+            found = self._numbers(model, clean[index], layer)
+            on_phase("clean picture", next(read), len(clean))
+            return found
+
+        parts = [moments(features(i) for i in fold) for fold in folds]
+        scores: list[float] = []
         for number, fold in enumerate(folds):
             others = functools.reduce(Moments.merged, parts[:number] + parts[number + 1 :]).clean_statistics()
-            scores += [self._raw(others, self._numbers(model, clean[i], layer)) for i in fold]
+            for i in fold:
+                scores.append(self._raw(others, self._numbers(model, clean[i], layer)))
+                on_phase("clean score", len(scores), len(clean))
         level = alarm_level(scores, self._false_alarms)
         low, high = false_alarm_interval(len(scores), self._false_alarms)
         values = {"clean_pictures": len(scores), "level": level, "false_alarms_low": low, "false_alarms_high": high}

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -39,6 +40,7 @@ from gear.plugins.defenses.activations.zmask_layers import Layers, NetworkInput,
 from gear.plugins.defenses.activations.zmask_options import ZMaskConfig
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
+from gear.values.progress import NO_CALLBACKS, PhaseProgress
 
 LAYER_PICTURES = 12
 """Largest number of patched calibration pictures from which the layers are selected."""
@@ -105,6 +107,25 @@ class ZMask:
         Raises:
             GearError: there are no pictures, clean and patched pictures show different scenes, or no patch is visible.
         """
+        return self.fit_in_phases(clean, patched, model, rng, NO_CALLBACKS.on_fit_phase)
+
+    def fit_in_phases(
+        self,
+        clean: Sequence[Views],
+        patched: Sequence[Views],
+        model: Model | None,
+        rng: np.random.Generator,
+        on_phase: PhaseProgress,
+    ) -> ZMaskState:
+        """Calibrates the defense as `fit` does, and reports the progress of each phase.
+
+        Args:
+            clean, patched, model, rng: as in `fit`.
+            on_phase: called with the unit of the phase and the numbers of finished and of all steps.
+
+        Raises:
+            GearError: as in `fit`.
+        """
         assert model is not None
         if not len(clean) or not len(patched):
             raise GearError(
@@ -116,18 +137,18 @@ class ZMask:
                 f"the calibration data are no twins: {len(clean)} clean samples, and {len(patched)} with patches"
             )
         layers = layers_of(model, self._settings.shallow, self._settings.deep)
-        statistics = self._statistics(clean, model, layers)
-        layers = self._telling(clean, patched, model, layers, statistics)
-        examples = list(self._examples(clean, patched, model, layers, statistics))
+        statistics = self._statistics(clean, model, layers, on_phase)
+        layers = self._telling(clean, patched, model, layers, statistics, on_phase)
+        examples = list(self._examples(clean, patched, model, layers, statistics, on_phase))
         if not examples:
             raise GearError("no patch is seen in the patched calibration data: Z-Mask has nothing to learn from")
-        block = learn(examples, self._settings.steps, rng)
+        block = learn(examples, self._settings.steps, rng, partial(on_phase, "training step"))
         scores = [
             max(
                 block.score(*self._heat_maps(model, net_input, layers, statistics))
                 for net_input in network_inputs(sample)
             )
-            for sample in spread(clean, self._settings.max_patched_pictures)
+            for sample in spread(clean, self._settings.max_patched_pictures, partial(on_phase, "clean score"))
         ]
         level = alarm_level(scores, self._settings.false_alarms)
         report = _fit_report(fit_of(block, examples), len(examples), len(scores), self._settings.false_alarms, level)
@@ -230,9 +251,11 @@ class ZMask:
         """
         return model
 
-    def _statistics(self, clean: Sequence[Views], model: Model, layers: Layers) -> dict[str, ChannelStatistics]:
+    def _statistics(
+        self, clean: Sequence[Views], model: Model, layers: Layers, on_phase: PhaseProgress
+    ) -> dict[str, ChannelStatistics]:
         each: dict[str, list[ChannelStatistics]] = {name: [] for name in layers.all()}
-        for sample in spread(clean, self._settings.max_clean_pictures):
+        for sample in spread(clean, self._settings.max_clean_pictures, partial(on_phase, "clean picture")):
             net_input = network_inputs(sample)[0]
             grid = self._grid(*net_input.views[net_input.camera].shape[:2])
             for name, features in feature_maps(model, net_input.views, layers.all()).items():
@@ -246,9 +269,11 @@ class ZMask:
         model: Model,
         layers: Layers,
         statistics: Mapping[str, ChannelStatistics],
+        on_phase: PhaseProgress,
     ) -> Iterator[Example]:
         """Yields training examples: the heat maps of each picture in which a patch is visible, with the true mask."""
-        for number in spread(range(len(patched)), self._settings.max_patched_pictures):
+        on_pair = partial(on_phase, "training pair")
+        for number in spread(range(len(patched)), self._settings.max_patched_pictures, on_pair):
             without, net_input = network_inputs(clean[number])[0], network_inputs(patched[number])[0]
             area = patch_area(without.views[net_input.camera], net_input.views[net_input.camera], number)
             if area.any():
@@ -314,6 +339,7 @@ class ZMask:
         model: Model,
         layers: Layers,
         statistics: Mapping[str, ChannelStatistics],
+        on_phase: PhaseProgress,
     ) -> Layers:
         """Selects the layers whose common heat map separates patches from other cells in the calibration pictures.
 
@@ -327,7 +353,7 @@ class ZMask:
         every = Layers(shallow=layers.all(), deep=layers.all())
         heats: dict[str, dict[str, list[Tensor]]] = {"shallow": {}, "deep": {}}
         truths = []
-        for number in spread(range(len(patched)), LAYER_PICTURES):
+        for number in spread(range(len(patched)), LAYER_PICTURES, partial(on_phase, "layer comparison")):
             without, net_input = network_inputs(clean[number])[0], network_inputs(patched[number])[0]
             grid = self._grid(*net_input.views[net_input.camera].shape[:2])
             truths.append(

@@ -86,8 +86,10 @@ def test_the_deepest_map_is_the_smallest() -> None:
 
 
 def test_samples_are_spread_over_all_of_them() -> None:
-    assert list(spread(range(10), 5)) == [0, 2, 4, 6, 8]
-    assert list(spread(range(3), 5)) == [0, 1, 2]
+    seen: list[tuple[int, int]] = []
+    assert list(spread(range(10), 5, lambda *step: seen.append(step))) == [0, 2, 4, 6, 8]
+    assert seen == [(1, 5), (2, 5), (3, 5), (4, 5), (5, 5)]
+    assert list(spread(range(3), 5, lambda *step: None)) == [0, 1, 2]
 
 
 def test_a_mirror_makes_the_right_picture_a_left_one() -> None:

@@ -52,6 +52,12 @@ def test_it_learns_where_patches_are() -> None:
     assert block.score(new.shallow, new.deep) > 3 * block.score(clean, clean)
 
 
+def test_every_training_step_is_reported() -> None:
+    seen: list[tuple[int, int]] = []
+    learn([example(1)], 3, np.random.Generator(np.random.PCG64(8)), lambda *step: seen.append(step))
+    assert seen == [(1, 3), (2, 3), (3, 3)]
+
+
 def test_the_same_generator_learns_the_same() -> None:
     blocks = [learn([example(1), example(2)], 5, np.random.Generator(np.random.PCG64(8))) for _ in range(2)]
     assert torch.equal(blocks[0].numbers, blocks[1].numbers)

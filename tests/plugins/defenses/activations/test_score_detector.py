@@ -50,6 +50,15 @@ def test_its_report_has_the_level_and_its_bounds(model: Any) -> None:
     assert 0 <= values["false_alarms_low"] < 0.1 < values["false_alarms_high"] < 1
 
 
+def test_calibration_reports_both_phases(model: Any) -> None:
+    seen: list[tuple[str, int, int]] = []
+    guard, clean = detector(), pictures(COUNT)
+    state = guard.fit_in_phases(clean, [], model, np.random.default_rng(0), lambda *step: seen.append(step))
+    counts = [(done, COUNT) for done in range(1, COUNT + 1)]
+    assert seen == [("clean picture", *one) for one in counts] + [("clean score", *one) for one in counts]
+    assert state.level == guard.fit(clean, [], model, np.random.default_rng(0)).level
+
+
 def test_a_batch_has_the_scores_of_its_pictures_and_gradients(model: Any) -> None:
     rng, clean = np.random.default_rng(0), pictures(COUNT)
     guard = detector()
