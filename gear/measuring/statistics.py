@@ -252,7 +252,8 @@ def auroc_interval(
     value = auroc(positives, negatives)
     if len(kept) > 1 and value in (0.0, 1.0):
         return separated_interval(value, len(kept))
-    return jackknife_interval(value, np.array([auroc(high[row], low[row]) for row in kept]), (0.0, 1.0))
+    replicates = np.array([auroc(high[row], low[row]) for row in kept])
+    return jackknife_interval(value, replicates, (0.0, 1.0), lost_degrees=1)  # 2 covers 97.8 % of eight scenes
 
 
 def clustered(differences: Values, clusters: Sequence[Hashable]) -> Values:

@@ -44,7 +44,7 @@ def test_of_a_symmetric_mean_it_is_students() -> None:
     half = derive_rng(0, "mean").normal(3, 2, 6)
     values = np.concatenate([half, 6 - half])
     interval = jackknife_interval(float(values.mean()), (values.sum() - values) / 11)
-    reach = 2.200985 * values.std(ddof=1) / math.sqrt(12)  # t of 11 degrees of freedom
+    reach = 2.228139 * values.std(ddof=1) / math.sqrt(12)  # t of 10 degrees of freedom
     assert interval == pytest.approx((values.mean() - reach, values.mean() + reach))
 
 
@@ -77,7 +77,7 @@ def test_the_longer_side_of_an_interval_is_that_of_the_long_tail(sign: int) -> N
     error = values.std(ddof=1) / math.sqrt(12)
     a = float(skew(values)) / math.sqrt(12)
     squares = np.square(values - values.mean())
-    reach = students_t.ppf(0.975, min(11, 3 * (squares.sum() ** 2 / np.square(squares).sum() - 1)))
+    reach = students_t.ppf(0.975, min(10, 3 * (squares.sum() ** 2 / np.square(squares).sum() - 1) - 1))
     for end, quantile in ((low, reach), (high, -reach)):
         studentised = (values.mean() - end) / error
         transformed = studentised + a * studentised**2 / 3 + a**2 * studentised**3 / 27 + a / 6
@@ -85,11 +85,11 @@ def test_the_longer_side_of_an_interval_is_that_of_the_long_tail(sign: int) -> N
 
 
 def test_few_streets_that_matter_count_for_few() -> None:
-    """Of twenty streets two show the class: three degrees of freedom, not nineteen, whose t is 2.1."""
+    """Of twenty streets two show the class: two degrees of freedom, not eighteen, whose t is 2.1."""
     replicates = np.array([0.4, 0.6] + [0.5] * 18)
     low, high = jackknife_interval(0.5, replicates) or (0, 0)
     error = math.sqrt(19 / 20 * np.square(replicates - 0.5).sum())
-    assert (high - low) / 2 == pytest.approx(3.182446 * error)
+    assert (high - low) / 2 == pytest.approx(4.302653 * error)
 
 
 def test_scores_that_happen_to_be_separated_may_not_always_be() -> None:
@@ -146,8 +146,9 @@ def test_ap_r40_of_few_labels_is_not_that_of_many() -> None:
 
 def test_without_a_correction_for_skewness_they_are_too_narrow() -> None:
     kind = BY_NAME["mean of a skewed error (skewness 3.7)"]
-    found = coverage(kind, samples=10, simulations=1000, methods=("student", "gear"), seed=1)
-    assert found["student"] < 0.90 < found["gear"], found
+    found = coverage(kind, samples=6, simulations=3000, methods=("student", "gear"), seed=1)
+    assert found["student"] < 0.885, found
+    assert found["gear"] >= 0.915, "0.92, and a standard error of 0.005 of 3000 simulations"
 
 
 def test_percentiles_of_a_bootstrap_do_not() -> None:
