@@ -381,7 +381,7 @@ def straight_on(graph: LaneGraph, lane: str, length_m: float) -> tuple[str, ...]
         length_m: length at which the search ends, in metres, counted from the start of the first lane.
 
     Returns:
-        Names of the lanes in driving order. They are shorter than `length_m` in all if the road ends earlier.
+        Names of the lanes in driving order. Together the lanes are shorter than `length_m` if the road ends earlier.
     """
     names, total_m = [lane], graph.lanes[lane].line.length_m
     while total_m < length_m and graph.lanes[names[-1]].next:

@@ -64,7 +64,7 @@ class CameraMount:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """The pinhole intrinsics that follow from the camera's options, in index pixels."""
+        """The intrinsics of the pinhole camera in index pixels: the centre of the first pixel is (0, 0)."""
         focal_px = self.focal_px
         if focal_px is None:
             focal_px = Intrinsics.from_hfov(self.width_px, self.height_px, math.radians(self.hfov_deg)).focal_px

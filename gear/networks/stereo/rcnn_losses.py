@@ -251,11 +251,13 @@ class SampledPairs:
 
 
 def sample_pairs(left: Tensor, right: Tensor, cars: CarTargets, draws: torch.Generator) -> SampledPairs:
-    """Samples box pairs from proposals and ground truth: at most a quarter of the pairs overlap a car in both
-    pictures; all further pairs overlap a car only partly, or none if the picture has no car.
+    """Samples pairs of boxes for the training of the second stage, from the proposals and the boxes of the cars.
+
+    At most a quarter of the sampled pairs overlap the same car in both pictures by an IoU of at least 0.5. The other
+    pairs overlap a car by an IoU of 0.1 to 0.5 in at least one picture. If there is no car, all pairs are background.
 
     Args:
-        left, right: (P, 4) proposals.
+        left, right: (P, 4) proposals in the left and the right picture: left, top, right, bottom.
         cars: training targets of the picture.
         draws: random generator that samples pairs.
     """
