@@ -1,7 +1,8 @@
 """Sphinx's configuration. `./run docs` builds the site strictly: every warning is an error (`-W -n`).
 
 Sphinx with MyST and Furo was chosen over MkDocs because it is maintained, checks every reference between pages and into
-the Python API itself, and needs no further plugins for the API reference or the search.
+the Python API itself, and needs no further plugins for the API reference or the search. MyST-NB runs the notebooks of
+`examples/notebooks` in the build.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ author = "The gear authors"
 project_copyright = author
 version = release = installed_version("mujoco-gear")
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "gear_site"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton", "gear_site"]
 exclude_patterns = ["_build", "_ext", "mjcf-conventions.md"]
 html_theme = "furo"
 html_title = "gear"
@@ -27,6 +28,12 @@ templates_path: list[str] = []
 
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
+
+# Notebooks are committed without outputs: the build runs them, in a temporary folder, and an error fails the build.
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_timeout = 900
+nb_execution_raise_on_error = True
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"

@@ -34,10 +34,12 @@ PUBLIC = (
 """Packages and modules that users and plugin authors import; with `gear` itself they are the Python API."""
 
 GENERATED = "reference/generated"
+NOTEBOOKS = Path(__file__).parents[2] / "examples" / "notebooks"
+"""Notebooks, which become pages of the site."""
 
 
 def write_generated_pages(app: Sphinx) -> None:
-    """Writes the pages of commands, plugins and Python modules into the source folder."""
+    """Writes the pages of commands, plugins, Python modules and notebooks into the source folder."""
     folder = Path(app.srcdir) / GENERATED
     folder.mkdir(parents=True, exist_ok=True)
     pages = {"cli.md": cli_pages.page(), "plugins.md": plugin_pages.page(), "gear.md": _top_page()}
@@ -45,6 +47,9 @@ def write_generated_pages(app: Sphinx) -> None:
     pages |= {f"{name}.md": _module_page(name) for name in names}
     pages["api.md"] = _index(["gear", *names])
     for stale in set(folder.glob("*.md")) - {folder / name for name in pages}:
+        stale.unlink()
+    pages |= {path.name: path.read_text(encoding="utf-8") for path in sorted(NOTEBOOKS.glob("*.ipynb"))}
+    for stale in set(folder.glob("*.ipynb")) - {folder / name for name in pages}:
         stale.unlink()
     for name, text in pages.items():
         path = folder / name

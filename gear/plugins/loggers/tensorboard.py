@@ -67,7 +67,7 @@ def build(config: TensorBoardConfig) -> Logger:
 
 spec = LoggerSpec(
     name="tensorboard",
-    summary="Curves, figures and settings for TensorBoard, in the folder `log` of the run's results.",
+    summary="Curves, figures and settings of a run, for TensorBoard.",
     config=TensorBoardConfig,
     build=build,
 )

@@ -15,6 +15,7 @@ from gear.contracts.loggers import LoggedRun
 from gear.contracts.specs import LoggerSpec
 from gear.measuring import run_log
 from gear.measuring.sample_figures import CELL_WIDTH_PX
+from gear.reporting.picture_grid import CAPTION_PX
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.values.errors import GearError, UnknownNameError
 from gear.verbs.attack import monitor
@@ -22,7 +23,7 @@ from gear.verbs.attack.curve_titles import curve_title
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.run_log import FIGURE
 from tests.plugins.loggers.reading import read_log
-from tests.verbs.attack.conftest import SMALL
+from tests.verbs.attack.conftest import SMALL, wrapping
 from tests.verbs.conftest import Install, Nothing, Small
 
 pytest.importorskip("tensorboard")
@@ -220,3 +221,17 @@ def test_finished_patches_are_not_logged_again(small: Small, install: Install, t
     logged(small, tmp_path / "out", val=(), force=True, steps=1)
     found = read_log(tmp_path / "out/log")
     assert {step for name in found.scalars for step, _ in found.scalars[name]} == {1}
+
+
+def test_predictions_in_figures_are_those_behind_the_defense(small: Small, install: Install, tmp_path: Path) -> None:
+    install(tiny_segmenter, wrapping)
+    clean = []
+    for defense in (None, "wrapping"):
+        warnings: list[str] = []
+        out = tmp_path / str(defense)
+        logged(small, out, steps=1, val=(), defense=defense, on_warning=warnings.append)
+        assert not warnings
+        line = picture_of(out / "figures/samples.png")[: 240 + CAPTION_PX]
+        clean.append((line[:, :CELL_WIDTH_PX], line[:, CELL_WIDTH_PX : 2 * CELL_WIDTH_PX]))
+    (picture, prediction), (same_picture, defended) = clean
+    assert np.array_equal(picture, same_picture) and not np.array_equal(prediction, defended)
