@@ -25,7 +25,7 @@ _SETTINGS = ("MUJOCO_GL", "PYOPENGL_PLATFORM")
 def backend_setting() -> str | None:
     """Name of the environment variable that selects EGL or OSMesa in this process; None if no variable does.
 
-    PyOpenGL binds a process to one platform until the process ends, and then sets `PYOPENGL_PLATFORM`.
+    On its first use, PyOpenGL binds the process to one platform until the process ends, and sets `PYOPENGL_PLATFORM`.
     """
     for name in _SETTINGS:
         if os.environ.get(name, "").strip().lower() in ("egl", "osmesa"):

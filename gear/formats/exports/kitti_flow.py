@@ -81,7 +81,7 @@ def _pair(split: ExportSplit, first: Sidecar, second: Sidecar, read: Read) -> It
 def object_map(actor_id: UInt16Image) -> UInt8Image:
     """(H, W) uint8 numbers of the road users in a picture, in the order of their ids, from 1; 0 is the background.
 
-    From the 255th road user on, all have the number 255; the benchmark only tells them from the background.
+    From the 255th road user on, all have the number 255: the benchmark only separates them from the background.
 
     Args:
         actor_id: (H, W) id of the road user at each pixel; 0 for the background.

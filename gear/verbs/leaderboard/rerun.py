@@ -320,7 +320,7 @@ def _numbers(samples: Sequence[int]) -> str:
 
 
 def moved_patches(record: Record, target: str, scenes: Sequence[str]) -> list[PatchFacts]:
-    """The patches of the first scene of a record as those of other scenes.
+    """The patches that a record names for its first scene, once for each other scene, to be shown there.
 
     Args:
         record: the record.
