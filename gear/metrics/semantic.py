@@ -87,7 +87,7 @@ class SemanticEvaluator:
         confusion = _confusion(sample.label_ids.reshape(-1), prediction.reshape(-1))
         self.confusion += confusion
         self._weigh(sample.instance_ids, prediction)
-        return {"miou": float(_mean(self._classes(confusion)))}
+        return {"miou": float(mean_known(self._classes(confusion)))}
 
     def _weigh(self, instances: npt.NDArray[np.uint16], prediction: npt.NDArray[np.uint8]) -> None:
         chosen = instances >= INSTANCE_FACTOR
@@ -163,10 +163,12 @@ class SemanticEvaluator:
         confusion = totals["confusion"]
         classes = self._classes(confusion)
         metrics = {
-            "miou": _mean(classes),
-            "iiou": _mean(_instance_iou(confusion, totals["tp"], totals["fn"])),
-            "category_miou": _mean(_category_iou(confusion)),
-            "category_iiou": _mean(_category_instance_iou(confusion, totals["category_tp"], totals["category_fn"])),
+            "miou": mean_known(classes),
+            "iiou": mean_known(_instance_iou(confusion, totals["tp"], totals["fn"])),
+            "category_miou": mean_known(_category_iou(confusion)),
+            "category_iiou": mean_known(
+                _category_instance_iou(confusion, totals["category_tp"], totals["category_fn"])
+            ),
             "pixel_accuracy": _accuracy(confusion),
         }
         return metrics | {f"iou_{name.replace(' ', '_')}": value for name, value in classes.items()}
@@ -191,7 +193,7 @@ class PresentClasses(SemanticEvaluator):
             totals: counts by name, as `totals` gives them.
         """
         classes = self._classes(totals["confusion"])
-        return {"miou": _mean(classes)} | {f"iou_{name.replace(' ', '_')}": iou for name, iou in classes.items()}
+        return {"miou": mean_known(classes)} | {f"iou_{name.replace(' ', '_')}": iou for name, iou in classes.items()}
 
     def _classes(self, confusion: npt.NDArray[Any]) -> dict[str, Values]:
         """IoU by name of the classes over which the mean is taken; NaN for classes that do not occur."""
@@ -241,12 +243,12 @@ def _category_iou(confusion: npt.NDArray[Any]) -> dict[str, Values]:
 def _iou(confusion: npt.NDArray[Any], ids: Sequence[int]) -> Values:
     tp = _block(confusion, ids, ids)
     fn = _block(confusion, ids, range(COUNT)) - tp
-    return _quotient(tp, tp + fn + _false_positives(confusion, ids))
+    return quotient(tp, tp + fn + _false_positives(confusion, ids))
 
 
 def _instance_iou(confusion: npt.NDArray[Any], tp: Values, fn: Values) -> dict[str, Values]:
     return {
-        label.name: _quotient(
+        label.name: quotient(
             tp[..., label.id], tp[..., label.id] + fn[..., label.id] + _false_positives(confusion, [label.id])
         )
         for label in EVALUATED
@@ -261,23 +263,32 @@ def _category_instance_iou(confusion: npt.NDArray[Any], tp: Values, fn: Values) 
         ids = _ids(category, LABELS)
         if all(LABELS[i].has_instances for i in ids):
             hit, missed = tp[..., ids].sum(axis=-1), fn[..., ids].sum(axis=-1)
-            metrics[category] = _quotient(hit, hit + missed + _false_positives(confusion, ids))
+            metrics[category] = quotient(hit, hit + missed + _false_positives(confusion, ids))
     return metrics
 
 
 def _accuracy(confusion: npt.NDArray[Any]) -> Values:
     counted = [label.id for label in EVALUATED]
     right = np.diagonal(confusion, axis1=-2, axis2=-1)[..., counted].sum(axis=-1)
-    return _quotient(right, confusion[..., counted, :].sum(axis=(-2, -1)))
+    return quotient(right, confusion[..., counted, :].sum(axis=(-2, -1)))
 
 
-def _quotient(part: npt.NDArray[Any], whole: npt.NDArray[Any]) -> Values:
-    """Quotient; NaN where the denominator is 0."""
+def quotient(part: npt.NDArray[Any], whole: npt.NDArray[Any]) -> Values:
+    """Divides two arrays of numbers of pixels; NaN where the divisor is 0.
+
+    Args:
+        part: dividend.
+        whole: divisor, of the same shape.
+    """
     return np.asarray(np.divide(part, np.where(whole, whole, np.nan)), np.float64)
 
 
-def _mean(values: Mapping[str, Values]) -> Values:
-    """Mean of the values that are not NaN; NaN if all are."""
+def mean_known(values: Mapping[str, Values]) -> Values:
+    """Returns the mean of the values that are not NaN; NaN if all are.
+
+    Args:
+        values: values by name, each a scalar or one value per resampled dataset.
+    """
     every = np.stack(list(values.values()))
     known = ~np.isnan(every)
-    return _quotient(np.where(known, every, 0).sum(axis=0), known.sum(axis=0))
+    return quotient(np.where(known, every, 0).sum(axis=0), known.sum(axis=0))

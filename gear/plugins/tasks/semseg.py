@@ -26,6 +26,7 @@ from gear.formats.label_png import encode_label_map, encode_painted
 from gear.formats.pixel_runs import Runs
 from gear.formats.png import encode_rgb
 from gear.groundtruth.label_maps import coarsen, instance_map, label_map
+from gear.metrics.critical_classes import CRITICAL, CriticalClasses
 from gear.metrics.semantic import PresentClasses, SemanticEvaluator
 from gear.plugins.tasks.common import (
     CameraOptions,
@@ -208,8 +209,10 @@ class SemsegTask:
         return SemanticEvaluator()
 
     def reports(self) -> Mapping[str, Evaluator[SemsegSample, npt.NDArray[np.uint8]]]:
-        """Further evaluators by name: `reference` is the mIoU over the classes that occur, without the class train."""
-        return {"reference": PresentClasses()}
+        """Further evaluators by name: `reference` is the mIoU over the classes that occur, without the class train;
+        `critical` evaluates road users, traffic lights and signs.
+        """
+        return {"reference": PresentClasses(), CRITICAL: CriticalClasses()}
 
     def without(self, sample: SemsegSample, masks: Masks) -> SemsegSample:
         """Returns a copy of the sample whose pixels inside the mask are unlabelled, so no metric counts these

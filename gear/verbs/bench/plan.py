@@ -16,6 +16,7 @@ from gear.contracts.specs import AttackSpec
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
 from gear.measuring.guard import Guard
 from gear.measuring.reports import OUTSIDE_PATCH
+from gear.metrics.critical_classes import CRITICAL
 from gear.metrics.obstacle_depth import NEAREST_OBSTACLE
 from gear.plugins.build import build, find
 from gear.values.rng import derive_rng
@@ -373,7 +374,7 @@ class Plan:
 
 def reports_of(task_plugins: TaskPlugins) -> tuple[str, ...]:
     """Returns the names of the metric reports that the tables need: the report with the task's main metric,
-    `outside_patch`, and for depth `nearest_obstacle`.
+    `outside_patch`, for depth `nearest_obstacle`, and for semantic segmentation `critical`.
 
     Args:
         task_plugins: networks and defenses of the task.
@@ -382,7 +383,7 @@ def reports_of(task_plugins: TaskPlugins) -> tuple[str, ...]:
     metric_report, dot, _ = task_plugins.task.metric.partition(".")
     wanted = [metric_report] if dot and isinstance(product, Reports) else []
     own = product.reports() if isinstance(product, Reports) else {}
-    wanted += [NEAREST_OBSTACLE] if NEAREST_OBSTACLE in own and NEAREST_OBSTACLE not in wanted else []
+    wanted += [name for name in (NEAREST_OBSTACLE, CRITICAL) if name in own and name not in wanted]
     return (*wanted, *([OUTSIDE_PATCH] if isinstance(product, Maskable) else []))
 
 
