@@ -16,7 +16,10 @@ from gear.plugins.controllers.corridor import Corridor
 from gear.plugins.controllers.tracker import Sighting
 
 FORESIGHT_S = {"person": 3.0, "vehicle": 1.0}
-"""Time over which the motion of a road user is continued in a straight line along the path, seconds."""
+"""Time over which the motion of a road user is continued, seconds: people in a straight line, vehicles on a circle."""
+
+MOST_TURNING_RADPS = 1.5
+"""Largest turning rate of a vehicle that is continued, rad/s."""
 
 FORESIGHT_STEP_S = 0.1
 ONCOMING_MPS = -1.0
@@ -26,7 +29,18 @@ because it keeps to its own lane.
 
 
 class Truth(Baseline):
-    """The baseline driver with the true positions of all road users, and their motion over the next seconds."""
+    """The baseline driver with the true positions of all road users, and their motion over the next seconds: people
+    walk on, vehicles keep their speed and their turning rate.
+    """
+
+    def reset(self, seed: int) -> None:
+        """Forgets the road users of an earlier drive.
+
+        Args:
+            seed: not used.
+        """
+        Baseline.reset(self, seed)
+        self._yaws: dict[int, tuple[float, float]] = {}
 
     def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
         """Returns the nearest road user that is in the corridor, or that will be there when the car arrives, or the
@@ -36,16 +50,37 @@ class Truth(Baseline):
             observation: the frame with the true road users.
             corridor: the strip of road that the car needs, in the ego frame.
         """
-        seen = [self._sighting(observation, corridor, obstacle) for obstacle in observation.obstacles]
+        turning = self._turning_radps(observation)
+        seen = [
+            self._sighting(observation, corridor, obstacle, turning.get(obstacle.id, 0.0))
+            for obstacle in observation.obstacles
+        ]
         if observation.red_light_m is not None:
             seen.append(Sighting(gap_m=observation.red_light_m, speed_mps=0.0))
         return min((one for one in seen if one is not None), key=lambda one: one.gap_m, default=None)
 
-    def _sighting(self, observation: Observation, corridor: Corridor, obstacle: Obstacle) -> Sighting | None:
+    def _turning_radps(self, observation: Observation) -> dict[int, float]:
+        """The turning rates of vehicles by id, from their headings in this frame and in the frame before it."""
+        ego = observation.ego
+        own_radps = ego.speed_mps * math.tan(ego.steering_rad) / observation.car.wheelbase_m
+        rates, yaws = {}, {}
+        for obstacle in observation.obstacles:
+            yaws[obstacle.id] = (observation.time_s, obstacle.yaw_rad)
+            seen_s, yaw_rad = self._yaws.get(obstacle.id, (observation.time_s, 0.0))
+            if obstacle.kind == "vehicle" and observation.time_s > seen_s:
+                turned_rad = math.remainder(obstacle.yaw_rad - yaw_rad, 2 * math.pi)
+                rate = turned_rad / (observation.time_s - seen_s) + own_radps
+                rates[obstacle.id] = min(max(rate, -MOST_TURNING_RADPS), MOST_TURNING_RADPS)
+        self._yaws = yaws
+        return rates
+
+    def _sighting(
+        self, observation: Observation, corridor: Corridor, obstacle: Obstacle, turning_radps: float
+    ) -> Sighting | None:
         outline_m = outline(obstacle)
         arc_m, left_m = corridor.along(outline_m)
-        middle = np.array([[obstacle.ahead_m, obstacle.left_m]])
-        direction = corridor.directions(corridor.along(middle)[0])[0]
+        middle_arc_m, middle_left_m = corridor.along(np.array([[obstacle.ahead_m, obstacle.left_m]]))
+        direction = corridor.directions(middle_arc_m)[0]
         velocity = np.array(obstacle.velocity_mps)
         along_mps = float(direction @ velocity)
         aside_mps = float(direction[0] * velocity[1] - direction[1] * velocity[0])
@@ -57,11 +92,16 @@ class Truth(Baseline):
             return None
         for step in range(1, round(FORESIGHT_S[obstacle.kind] / FORESIGHT_STEP_S) + 1):
             later_s = step * FORESIGHT_STEP_S
-            aside_m = left_m + aside_mps * later_s
+            turned_rad = turning_radps * later_s
+            c, s = math.cos(turned_rad), math.sin(turned_rad)
+            ahead_s, left_s = (s / turning_radps, (1 - c) / turning_radps) if abs(turned_rad) > 1e-6 else (later_s, 0.0)
+            off_arc_m, off_left_m = arc_m - middle_arc_m, left_m - middle_left_m
+            aside_m = middle_left_m + aside_mps * ahead_s + along_mps * left_s + c * off_left_m + s * off_arc_m
+            later_m = middle_arc_m + along_mps * ahead_s - aside_mps * left_s + c * off_arc_m - s * off_left_m
             if aside_m.min() > corridor.half_width_m or aside_m.max() < -corridor.half_width_m:
                 continue
             reach_m = observation.ego.speed_mps * (later_s + HEADWAY_S) + STANDSTILL_GAP_M
-            gap_m = float(arc_m.min()) + along_mps * later_s - corridor.front_m
+            gap_m = float(later_m.min()) - corridor.front_m
             if 0 <= gap_m <= reach_m:
                 return Sighting(gap_m=max(0.0, float(arc_m.min()) - corridor.front_m), speed_mps=max(0.0, along_mps))
         return None

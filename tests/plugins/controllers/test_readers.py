@@ -106,6 +106,27 @@ def test_truth_stops_for_a_red_light_and_for_what_is_nearer() -> None:
     assert nearer is not None and nearer.gap_m < 15.0
 
 
+def test_truth_knows_that_a_vehicle_turns_into_the_next_lane() -> None:
+    """At its speed of 7 m/s to the left it would be in the corridor in 0.9 s; but it turns towards the next lane."""
+
+    def turning(yaw_rad: float) -> Obstacle:
+        velocity = (7.0 * np.cos(yaw_rad), 7.0 * np.sin(yaw_rad))
+        return Obstacle(
+            id=4, kind="vehicle", ahead_m=12.0, left_m=-10.0, yaw_rad=yaw_rad, half_length_m=2.1, half_width_m=0.9,
+            velocity_mps=velocity,
+        )  # fmt: skip
+
+    reader = truth.Truth(truth.BaselineConfig())
+    found = []
+    for time_s, yaw_rad in ((0.0, 1.5), (0.1, 1.42)):
+        seen = straight_road(obstacles=(turning(yaw_rad),), time_s=time_s)
+        found.append(reader.nearest(seen, Corridor.of(seen)))
+    assert found[0] is not None and found[1] is None
+    reader.reset(0)
+    seen = straight_road(obstacles=(turning(1.42),), time_s=0.1)
+    assert reader.nearest(seen, Corridor.of(seen)) is not None, "an earlier drive is forgotten"
+
+
 def test_truth_sees_who_will_step_into_the_lane() -> None:
     assert true_sighting(walker(20.0, -4.0, (0.0, 1.4))) is not None
     assert true_sighting(walker(20.0, -4.0, (0.0, 0.0))) is None, "who stands on the sidewalk is no obstacle"
