@@ -31,9 +31,8 @@ def completed(mask: Bool, sizes: Sequence[tuple[int, int]]) -> Bool:
     similarity = FIRST
     for _ in range(TRIES):
         result = np.zeros_like(mask)
-        for (height, width), values in distances:
-            for top, left in np.argwhere(values < (1 - similarity) * height * width):
-                result[top : top + height, left : left + width] = True
+        for size, values in distances:
+            result |= _union(values < (1 - similarity) * size[0] * size[1], size)
         if result.any():
             return result
         similarity *= DECAY
@@ -46,3 +45,15 @@ def _distances(mask: Bool, size: tuple[int, int]) -> npt.NDArray[np.float64]:
     sums = cv2.integral(mask.astype(np.uint8), sdepth=cv2.CV_64F)
     inside = sums[height:, width:] - sums[:-height, width:] - sums[height:, :-width] + sums[:-height, :-width]
     return np.asarray(height * width - inside + (mask.sum() - inside), np.float64)
+
+
+def _union(corners: Bool, size: tuple[int, int]) -> Bool:
+    """The union of the rectangles of one size with given upper left corners, (H, W) bool.
+
+    Sums of the corners, +1 where a rectangle begins and -1 behind its end, count the rectangles over each pixel.
+    """
+    (height, width), (rows, columns) = size, corners.shape
+    steps = np.zeros((rows + height, columns + width), np.int64)
+    for top, left, sign in ((0, 0, 1), (height, 0, -1), (0, width, -1), (height, width, 1)):
+        steps[top : top + rows, left : left + columns] += sign * corners.astype(np.int64)
+    return np.asarray(steps.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0, np.bool_)
