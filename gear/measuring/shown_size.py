@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gear.config.nodes import Place, Scalar
+from gear.config.nodes import Node, Place, Scalar
 from gear.config.overrides import with_value
 from gear.config.reader import read_node
 from gear.contracts.specs import ModelSpec, TaskSpec
@@ -19,7 +19,7 @@ from gear.measuring.plugin_selection import Chosen
 from gear.networks.input_scale import OPTION, width_share
 from gear.networks.options import NONE
 from gear.networks.shipped import trained_option
-from gear.plugins.build import find, name_of_task
+from gear.plugins.build import NO_OPTIONS, build, find, name_of_task
 from gear.values.errors import ConfigError
 
 
@@ -56,4 +56,35 @@ def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str
     return (
         f"{dataset.root}: pictures are {width_px} px wide and {spec.name} sees them at {share * width_px:.0f} px; it "
         f"learnt from {share * usual_px:.0f} px, so things look {look} than it knows them: {remedy}"
+    )
+
+
+def focal_note(model: Chosen, task: str, options: Node, where: str) -> str | None:
+    """A warning if a driver's camera shows objects smaller or larger than the training pictures of its network did.
+
+    The result is None if they have nearly the same size, if the training size is unknown, or if the user set the input
+    scale.
+
+    Args:
+        model: the network with its options.
+        task: name of the task.
+        options: options of the task, which decide the camera.
+        where: who takes the pictures, for the message, such as `driver depth`.
+    """
+    spec = model.found.spec
+    assert isinstance(spec, ModelSpec)
+    found = find("task", task)
+    config = read_node(spec.config, model.options, "")
+    weights = getattr(config, "weights", NONE)
+    if getattr(config, OPTION, 1.0) is not None or weights == NONE:
+        return None
+    here_px, usual_px = (build(found, one).rig().cameras[0].intrinsics.fx_px for one in (options, NO_OPTIONS))
+    share = width_share(round(here_px), round(usual_px))
+    if share == 1:
+        return None
+    look = "smaller" if share < 1 else "larger"
+    return (
+        f"{where}: its camera has a focal length of {here_px:.0f} px, and {spec.name} learnt from pictures of"
+        f" {usual_px:.0f} px, so things look {look} than it knows them: set options.focal_px={usual_px:.0f}, or"
+        f" model_set.{OPTION}"
     )

@@ -14,6 +14,8 @@ import torch
 from gear.cli.main import main
 from gear.config.overrides import with_overrides
 from gear.contracts.specs import ModelSpec
+from gear.measuring.plugin_selection import Chosen
+from gear.measuring.shown_size import focal_note
 from gear.networks.weights import write as write_weights
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
@@ -65,3 +67,18 @@ def test_networks_run_at_the_share_that_their_spec_names(name: str) -> None:
     network = build(found, with_overrides(NO_OPTIONS, ["weights=none", "device=cpu"]))
     scale = network.sizing.inner_px((1000, 1000))[0] / 1000 if name.startswith("retinanet") else network.input_scale
     assert isinstance(found.spec, ModelSpec) and found.spec.input_scale == scale
+
+
+def test_a_driver_whose_camera_has_another_focal_length_is_told(install: Callable[..., None]) -> None:
+    install(replace(tiny_segmenter, config=ScaledConfig, build=lambda _: TinySegmenter(TinyConfig())))
+
+    def note(options: list[str], *settings: str) -> str | None:
+        model = Chosen(found=find("model", "tiny_segmenter"), options=with_overrides(NO_OPTIONS, list(settings)))
+        return focal_note(model, "semseg", with_overrides(NO_OPTIONS, options), "driver a")
+
+    small, weights = ["width_px=1024", "height_px=512"], "weights=trained"
+    shown = note(small, weights)
+    assert shown is not None and shown.startswith("driver a: its camera has a focal length of 512 px")
+    assert "learnt from pictures of 1024 px, so things look smaller" in shown and "options.focal_px=1024" in shown
+    assert note([], weights) is None and note([*small, "focal_px=1024"], weights) is None
+    assert note(small, weights, "input_scale=1") is None and note(small) is None

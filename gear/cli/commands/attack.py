@@ -224,7 +224,12 @@ def attack_drives(args: argparse.Namespace) -> int:
         flag = given[0].removesuffix("_settings").replace("_", "-")
         raise GearError(f"--{flag} is for attacks on pictures; with --drive, the drive config names what is attacked")
     request = request_of(DriveAttackRequest, args, device=device)
-    with Display("attack", unit=unit_of_drives(request)) as display:
+    unit = unit_of_drives(request)
+    if unit == "step" and args.queries is not None:
+        raise GearError(f"attack {request.attack!r} takes steps; --queries is for attacks without gradients")
+    if unit == "query" and (args.steps, args.redrive, args.frames) != (None, None, None):
+        raise GearError(f"attack {request.attack!r} takes queries; --steps, --redrive and --frames need gradients")
+    with Display("attack", unit=unit) as display:
         report = run_attack_drive(request, display.callbacks)
     print(json.dumps(report.facts, indent=2) if args.json else report.summary())
     return 0

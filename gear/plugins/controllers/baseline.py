@@ -24,9 +24,9 @@ STANDSTILL_GAP_M, HEADWAY_S = 2.5, 1.2
 RELEASE_GAP_M = 1.0
 """Emergency braking ends when the obstacle is no longer approached and is farther away than this, or the car stands."""
 
-HOLD_MPS, HOLD_GAP_M = 0.5, 6.0
-"""A car that has stopped behind a standing obstacle stays there (stop and hold): both are slower than this speed, and
-the gap is below this distance.
+HOLD_MPS, HOLD_GAP_M = 1.5, 6.0
+"""A car at walking pace behind an obstacle that stands, or nearly stands, stops and stays there (stop and hold): both
+are slower than this speed, and the gap is below this distance. Otherwise errors of the measured gap let it creep on.
 """
 
 LEAST_LOOK_AHEAD_M, LOOK_AHEAD_S = 5.0, 0.8

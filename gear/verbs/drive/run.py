@@ -25,6 +25,7 @@ from gear.dataset.layout import split_folder
 from gear.dataset.store import check_output
 from gear.driving.drives import RUNS, DriveRun, Drives, patches_of, plan_drives, read_drive_config
 from gear.driving.worker import CLAIMS, UNREADABLE, DriveResult, drive_all, read_log, read_result
+from gear.measuring.shown_size import focal_note
 from gear.plugins.build import find
 from gear.reporting.display import displayed
 from gear.values.counted import counted
@@ -129,6 +130,12 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
     """
     drives = prepared(request)
     executor = _executor(request)
+    for label, cast in drives.casts.items():
+        note = None
+        if cast.model is not None:
+            note = focal_note(cast.model, cast.task, cast.driver.options, f"driver {label}")
+        if note is not None:
+            callbacks.on_warning(note)
     write_whole(drives.root, CONFIG, to_yaml(drives.config).encode())
     outcomes = _made(drives, executor, callbacks)
     clear_claims(drives.root, CLAIMS)

@@ -83,6 +83,8 @@ def test_a_killed_attack_continues_with_the_same_result(
         (["--drive", "quick", "--model", "x"], "--model is for attacks on pictures"),
         (["--drive", "quick", "--per-scene"], "--per-scene is for attacks on pictures"),
         (["--drive", "nothing.yml"], "nothing.yml"),
+        (["--drive", "quick", "--steps", "5"], "takes queries; --steps"),
+        (["--drive", "quick", "--attack", "scene_specific", "--queries", "5"], "takes steps; --queries"),
     ],
 )
 def test_the_command_line_refuses_what_does_not_fit(
