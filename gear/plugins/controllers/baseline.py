@@ -20,7 +20,11 @@ from gear.plugins.controllers.tracker import Sighting, Tracker
 from gear.values.errors import FieldError
 
 ACCELERATION_MPS2, COMFORTABLE_MPS2, CRUISE_BRAKING_MPS2 = 1.6, 2.0, 3.5
-STANDSTILL_GAP_M, HEADWAY_S = 2.5, 1.2
+STANDSTILL_GAP_M, HEADWAY_S = 4.0, 1.2
+"""Gap behind a standing obstacle, and time gap behind a moving one. The gap is at the upper end of what adaptive cruise
+control keeps, because networks see little nearer than 5 m in their training pictures, and take nearer things for that
+far.
+"""
 RELEASE_GAP_M = 1.0
 """Emergency braking ends when the obstacle is no longer approached and is farther away than this, or the car stands."""
 

@@ -29,7 +29,7 @@ def bend(radius_m: float) -> Observation:
 def test_the_driver_model_has_its_known_equilibria() -> None:
     assert following(10.0, 10.0, math.inf, 0.0) == pytest.approx(0.0)
     assert following(0.0, 10.0, math.inf, 0.0) == pytest.approx(1.6)
-    assert following(0.0, 10.0, 2.5, 0.0) == pytest.approx(0.0), "it stands at the standstill gap"
+    assert following(0.0, 10.0, 4.0, 0.0) == pytest.approx(0.0), "it stands at the standstill gap"
     assert following(10.0, 10.0, 20.0, 0.0) < -4, "it brakes hard for what stands near"
 
 
@@ -55,6 +55,16 @@ def test_far_obstacles_are_a_matter_of_cruise_control() -> None:
     actions = [driver.act(one) for one in seen]
     assert all(action.notes["is_emergency"] == 0 for action in actions)
     assert -3.5 <= actions[-1].acceleration_mps2 < 0
+
+
+@pytest.mark.parametrize(("speed_mps", "gap_m", "holds"), [(1.4, 5.5, True), (1.6, 5.5, False), (1.4, 6.5, False)])
+def test_a_car_at_walking_pace_stops_and_holds(speed_mps: float, gap_m: float, holds: bool) -> None:
+    driver = Truth(BaselineConfig())
+    thing = Thing(parts=CAR_PARTS, position_m=(2.3 + 2.1 + gap_m, 0.0, 0.0), object_id=2, role="npc")
+    for number in range(3):
+        seen = straight_road(time_s=number * 0.1, speed_mps=speed_mps, obstacles=obstacles_of([thing]))
+        action = driver.act(seen)
+    assert (action.acceleration_mps2 == -3.5) == holds and action.notes["is_emergency"] == 0
 
 
 def test_a_single_frame_confirms_nothing_and_memory_lasts_half_a_second() -> None:
