@@ -74,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from gear.cli.requests import request_of
     from gear.reporting.display import Display
     from gear.verbs.bench.command import command
+    from gear.verbs.bench.drive_steps import every_step
     from gear.verbs.bench.request import BenchRequest
     from gear.verbs.bench.run import prepared, run_bench
     from gear.verbs.bench.sweep import requests_of, run_sweep, sweep_of
@@ -86,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         requests = [request] if chosen is None else [one for _, one in requests_of(request, chosen, seed)]
         timed = [step for _, step in steps_of(times_of(request), Path(request.out))] if is_timed else []
-        steps = timed or [step for one in requests for step in prepared(one).steps()]
+        steps = timed or [step for one in requests for step in every_step(prepared(one))]
         listed = [{"verb": step.verb, "title": step.title, "arguments": step.arguments} for step in steps]
         print(json.dumps(listed, indent=1) if args.json else "\n".join(map(command, steps)))
         return 0

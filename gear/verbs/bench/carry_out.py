@@ -12,9 +12,10 @@ from gear.values.progress import Callbacks, Warn
 from gear.verbs.attack.run import attack
 from gear.verbs.bench.plan import Step, Verb
 from gear.verbs.collect.run import collect
+from gear.verbs.drive.run import drive
 from gear.verbs.evaluate.run import CalibrationChangedError, evaluate
 
-VERBS: dict[Verb, Callable[..., Any]] = {"collect": collect, "attack": attack, "evaluate": evaluate}
+VERBS: dict[Verb, Callable[..., Any]] = {"collect": collect, "attack": attack, "evaluate": evaluate, "drive": drive}
 
 
 def carry_out(step: Step, root: Path, callbacks: Callbacks, *, changed: Mapping[str, Any] | None = None) -> Any:
@@ -30,7 +31,7 @@ def carry_out(step: Step, root: Path, callbacks: Callbacks, *, changed: Mapping[
         GearError: the step fails; the message names the step.
     """
     keywords: dict[str, Any] = {"on_progress": callbacks.on_progress, "on_warning": callbacks.on_warning}
-    if step.verb != "collect":
+    if step.verb in ("attack", "evaluate"):
         keywords["on_fit_progress"] = callbacks.on_fit_progress
         keywords["on_fit_phase"] = callbacks.on_fit_phase
     try:

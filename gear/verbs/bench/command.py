@@ -22,6 +22,9 @@ ONCE: dict[Verb, tuple[str, ...]] = {"evaluate": ("data",)}
 
 ONLY_IN_PYTHON = ("pools",)
 
+POSITIONAL = ("config",)
+"""Arguments that stand on the command line without a flag."""
+
 
 def command(step: Step) -> str:
     """Returns the command line of a step, quoted for a POSIX shell."""
@@ -31,6 +34,9 @@ def command(step: Step) -> str:
 def _words(step: Step) -> Iterator[str]:
     for name, value in step.arguments.items():
         if name in ONLY_IN_PYTHON:
+            continue
+        if name in POSITIONAL:
+            yield str(value)
             continue
         flag = f"--{FLAGS.get(name, name)}"
         if value is True:

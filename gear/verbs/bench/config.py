@@ -160,6 +160,34 @@ class Sweep:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DriveBench:
+    """The drives of the benchmark in the closed loop (`gear drive`): every network, alone and behind each defense,
+    drives through scenarios in every scene, without a patch, with a random patch, and with the optimised patches. The
+    weather is the first of `weathers`.
+
+    Attributes:
+        controllers: name of the controller plugin, by task; by default `<task>_baseline`.
+        references: controllers without a network that drive as well, such as `truth` and `blind`.
+        scenarios: speeds of the ego car in km/h, by name of the scenario; an empty list means the speeds of the
+            library. Empty for all scenarios of the library.
+        library: name or path of the library of scenarios.
+        repeats: number of drives of each situation, with different seeds.
+        crowd: factor on the scene's numbers of other vehicles and people, 0 to 10.
+        video: whether each drive leaves a video (MP4), which needs the extra `video`.
+        open_loop: whether the predictions of each drive are also evaluated by the metrics of their task.
+    """
+
+    controllers: dict[str, str] = field(default_factory=dict)
+    references: tuple[str, ...] = ()
+    scenarios: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    library: str = "standard"
+    repeats: int = 1
+    crowd: float = 0.5
+    video: bool = False
+    open_loop: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BenchConfig:
     """The configuration of a whole benchmark.
 
@@ -175,6 +203,7 @@ class BenchConfig:
         seed: seed of all random draws.
         collect: further collection settings for all tasks (`gear show-config` prints the keys).
         sweep: a key that takes several values; None for a single benchmark.
+        drives: drives in the closed loop; None for none.
     """
 
     tasks: dict[str, TaskBench]
@@ -188,6 +217,7 @@ class BenchConfig:
     seed: int = 0
     collect: Node = field(default_factory=_nothing)
     sweep: Sweep | None = None
+    drives: DriveBench | None = None
 
     def __post_init__(self) -> None:
         for name, what in (("tasks", "task"), ("places", "town"), ("weathers", "weather")):

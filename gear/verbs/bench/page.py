@@ -20,6 +20,7 @@ from gear.plugins.datasets import open_dataset
 from gear.reporting.html_table import Cell, Link, html_table, safe
 from gear.reporting.report_page import report_page
 from gear.verbs.bench.chart import chart
+from gear.verbs.bench.drive_results import LEGEND, DriveSection
 from gear.verbs.bench.paper_page import paper_table
 from gear.verbs.bench.paper_tables import paper_tables, scenes_of
 from gear.verbs.bench.pictures.figure import figure
@@ -60,9 +61,25 @@ def page(report: BenchReport, plan: Plan) -> str:
             name = safe(f"bars of {task.metric.title} by network, defense and patch")
             parts.append(f'<p><img alt="{name}" src="data:image/svg+xml;base64,{drawn}"></p>')
         parts += [_scenes(task, report.out), *predictions(task, scenes_of(report)), *_pictures(plan, task_plugins)]
+    if report.drives is not None:
+        parts += _drives(report.drives)
     parts += [paper_table(table) for table in paper_tables(report)]
     parts.append(f"<h2>Config</h2><pre>{safe(to_yaml(plan.config))}</pre>")
     return report_page(report.title, parts)
+
+
+def _drives(section: DriveSection) -> Iterable[str]:
+    """Yields the section about drives: the table, links to the reports of each scene, and drives without a place."""
+    titles, *rows = section.rows() or [[]]
+    yield f'<h2>Drives in the closed loop</h2><p class="dim">{safe(LEGEND)}.</p>'
+    if rows:
+        yield html_table(
+            titles, [(number == 0 or row[:3] != rows[number - 1][:3], row) for number, row in enumerate(rows)]
+        )
+    links = [f'<li><a href="{safe(quote(study))}/report.html">{safe(study)}</a></li>' for study in section.studies]
+    yield f"<h3>Reports of the drives</h3><ul>{''.join(links)}</ul>"
+    failed = [f"<li>{safe(title)}: {safe(problem)}</li>" for title, problem in section.failed]
+    yield f"<h3>Drives that could not be made</h3><ul>{''.join(failed)}</ul>" if failed else ""
 
 
 def _table(task: TaskResult) -> str:

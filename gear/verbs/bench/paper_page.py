@@ -9,6 +9,7 @@ TITLES = {
     "table1": "Table 1: detection of patches by scene",
     "table2": "Table 2: clean and adversarial performance by scene",
     "table2-adaptive": "Table 2 for adaptive patches",
+    "drives": "Collision rates of the drives",
 }
 """Titles of the paper's tables by their names."""
 

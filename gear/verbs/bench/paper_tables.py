@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gear.contracts.tasks import NO_PATCH
+from gear.verbs.bench.drive_results import KINDS, LEGEND, DriveSection
 from gear.verbs.bench.plan import ADAPTIVE, PATCH
 from gear.verbs.bench.report import BenchReport, Result, TaskResult
+from gear.verbs.drive.report import ALL
+from gear.verbs.drive.table import rate
 from gear.verbs.evaluate.report import RowReport
 
 Tone = Literal["", "reference", "worse", "better", "same"]
@@ -73,13 +76,41 @@ class PaperTable:
 
 def paper_tables(report: BenchReport) -> list[PaperTable]:
     """Returns the tables of the CARLA-GeAR paper for a benchmark: Table 1, Table 2, and Table 2 for adaptive patches;
-    tables without any number are left out.
+    and, in the same layout, the collision rates of the drives. Tables without any number are left out.
 
     Args:
         report: results of the benchmark.
     """
     found = [_detection(report), _defense(report, PATCH, "table2"), _defense(report, ADAPTIVE, "table2-adaptive")]
+    found += [] if report.drives is None else [_collisions(report.drives)]
     return [table for table in found if any(cell.text for line in table.lines for cell in line.cells)]
+
+
+def _collisions(section: DriveSection) -> PaperTable:
+    """Collision rates over all scenes: one line per network and defense, one column per kind of patch."""
+    lines = [line for line in section.lines if line.scenario == ALL]
+    kinds = [kind for kind in KINDS if any(line.patch == kind for line in lines)]
+    found = {(line.task, line.seat, line.patch): line for line in lines}
+    return PaperTable(
+        name="drives",
+        caption=f"Collision rates by network, defense and kind of patch: {LEGEND}.",
+        tasks=(("collision rate", len(kinds)),),
+        columns=tuple(kinds),
+        lines=tuple(
+            Line(
+                scene=seat.model or seat.controller,
+                label=seat.defense or "-",
+                cells=tuple(
+                    Cell(
+                        text=rate(found[task, seat, kind].crashes) if (task, seat, kind) in found else "",
+                        is_grey=kind in (PATCH, ADAPTIVE),
+                    )
+                    for kind in kinds
+                ),
+            )
+            for task, seat in dict.fromkeys((line.task, line.seat) for line in lines)
+        ),
+    )
 
 
 def scenes_of(report: BenchReport) -> list[str]:

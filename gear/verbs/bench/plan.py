@@ -30,12 +30,12 @@ RANDOM, PATCH, ADAPTIVE = RANDOM_PATCH, "patch", "adaptive patch"
 SPLITS = {"attack": "train", "choose": "val", "measure": "test", "calibrate": "finetuning"}
 """Name of the dataset split that is collected for each purpose."""
 
-Verb = Literal["collect", "attack", "evaluate"]
+Verb = Literal["collect", "attack", "evaluate", "drive"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """One step of a benchmark: a call of `gear.collect`, `gear.attack` or `gear.evaluate`.
+    """One step of a benchmark: a call of `gear.collect`, `gear.attack`, `gear.evaluate` or `gear.drive`.
 
     A step resumes an interrupted run, and returns quickly if its results exist.
 
@@ -43,11 +43,13 @@ class Step:
         verb: name of the called function.
         title: one line for the progress display.
         arguments: keyword arguments of the call.
+        inputs: folders, made by other steps, that the step reads and that no argument names by itself.
     """
 
     verb: Verb
     title: str
     arguments: dict[str, Any]
+    inputs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -110,8 +112,8 @@ class Plan:
         """Keeps the inputs of the benchmark, which the class describes; nothing is checked or written."""
         self.config, self.plugins_of_tasks, self.scenes = config, plugins_of_tasks, scenes
         self.weathers = tuple(weathers(config.weathers))
-        self._calibration, self._attack, self._root = calibration, attack, root
-        self._workers = workers
+        self._calibration, self._attack, self.root = calibration, attack, root
+        self.workers = workers
 
     def steps(self) -> Iterator[Step]:
         """Yields all steps in an order in which each step comes after the steps that it depends on."""
@@ -145,7 +147,7 @@ class Plan:
                     task_plugins=task_plugins,
                     model=model,
                     defense=defense,
-                    out=self._root / "evaluations" / task_plugins.folder / self.name(model, defense),
+                    out=self.root / "evaluations" / task_plugins.folder / self.name(model, defense),
                     pools={
                         kind: [self.pictures(task_plugins, *place, patch) for place in self.places()]
                         for kind, patch in shown.items()
@@ -177,7 +179,7 @@ class Plan:
             scene: the scene.
             name: name of the attacked network, or of a network with a defense, as `Plan.name` returns it.
         """
-        return self._root / "patches" / task_plugins.folder / name / scene.label
+        return self.root / "patches" / task_plugins.folder / name / scene.label
 
     def adaptive_defenses(self, task_plugins: TaskPlugins) -> tuple[Candidate | None, ...]:
         """Returns the defenses that attacks on a network take into account; None stands for the attack on the network
@@ -221,7 +223,7 @@ class Plan:
         return self._calibration
 
     def _place(self, task_plugins: TaskPlugins, scene: Scene) -> Path:
-        return self._root / "data" / task_plugins.folder / scene.label
+        return self.root / "data" / task_plugins.folder / scene.label
 
     def _is_adaptive(self, defense: Candidate) -> bool:
         return self.config.adaptive and defense.supports_adaptive_attack(self._attack)
@@ -302,7 +304,7 @@ class Plan:
                 *weather.settings,
                 f"patch_seed={self.seed(RANDOM)}",
             ),
-            **self._workers,
+            **self.workers,
         }
         return Step(
             verb="collect",
@@ -331,7 +333,7 @@ class Plan:
                 **({"queries": attack.queries} if attack.queries else {"steps": attack.steps}),
                 "settings": tuple(settings_of(attack.set)),
                 "model_settings": model.settings,
-                **_keywords(self._guard(task_plugins, model, defense)),
+                **_keywords(self.guard(task_plugins, model, defense)),
                 "compositor": attack.compositor,
                 "seed": self.config.seed,
             },
@@ -349,7 +351,7 @@ class Plan:
             arguments={
                 "model": planned.model.plugin,
                 "model_settings": planned.model.settings,
-                **_keywords(self._guard(planned.task_plugins, planned.model, planned.defense)),
+                **_keywords(self.guard(planned.task_plugins, planned.model, planned.defense)),
                 "data": [str(root) for roots in planned.pools.values() for root in roots],
                 "reports": reports_of(planned.task_plugins),
                 "out": str(planned.out),
@@ -358,8 +360,14 @@ class Plan:
             },
         )
 
-    def _guard(self, task_plugins: TaskPlugins, model: Candidate, defense: Candidate | None) -> Guard | None:
-        """Returns a defense of one network with the calibration data that it needs; None for no defense."""
+    def guard(self, task_plugins: TaskPlugins, model: Candidate, defense: Candidate | None) -> Guard | None:
+        """Returns a defense of one network with the calibration data that it needs; None for no defense.
+
+        Args:
+            task_plugins: networks and defenses of the task.
+            model: the network.
+            defense: the defense; None for the network alone.
+        """
         if defense is None:
             return None
         guard = Guard(defense=defense.plugin, settings=defense.settings)

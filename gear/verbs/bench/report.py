@@ -10,6 +10,7 @@ from gear.contracts.tasks import NO_PATCH
 from gear.measuring.object_report import OBJECTS
 from gear.measuring.reports import OUTSIDE_PATCH, TASK
 from gear.values.serial import Json
+from gear.verbs.bench.drive_results import DriveSection
 from gear.verbs.bench.plan import RANDOM
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, Metrics, PairedTest, Pool
 from gear.verbs.evaluate.table import metric_title
@@ -188,11 +189,13 @@ class BenchReport:
         out: folder with bench.json, bench.csv, table.txt and report.html.
         facts: config, scenes, weathers, versions and notes; JSON.
         tasks: results of each task, in the order of the config.
+        drives: collision rates of the drives; None if the config has no drives.
     """
 
     out: Path
     facts: Json
     tasks: tuple[TaskResult, ...]
+    drives: DriveSection | None = None
 
     def as_json(self) -> Json:
         """Returns the content of bench.json: the entries of `facts`, and under `tasks` the metric and the results of
@@ -205,6 +208,7 @@ class BenchReport:
             "version": 1,
             **self.facts,
             "tasks": {task.name: task_json(task, self.out) for task in self.tasks},
+            **({} if self.drives is None else {"drives": self.drives.as_json()}),
         }
 
     @property

@@ -38,6 +38,9 @@ from gear.verbs.bench.all_metrics import metric_records
 from gear.verbs.bench.carry_out import carry_out
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig, settings_of
+from gear.verbs.bench.drive_results import COLUMNS as DRIVE_COLUMNS
+from gear.verbs.bench.drive_results import DriveSection, drive_section
+from gear.verbs.bench.drive_steps import check_drives, every_step, planned_drives
 from gear.verbs.bench.latex import document, tabular
 from gear.verbs.bench.page import page
 from gear.verbs.bench.paper_tables import paper_tables
@@ -50,7 +53,11 @@ from gear.verbs.bench.scenes import calibration_scene, located, measured_scenes
 from gear.verbs.bench.schedule import OnStep, run_steps
 from gear.verbs.bench.table import text
 from gear.verbs.bench.validation import check_collect, find_attack, plugins_of_tasks
+from gear.verbs.drive.report import DriveReport
 from gear.verbs.evaluate.report import EvaluateReport
+
+Reports = dict[str, EvaluateReport | DriveReport]
+"""Reports of the steps that evaluate or drive, by their folder."""
 
 CONFIG = "bench.yml"
 """Name of the file with the bench config, with all defaults filled in."""
@@ -81,7 +88,7 @@ def bench(
 
     The folder `out` gets `report.html`, `table.txt`, `bench.csv` (one line per metric), `bench.json` and charts in
     `figures`; the folders `data`, `patches` and `evaluations` of the other verbs; and `bench.yml`, the config with all
-    defaults filled in.
+    defaults filled in. With the key `drives`, it also gets `drives.csv` and the folder `drives` of `gear.drive`.
 
     Args:
         config: name (`gear bench quick`) or path of a bench config.
@@ -153,7 +160,7 @@ def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | Non
     with exclusive_lock(root, callbacks.on_warning), contextlib.closing(log):
         if not (root / CONFIG).exists():  # an existing config belongs to the existing reports
             write_whole(root, CONFIG, config)
-        steps = with_log(list(plan.steps()), request)
+        steps = with_log(every_step(plan), request)
         carried_out = _scheduled if request.is_scheduled else _in_turn
         report = _report(plan, root, request, carried_out(steps, root, request, callbacks, on_step))
         write_whole(root, CONFIG, config)
@@ -167,23 +174,23 @@ def run_bench(request: BenchRequest, callbacks: Callbacks, on_step: OnStep | Non
 
 def _in_turn(
     steps: Sequence[Step], root: Path, request: BenchRequest, callbacks: Callbacks, on_step: OnStep | None
-) -> dict[str, EvaluateReport]:
-    """Carries out all steps in this process, one after the other; returns the evaluations by their folder."""
-    evaluations: dict[str, EvaluateReport] = {}
+) -> Reports:
+    """Carries out all steps in this process, one after the other; returns the reports by their folder."""
+    evaluations: Reports = {}
     for number, step in enumerate(steps, 1):
         if on_step is not None:
             on_step(step, number, len(steps))
         changed = {"in_subprocess": request.in_subprocess} if step.verb == "collect" else {}
         done = carry_out(step, root, callbacks, changed=changed)
-        if isinstance(done, EvaluateReport):
+        if isinstance(done, (EvaluateReport, DriveReport)):
             evaluations[step.arguments["out"]] = done
     return evaluations
 
 
 def _scheduled(
     steps: Sequence[Step], root: Path, request: BenchRequest, callbacks: Callbacks, on_step: OnStep | None
-) -> dict[str, EvaluateReport]:
-    """Carries out all steps with the workers of an engine; returns the evaluations by their folder."""
+) -> Reports:
+    """Carries out all steps with the workers of an engine; returns the reports by their folder."""
     workers, has_gpu = fitting_workers(request.workers), has_cuda(request.device)
     return run_steps(
         steps,
@@ -210,6 +217,8 @@ def _write(report: BenchReport, plan: Plan, root: Path) -> None:
     write_whole(root, "metrics.csv", _csv(METRIC_COLUMNS, metrics))
     write_whole(root, "metrics.json", dump_json(metrics))
     tables = paper_tables(report)
+    if report.drives is not None:
+        write_whole(root, "drives.csv", _csv(DRIVE_COLUMNS, (line.record() for line in report.drives.lines)))
     for one in tables:
         write_whole(root, f"tables/{one.name}.tex", tabular(one).encode())
     write_whole(root, "tables/tables.tex", document(tables, report.title).encode())
@@ -257,6 +266,7 @@ def prepared(request: BenchRequest) -> Plan:
         workers=_workers(request),
     )
     _check_pictures(plan, node)
+    check_drives(plan, node)
     return plan
 
 
@@ -304,7 +314,8 @@ def _check_pictures(plan: Plan, node: Node) -> None:
                 raise located(node, error, *at) from error
 
 
-def _report(plan: Plan, root: Path, request: BenchRequest, evaluations: dict[str, EvaluateReport]) -> BenchReport:
+def _report(plan: Plan, root: Path, request: BenchRequest, reports: Reports) -> BenchReport:
+    evaluations = {out: one for out, one in reports.items() if isinstance(one, EvaluateReport)}
     tasks = []
     for task_plugins in plan.plugins_of_tasks:
         spec = task_plugins.task
@@ -325,7 +336,15 @@ def _report(plan: Plan, root: Path, request: BenchRequest, evaluations: dict[str
         "versions": versions(),
         "notes": list(dict.fromkeys(notes)),
     }
-    return BenchReport(out=root, facts=facts, tasks=tuple(tasks))
+    return BenchReport(out=root, facts=facts, tasks=tuple(tasks), drives=_drives(plan, root, reports))
+
+
+def _drives(plan: Plan, root: Path, reports: Reports) -> DriveSection | None:
+    """Gathers the drives of the benchmark; None if its config has none."""
+    if plan.config.drives is None:
+        return None
+    made = [(planned, reports[str(planned.out)]) for planned in planned_drives(plan)]
+    return drive_section([(planned, one) for planned, one in made if isinstance(one, DriveReport)], root)
 
 
 def _result(planned: PlannedEvaluation, metric: Metric | None, evaluation: EvaluateReport, plan: Plan) -> Result:

@@ -23,7 +23,7 @@ INPUTS = ("data", "val", "calibration", "calibration_patched", "patch")
 """Arguments of a step that name folders, which other steps may have made."""
 
 ALONE: dict[str, Any] = {"workers": 1, "engine": "processes", "address": None}
-"""Arguments of a collection whose samples are all made by the worker that carries out the step."""
+"""Arguments of a collection or of drives that are all made by the worker that carries out the step."""
 
 OnStep = Callable[[Step, int, int], None]
 """A callback that gets the step, its number (from 1) and the number of all steps."""
@@ -34,7 +34,7 @@ class StepResult:
     """The result of a step that a worker has carried out.
 
     Attributes:
-        value: the evaluation report of a step that evaluates; None for other steps.
+        value: the report of a step that evaluates or drives; None for other steps.
         warnings: warnings of the step, one line each.
     """
 
@@ -50,6 +50,7 @@ def dependencies(steps: Sequence[Step]) -> list[frozenset[int]]:
 
 def _inputs(step: Step) -> Iterator[str]:
     """Yields the paths of the folders that a step reads."""
+    yield from step.inputs
     for name in INPUTS:
         value = step.arguments.get(name, ())
         yield from (value,) if isinstance(value, str) else value
@@ -75,13 +76,13 @@ def run_steps(
         steps: all steps, each after the steps that it depends on.
         root: folder of the benchmark.
         rendering: executor of the collections.
-        networks: executor of the attacks and evaluations.
+        networks: executor of the attacks, evaluations and drives.
         workers: number of workers that render.
         callbacks: callbacks that receive the number of finished steps, and warnings.
         on_step: called after each step, with the number of finished steps.
 
     Returns:
-        The reports of the evaluations, by their folder.
+        The reports of the evaluations and of the drives, by their folder.
 
     Raises:
         GearError: steps have failed; the message names the first one. All other steps were carried out.
@@ -188,7 +189,7 @@ def make_steps(
         root: folder of the benchmark.
         folder: current folder of the command, to which paths of the steps are relative; None if the worker is the
             process of the command.
-        changed: arguments of collections that replace those of the steps.
+        changed: arguments of collections and drives that replace those of the steps.
         indices: positions of the steps.
         report: called with the outcome of each step. An error that the user can correct is a failure of its step.
 
@@ -199,8 +200,8 @@ def make_steps(
     def call(index: int) -> StepResult:
         step, warnings = steps[index], list[str]()
         callbacks = Callbacks.of(on_warning=warnings.append)
-        value = carry_out(step, root, callbacks, changed=changed if step.verb == "collect" else None)
-        return StepResult(value=value if step.verb == "evaluate" else None, warnings=tuple(warnings))
+        value = carry_out(step, root, callbacks, changed=changed if step.verb in ("collect", "drive") else None)
+        return StepResult(value=value if step.verb in ("evaluate", "drive") else None, warnings=tuple(warnings))
 
     with shared_folder(folder):
         carry_out_jobs(call, indices, report)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from gear.measuring.detection_rates import FALSE_ALARMS
 from gear.measuring.text_table import number_table
 from gear.verbs.bench.detection import detection_rates
+from gear.verbs.bench.drive_results import LEGEND as DRIVE_LEGEND
 from gear.verbs.bench.gains import against_clean, gain, is_failed
 from gear.verbs.bench.report import BenchReport, Result, TaskResult
 from gear.verbs.evaluate.report import Difference, Pool
@@ -37,7 +38,11 @@ def text(report: BenchReport) -> str:
         report: results of the benchmark.
     """
     parts = ["\n".join([title(task), *number_table(columns(task))]) for task in report.tasks]
-    return "\n\n".join([*parts, "\n".join([legend(), *report.facts["notes"]])]) + "\n"
+    legends = [legend(), *report.facts["notes"]]
+    if report.drives is not None:
+        parts.append("\n".join(["drives", *number_table(report.drives.rows())]))
+        legends.append(DRIVE_LEGEND)
+    return "\n\n".join([*parts, "\n".join(legends)]) + "\n"
 
 
 def title(task: TaskResult) -> str:
