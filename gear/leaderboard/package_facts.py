@@ -9,7 +9,7 @@ import json
 from functools import cache
 from pathlib import Path
 
-from gear.leaderboard.record import LONGEST_TEXT, SHA256
+from gear.leaderboard.field_checks import LONGEST_TEXT, SHA256
 
 SKIPPED = "__pycache__"
 

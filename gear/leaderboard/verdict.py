@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from gear.leaderboard.field_checks import LONGEST_TEXT, check_sha256, check_text
 from gear.leaderboard.reading import limited, read_as
-from gear.leaderboard.record import LONGEST_TEXT, canonical, check_sha256, check_text
+from gear.leaderboard.record import canonical
 from gear.values.errors import FieldError
 from gear.values.serial import Json, to_json
 

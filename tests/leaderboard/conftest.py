@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from gear.leaderboard.drive_claims import DriveClaim
 from gear.leaderboard.reading import Filed, encoded
 from gear.leaderboard.record import (
     AttackFacts,
@@ -82,6 +83,20 @@ def record(values: dict[str, float] = VALUES, **changes: Any) -> Record:
         "cost_s": {"model": 0.1, "defense": 0.0},
     }  # fmt: skip
     return Record(**(fields | changes))
+
+
+def drive(patch: str, seed: int = 0, *, is_crash: bool = False, **changes: Any) -> DriveClaim:
+    facts: dict[str, Any] = {
+        "scene": "town10-billboard01", "scenario": "stopped_lead", "speed_kmh": 40.0, "seed": seed, "patch": patch,
+        "is_free": False, "is_crash": is_crash, "score": 0.5, "log_sha256": sha(f"{patch} {seed}"),
+    }  # fmt: skip
+    return DriveClaim(**(facts | changes))
+
+
+def driving(one: Record, crashes: dict[str, int], count: int = 4) -> Record:
+    """A record with drives, of which some crash, by kind of patch."""
+    drives = [drive(patch, seed, is_crash=seed < most) for patch, most in crashes.items() for seed in range(count)]
+    return replace(one, controller=plugin("depth_baseline"), drives=tuple(drives))
 
 
 def filed(one: Record, name: str = "one.json") -> Filed:

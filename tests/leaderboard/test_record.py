@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from gear.leaderboard.record import Benchmark, Figure, check_plain, digest
+from gear.leaderboard.field_checks import check_plain
+from gear.leaderboard.record import Benchmark, Figure, digest
 from gear.values.errors import FieldError
 from tests.leaderboard.conftest import benchmark, plugin, record, sha
 

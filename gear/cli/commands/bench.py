@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from gear.cli.requests import request_of
     from gear.reporting.display import Display
     from gear.verbs.bench.command import command
-    from gear.verbs.bench.drive_steps import every_step
+    from gear.verbs.bench.drives.steps import every_step
     from gear.verbs.bench.request import BenchRequest
     from gear.verbs.bench.run import prepared, run_bench
     from gear.verbs.bench.sweep import requests_of, run_sweep, sweep_of

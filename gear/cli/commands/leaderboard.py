@@ -38,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     checking.add_argument(
         "--fresh", type=int, default=8, metavar="N", help="samples outside of the benchmark, per kind of patch (8)"
     )
+    checking.add_argument("--drives", type=positive, default=2, metavar="N", help="drives to make again (2)")
     checking.add_argument("--seed", type=int, metavar="N", help="seed of the choice of samples (random)")
     checking.add_argument(
         "--set",

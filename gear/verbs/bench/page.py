@@ -20,7 +20,7 @@ from gear.plugins.datasets import open_dataset
 from gear.reporting.html_table import Cell, Link, html_table, safe
 from gear.reporting.report_page import report_page
 from gear.verbs.bench.chart import chart
-from gear.verbs.bench.drive_results import LEGEND, DriveSection
+from gear.verbs.bench.drives.results import LEGEND, DriveSection
 from gear.verbs.bench.paper_page import paper_table
 from gear.verbs.bench.paper_tables import paper_tables, scenes_of
 from gear.verbs.bench.pictures.figure import figure

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gear.contracts.tasks import NO_PATCH
-from gear.verbs.bench.drive_results import KINDS, LEGEND, DriveSection
+from gear.verbs.bench.drives.results import KINDS, LEGEND, DriveSection
 from gear.verbs.bench.plan import ADAPTIVE, PATCH
 from gear.verbs.bench.report import BenchReport, Result, TaskResult
 from gear.verbs.drive.report import ALL

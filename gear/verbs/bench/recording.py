@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from gear.dataset.hashing import file_hash
 from gear.dataset.json_text import load_json
 from gear.dataset.layout import manifest_path
 from gear.dataset.reading import Dataset
-from gear.leaderboard.package_facts import code_sha256, package_metadata, printable, wheel_sha256
+from gear.leaderboard.package_facts import package_metadata, printable
 from gear.leaderboard.reading import encoded
 from gear.leaderboard.record import (
     AttackFacts,
@@ -25,7 +26,6 @@ from gear.leaderboard.record import (
     Figure,
     Kind,
     PatchFacts,
-    Plugin,
     Record,
     SampleResult,
     canonical,
@@ -41,7 +41,10 @@ from gear.plugins.datasets import open_dataset
 from gear.values.errors import FieldError, GearError
 from gear.values.serial import Json
 from gear.verbs.bench.config import settings_of
+from gear.verbs.bench.drives.recording import controller_facts, drive_claims
+from gear.verbs.bench.drives.results import DriveSection
 from gear.verbs.bench.plan import PATCH, Plan, PlannedEvaluation
+from gear.verbs.bench.plugin_facts import plugin_facts, without_folders
 from gear.verbs.bench.report import FOUND_SHARE, BenchReport, Metric, Result, TaskResult
 from gear.verbs.bench.validation import TaskPlugins
 from gear.verbs.evaluate.report import Pool
@@ -49,9 +52,6 @@ from gear.verbs.evaluate.table import metric_title
 
 RECORDS = "records"
 AUROC = "auroc"
-
-UNKNOWN_VERSION = "?"
-"""The version of a plugin whose package is not installed, such as one that a script made."""
 
 
 def write_records(report: BenchReport, plan: Plan, name: str, kind: Kind | None = None) -> list[Path]:
@@ -76,7 +76,7 @@ def write_records(report: BenchReport, plan: Plan, name: str, kind: Kind | None 
             raise GearError(f"{task.name}: has no metric by which networks can be ranked, so there is no record")
         for one, planned in zip(task.results, plan.planned_evaluations(task_plugins), strict=True):
             try:
-                record = _record(task, one, planned, plan, name, kind)
+                record = _with_drives(_record(task, one, planned, plan, name, kind), report.drives, planned, plan)
             except FieldError as error:
                 raise GearError(
                     f"{plan.name(planned.model, planned.defense)} of {task.name}: no record: {error}"
@@ -114,6 +114,11 @@ def _record(
     )
 
 
+def _with_drives(record: Record, section: DriveSection | None, planned: PlannedEvaluation, plan: Plan) -> Record:
+    drives = drive_claims(section, planned)
+    return replace(record, drives=drives, controller=controller_facts(plan, planned)) if drives else record
+
+
 def guard_of(plan: Plan, planned: PlannedEvaluation) -> Guard | None:
     """The defense of an evaluation with its calibration data; None for a network alone.
 
@@ -140,7 +145,7 @@ def reduced(plan: Plan, planned: PlannedEvaluation) -> Json:
         plan: plan of the benchmark.
         planned: the evaluation whose network and defense are kept.
     """
-    config = _nameless(to_plain(plan.config))
+    config = without_folders(to_plain(plan.config))
     config["tasks"] = {
         task: {
             **bench,
@@ -160,37 +165,6 @@ def reduced(plan: Plan, planned: PlannedEvaluation) -> Json:
         config["calibration"] = {"town": Path(town).stem, "scene": scene.rpartition(":")[2]}
     config["transfer"] = False
     return config
-
-
-def _nameless(value: Json, key: str = "") -> Json:
-    if isinstance(value, dict):
-        return {name: _nameless(inner, name) for name, inner in value.items()}
-    if isinstance(value, list):
-        return [_nameless(inner) for inner in value]
-    is_path = isinstance(value, str) and "/" in value and key != "plugin"
-    return Path(value).name if is_path else value
-
-
-def plugin_facts(chosen: Chosen, weights_sha256: str | None = None) -> Plugin:
-    """Name, package, version, options and hashes of a plugin, for a record.
-
-    Args:
-        chosen: the plugin with its options.
-        weights_sha256: SHA-256 of the network's weights; None for plugins without weights.
-
-    Raises:
-        FieldError: an option cannot be part of a record.
-    """
-    facts = chosen.facts()
-    return Plugin(
-        name=facts["name"],
-        package=facts["package"],
-        version=facts["version"].replace(UNKNOWN_VERSION, "unknown"),
-        options=_nameless(facts["options"]),
-        code_sha256=code_sha256(chosen.found.spec.build.__module__),
-        wheel_sha256=wheel_sha256(facts["package"]),
-        weights_sha256=weights_sha256,
-    )
 
 
 def _entry(task: TaskResult, one: Result, planned: PlannedEvaluation, kind: Kind | None, *, random: bool) -> Entry:

@@ -10,7 +10,7 @@ from gear.contracts.tasks import NO_PATCH
 from gear.measuring.object_report import OBJECTS
 from gear.measuring.reports import OUTSIDE_PATCH, TASK
 from gear.values.serial import Json
-from gear.verbs.bench.drive_results import DriveSection
+from gear.verbs.bench.drives.results import DriveSection
 from gear.verbs.bench.plan import RANDOM
 from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, Metrics, PairedTest, Pool
 from gear.verbs.evaluate.table import metric_title

@@ -38,9 +38,9 @@ from gear.verbs.bench.all_metrics import metric_records
 from gear.verbs.bench.carry_out import carry_out
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig, settings_of
-from gear.verbs.bench.drive_results import COLUMNS as DRIVE_COLUMNS
-from gear.verbs.bench.drive_results import DriveSection, drive_section
-from gear.verbs.bench.drive_steps import check_drives, every_step, planned_drives
+from gear.verbs.bench.drives.results import COLUMNS as DRIVE_COLUMNS
+from gear.verbs.bench.drives.results import DriveSection, drive_section
+from gear.verbs.bench.drives.steps import check_drives, every_step, planned_drives
 from gear.verbs.bench.latex import document, tabular
 from gear.verbs.bench.page import page
 from gear.verbs.bench.paper_tables import paper_tables

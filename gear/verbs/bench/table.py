@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from gear.measuring.detection_rates import FALSE_ALARMS
 from gear.measuring.text_table import number_table
 from gear.verbs.bench.detection import detection_rates
-from gear.verbs.bench.drive_results import LEGEND as DRIVE_LEGEND
+from gear.verbs.bench.drives.results import LEGEND as DRIVE_LEGEND
 from gear.verbs.bench.gains import against_clean, gain, is_failed
 from gear.verbs.bench.report import BenchReport, Result, TaskResult
 from gear.verbs.evaluate.report import Difference, Pool

@@ -9,13 +9,15 @@ from pathlib import Path
 from gear.dataset.files import explained, write_whole
 from gear.dataset.guarded_paths import remove_file
 from gear.leaderboard.board import Table, tables
+from gear.leaderboard.field_checks import LONGEST_TEXT, SHA256
 from gear.leaderboard.reading import Filed, limited, read_records
-from gear.leaderboard.record import LONGEST_TEXT, SHA256, canonical
+from gear.leaderboard.record import canonical
 from gear.leaderboard.verdict import Verdict, read_verdict
 from gear.plugins.text import printable
 from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
-from gear.verbs.leaderboard.pages import index_page, is_record_page, record_page
+from gear.verbs.leaderboard.drive_page import drive_tables, drives_json
+from gear.verbs.leaderboard.pages import drives_page, index_page, is_record_page, record_page
 from gear.verbs.leaderboard.texts import board_json
 
 RECORDS = "records"
@@ -40,8 +42,10 @@ class BoardReport:
     refused: tuple[str, ...]
 
     def as_json(self) -> Json:
-        """Returns the content of board.json: the lines `refused`, and the `tables` with their rows."""
-        return board_json(self.tables, self.refused)
+        """Returns the content of board.json: the lines `refused`, the `tables` with their rows, and the tables of
+        `drives`.
+        """
+        return board_json(self.tables, self.refused) | {"drives": drives_json(drive_tables(self.tables))}
 
     def summary(self) -> str:
         """Returns the result as text: counts, and one line per refused file."""
@@ -54,7 +58,8 @@ class BoardReport:
 def build_leaderboard(
     records: str | Path, *, out: str | Path, checks: str | Path | None = None, commitment: str | None = None
 ) -> BoardReport:
-    """Makes static pages of a folder of records: `index.html`, one page per record, and `board.json`.
+    """Makes static pages of a folder of records: `index.html`, `drives.html` about drives,
+    one page per record, and `board.json`.
 
     Pages of records that are no longer listed are removed.
 
@@ -86,6 +91,7 @@ def build_leaderboard(
         write_whole(report.out, f"{RECORDS}/{sha256}.html", record_page(one, verdicts.get(sha256)).encode())
     _remove_old_pages(report.out, filed)
     write_whole(report.out, "board.json", canonical(report.as_json()))
+    write_whole(report.out, "drives.html", drives_page(drive_tables(found)).encode())
     write_whole(report.out, "index.html", index_page(found, refused, commitment).encode())
     return report
 

@@ -29,6 +29,7 @@ from gear.verbs.leaderboard.compare import (
     compare_withheld,
     is_same_machine,
 )
+from gear.verbs.leaderboard.drive_check import check_drives
 from gear.verbs.leaderboard.figures import compare_figures, compare_reference
 from gear.verbs.leaderboard.request import CheckRequest
 from gear.verbs.leaderboard.rerun import Again, Rerun, check_data
@@ -46,6 +47,7 @@ def check_record(
     patches: str | Path | None = None,
     samples: int = 4,
     fresh: int = 8,
+    drives: int = 2,
     seed: int = 0,
     settings: Iterable[str] = (),
     withheld: str | Path | None = None,
@@ -61,7 +63,9 @@ def check_record(
     Repeated samples must give the same predictions on the same kind of machine, and metrics within a tolerance
     elsewhere. Fresh samples, with a seed that is not part of the benchmark, must give metrics of the same distribution.
     The ranked metric is computed again if all samples of the benchmark are repeated, or if it is the mean of the values
-    of the samples; otherwise the verdict is `incomplete`. Nothing in the record is run; its plugins must be installed.
+    of the samples; otherwise the verdict is `incomplete`. Some drives of the record, which repeat bit for bit, are made
+    again; the hash of the log and the outcome must be equal. Nothing in the record is run; its plugins must be
+    installed.
 
     Args:
         record: file of the record.
@@ -70,7 +74,8 @@ def check_record(
         patches: folder with the patches, by default `patches` beside the record.
         samples: number of samples that are measured again, each with every kind of patch.
         fresh: number of fresh samples for every kind of patch; 0 for none.
-        seed: seed by which samples are chosen; it should not be known to the author of the record.
+        drives: number of drives that are made again, if the record has drives.
+        seed: seed by which samples and drives are chosen; it should not be known to the author of the record.
         settings: `KEY=VALUE` texts that replace keys of the record's config, such as files that lie elsewhere here.
         withheld: file with withheld scenes, whose seed and places are used for the fresh samples.
         commitment: published salted hash of that file.
@@ -92,6 +97,7 @@ def check_record(
             patches=patches,
             samples=samples,
             fresh=fresh,
+            drives=drives,
             seed=seed,
             settings=tuple(settings),
             withheld=withheld,
@@ -133,6 +139,7 @@ def run_check(request: CheckRequest, callbacks: Callbacks) -> Verdict:
     is_every = len(again) == sum(one.samples for one in record.data if one.patch in _kinds(rerun))
     alone = _again(rerun, chosen, count, with_defense=False) if is_every and record.entry.defense is not None else []
     found += compare_reference(record, alone, rerun.ranked)
+    found += check_drives(rerun, request, is_same=is_same)
     if request.fresh:
         found += _fresh(rerun, request, secret, count)
     verdict = Verdict(

@@ -8,8 +8,15 @@ import html
 from collections.abc import Iterable, Sequence
 
 from gear.leaderboard.board import Row, Table
+from gear.leaderboard.drive_claims import crashes
 from gear.leaderboard.reading import Filed
+from gear.leaderboard.record import Plugin, Record
 from gear.leaderboard.verdict import Verdict
+from gear.verbs.drive.report import Rate
+from gear.verbs.drive.table import rate
+from gear.verbs.leaderboard.drive_page import HEAD as DRIVE_HEAD
+from gear.verbs.leaderboard.drive_page import LEGEND as DRIVE_LEGEND
+from gear.verbs.leaderboard.drive_page import DriveTable, drive_cells
 from gear.verbs.leaderboard.texts import (
     ATTACKS,
     BY_KNOWLEDGE,
@@ -45,6 +52,26 @@ BACK = '<p><a href="../index.html">leaderboard</a></p>'
 """Link of a record's page to the main page."""
 
 
+def drives_page(tables: Sequence[DriveTable]) -> str:
+    """Returns the page about drives as HTML text: collision rates by network, defense and controller.
+
+    Args:
+        tables: tables of rows that drove through the same scenarios in the same scenes.
+    """
+    parts = ['<p><a href="index.html">leaderboard</a></p>', f'<p class="dim">{_safe(DRIVE_LEGEND)}</p>']
+    for table in tables:
+        lines, rank = [], 0
+        for one in table.rows:
+            rank += one.is_ranked
+            cells = [_cell(cell) for cell in drive_cells(one, rank if one.is_ranked else None)]
+            network = _safe(named(one.row.first.record.entry.network))
+            cells[1] = f'<td><a href="records/{one.row.first.sha256}.html">{network}</a></td>'
+            cells[4] = f'<td class="{one.state}">{one.state}</td>'
+            lines.append("".join(cells))
+        parts += [f"<h2>Benchmark {_safe(table.title)}</h2>", _rows(DRIVE_HEAD, lines)]
+    return _page("gear leaderboard: drives", parts if tables else [*parts, "<p>No record has drives.</p>"])
+
+
 def index_page(tables: Sequence[Table], refused: Sequence[str], commitment: str | None) -> str:
     """Returns the main page of a leaderboard as HTML text: for each benchmark and task the defenses, the attacks, and
     the attacks by knowledge.
@@ -57,6 +84,8 @@ def index_page(tables: Sequence[Table], refused: Sequence[str], commitment: str 
     parts = [f'<p class="dim">{_safe(LEGEND)}</p>']
     if commitment is not None:
         parts.append(f'<p class="dim">Salted hash of the withheld scenes: {_safe(commitment)}</p>')
+    if any(one.record.drives for table in tables for row in table.rows for one in row.own):
+        parts.append('<p><a href="drives.html">Drives in the closed loop: collision rates</a></p>')
     for table in tables:
         better = "lower" if table.lower_is_better else "higher"
         title = f"{table.task}: {table.metric} ({better} is better), benchmark {table.benchmark} {table.data_key[:8]}"
@@ -83,6 +112,7 @@ def record_page(filed: Filed, verdict: Verdict | None) -> str:
         ("task", entry.task),
         ("network", f"{named(entry.network)}, weights {entry.network.weights_sha256 or '-'}"),
         ("defense", named(entry.defense)),
+        *([] if record.controller is None else [("controller of the drives", _with_wheel(record.controller))]),
         ("gradient of the defense", entry.gradient or "-"),
         ("is random", "yes" if entry.is_random else "no"),
         ("attack", f"{named(record.attack.plugin)}, {record.attack.knowledge}, {record.attack.steps} steps, "
@@ -98,6 +128,7 @@ def record_page(filed: Filed, verdict: Verdict | None) -> str:
         BACK,
         _table(("what", "value"), [list(fact) for fact in facts]),
         _titled("Results", ("patch", "figure", "value", "samples"), figures),
+        _titled("Drives", ("patch", "collision rate", "drives"), _driven(record)),
         _titled("Data", ("scene", "weather", "patch", "samples", "content key"), data),
     ]
     if verdict is None:
@@ -105,6 +136,17 @@ def record_page(filed: Filed, verdict: Verdict | None) -> str:
     else:
         parts.append(_titled(f"Check: {verdict.state}", ("", "finding"), [[o.level, o.text] for o in verdict.findings]))
     return _page(f"{named(entry.network)} {named(entry.defense)}", parts)
+
+
+def _with_wheel(plugin: Plugin) -> str:
+    return f"{named(plugin)}, wheel {plugin.wheel_sha256 or '-'}, code {plugin.code_sha256}"
+
+
+def _driven(record: Record) -> list[list[str]]:
+    """The collision rates of a record by kind of patch, for its page."""
+    kinds = dict.fromkeys(one.patch for one in record.drives)
+    rates = [(kind, Rate.of(crashes(record.drives, kind))) for kind in kinds]
+    return [[kind, rate(value), str(value.total)] for kind, value in rates if value.total]
 
 
 def is_record_page(data: bytes) -> bool:

@@ -20,7 +20,8 @@ class CheckRequest:
         patches: folder with the patches; None for `patches` beside the record.
         samples, fresh: numbers of samples that are measured again, and of samples that are not part of the benchmark,
             for each kind of patch.
-        seed: seed by which samples are chosen.
+        drives: number of drives that are made again.
+        seed: seed by which samples and drives are chosen.
         settings: `KEY=VALUE` texts that replace keys of the record's config, such as paths of files.
         withheld, commitment: file with withheld scenes, and its published salted hash; both or none.
         most_pictures: largest number of pictures that are rendered.
@@ -36,6 +37,7 @@ class CheckRequest:
     patches: str | Path | None = None
     samples: int = 4
     fresh: int = 8
+    drives: int = 2
     seed: int = 0
     settings: tuple[str, ...] = ()
     withheld: str | Path | None = None
@@ -45,7 +47,7 @@ class CheckRequest:
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
-        if self.samples < 1 or self.fresh < 0 or self.most_pictures < 1:
-            raise GearError("samples and most-pictures must be at least 1, and fresh at least 0")
+        if min(self.samples, self.drives, self.most_pictures) < 1 or self.fresh < 0:
+            raise GearError("samples, drives and most-pictures must be at least 1, and fresh at least 0")
         if (self.commitment is None) != (self.withheld is None):
             raise GearError("withheld scenes and their commitment belong together: give both or none")

@@ -27,8 +27,10 @@ from gear.measuring.statistics import AnyEvaluator
 from gear.plugins.datasets import open_dataset, task_of
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
+from gear.verbs.bench.drives.recording import controller_facts
 from gear.verbs.bench.plan import RANDOM, SPLITS, Plan, PlannedEvaluation, Step
-from gear.verbs.bench.recording import files_sha256, guard_of, plugin_facts, sample_metric
+from gear.verbs.bench.plugin_facts import plugin_facts
+from gear.verbs.bench.recording import files_sha256, guard_of, sample_metric
 from gear.verbs.bench.report import Metric
 from gear.verbs.bench.request import BenchRequest
 from gear.verbs.bench.run import prepared
@@ -111,10 +113,13 @@ class Rerun:
         self._guarded: dict[bool, GuardedModel] = {}
 
     def installed(self) -> list[tuple[str, Plugin, Plugin]]:
-        """The network and the defense as (role, plugin in the record, installed plugin)."""
+        """The network, the defense and the controller as (role, plugin in the record, installed plugin)."""
         found = [("network", self.record.entry.network, self.network)]
         if self.defense is not None and self.record.entry.defense is not None:
             found.append(("defense", self.record.entry.defense, self.defense))
+        controller = controller_facts(self.plan, self.planned)
+        if self.record.controller is not None and controller is not None:
+            found.append(("controller", self.record.controller, controller))
         return found
 
     def data_of(self, patch: str) -> list[Data]:
@@ -234,7 +239,7 @@ class Rerun:
     def _collect(self, step: Step, part: Shard | None = None) -> None:
         arguments = dict(step.arguments)
         if arguments["patch"] not in (NO_PATCH, RANDOM):
-            self._place_patches(Path(arguments["patch"]))
+            self.place_patches(Path(arguments["patch"]))
         run_job(resolve(CollectRequest(**arguments).loaded()), shard=part)
 
     def _part(self, step: Step, samples: int, indices: Sequence[int]) -> Dataset[Any]:
@@ -277,10 +282,13 @@ class Rerun:
             )
         return found
 
-    def _place_patches(self, folder: Path) -> None:
+    def place_patches(self, folder: Path) -> None:
         """Copies the patches of one scene into the folder where the benchmark expects them.
 
         The names of the files are hashes, which are compared with the content.
+
+        Args:
+            folder: folder of the patches of one scene in the plan of the benchmark.
 
         Raises:
             GearError: the record names no patches for this folder, or a file is missing or has another content.

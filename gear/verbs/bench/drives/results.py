@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 from gear.contracts.tasks import NO_PATCH
 from gear.driving.worker import DriveResult
 from gear.values.serial import Json
-from gear.verbs.bench.drive_steps import PlannedDrives, Seat
+from gear.verbs.bench.drives.steps import PlannedDrives, Seat
 from gear.verbs.bench.plan import ADAPTIVE, PATCH, RANDOM
 from gear.verbs.drive.report import ALL, DriveReport, Paired, Rate, compared
 from gear.verbs.drive.table import rate
@@ -105,11 +105,13 @@ class DriveSection:
         lines: one line per driver, scenario and kind of patch.
         studies: folders of the results of `gear.drive`, relative to the folder of the benchmark.
         failed: drives that could not be made: title, and reason.
+        made: the planned drives with their results, from which the lines follow.
     """
 
     lines: tuple[DriveLine, ...] = ()
     studies: tuple[str, ...] = ()
     failed: tuple[tuple[str, str], ...] = ()
+    made: tuple[tuple[PlannedDrives, DriveReport], ...] = ()
 
     def as_json(self) -> Json:
         """The section as JSON: `studies`, `failed`, and `lines` as flat records."""
@@ -125,7 +127,7 @@ class DriveSection:
         return [list(TITLES), *rows] if rows else []
 
 
-def drive_section(made: Iterable[tuple[PlannedDrives, DriveReport]], root: Path) -> DriveSection:
+def drive_section(made: Sequence[tuple[PlannedDrives, DriveReport]], root: Path) -> DriveSection:
     """Gathers the drives of a benchmark over its scenes.
 
     Args:
@@ -150,6 +152,7 @@ def drive_section(made: Iterable[tuple[PlannedDrives, DriveReport]], root: Path)
         lines=tuple(_line(key, groups) for key in sorted(groups, key=lambda key: _order(key, groups))),
         studies=tuple(studies),
         failed=tuple(failed),
+        made=tuple(made),
     )
 
 

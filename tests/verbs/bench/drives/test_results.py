@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from gear.driving.worker import DriveResult
-from gear.verbs.bench.drive_results import COLUMNS, DriveSection, drive_section
-from gear.verbs.bench.drive_steps import PlannedDrives, Seat
+from gear.verbs.bench.drives.results import COLUMNS, DriveSection, drive_section
+from gear.verbs.bench.drives.steps import PlannedDrives, Seat
 from gear.verbs.bench.paper_page import paper_table
 from gear.verbs.bench.paper_tables import paper_tables
 from gear.verbs.drive.report import DriveReport
@@ -24,8 +24,9 @@ TRUTH = Seat(model=None, defense=None, controller="truth")
 
 def planned(scene: str, *, is_adaptive: bool = False) -> PlannedDrives:
     plugins: Any = SimpleNamespace(name="depth")
+    place: Any = SimpleNamespace(label=scene)
     return PlannedDrives(
-        task_plugins=plugins, scene=plugins, is_adaptive=is_adaptive, out=Path("out/drives/depth") / scene,
+        task_plugins=plugins, scene=place, is_adaptive=is_adaptive, out=Path("out/drives/depth") / scene,
         seats={"net": NET, "net-d": GUARDED, "truth": TRUTH}, config={}, inputs=(),
     )  # fmt: skip
 

@@ -16,7 +16,7 @@ from gear.driving.config import DriveConfig
 from gear.plugins.build import NO_OPTIONS
 from gear.values.errors import GearError
 from gear.verbs.bench.command import command
-from gear.verbs.bench.drive_steps import every_step, planned_drives, settings
+from gear.verbs.bench.drives.steps import every_step, planned_drives, settings
 from gear.verbs.bench.plan import Plan
 from gear.verbs.bench.request import BenchRequest
 from gear.verbs.bench.run import prepared

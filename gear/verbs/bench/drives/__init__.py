@@ -1,0 +1,1 @@
+"""Drives in a benchmark: steps, results and records."""
