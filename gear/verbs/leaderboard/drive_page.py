@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from gear.driving.statistics import Rate
 from gear.leaderboard.board import Row, State, Table
 from gear.leaderboard.drive_claims import crashes
 from gear.leaderboard.reading import Filed
 from gear.leaderboard.record import Plugin, Record, digest
 from gear.leaderboard.rules import ADAPTIVE, NONE, PATCH, RANDOM
 from gear.values.serial import Json
-from gear.verbs.drive.report import Rate
 from gear.verbs.drive.table import rate
 from gear.verbs.leaderboard.texts import named
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Sequence
 
+from gear.driving.statistics import Rate
 from gear.leaderboard.board import Row, Table
 from gear.leaderboard.drive_claims import crashes
 from gear.leaderboard.reading import Filed
 from gear.leaderboard.record import Plugin, Record
 from gear.leaderboard.verdict import Verdict
-from gear.verbs.drive.report import Rate
 from gear.verbs.drive.table import rate
 from gear.verbs.leaderboard.drive_page import HEAD as DRIVE_HEAD
 from gear.verbs.leaderboard.drive_page import LEGEND as DRIVE_LEGEND

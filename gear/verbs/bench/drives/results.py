@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from gear.contracts.tasks import NO_PATCH
+from gear.driving.statistics import Paired, Rate, compared
 from gear.driving.worker import DriveResult
 from gear.values.serial import Json
 from gear.verbs.bench.drives.steps import PlannedDrives, Seat
 from gear.verbs.bench.plan import ADAPTIVE, PATCH, RANDOM
-from gear.verbs.drive.report import ALL, DriveReport, Paired, Rate, compared
+from gear.verbs.drive.report import ALL, DriveReport
 from gear.verbs.drive.table import rate
 
 KINDS = (NO_PATCH, RANDOM, PATCH, ADAPTIVE)
