@@ -41,6 +41,21 @@ BEYOND_M = 15.0
 KEPT_FREE_M = (20.0, 30.0)
 """Distances behind the ego car and beyond the conflict up to which no other road user starts in the lane, metres."""
 
+MOST_LATERAL_MPS2 = 3.0
+"""Lateral acceleration that a car at the drawn speed may need between its start and the road beyond the conflict, m/s².
+No controller slows down for bends, and around a corner a conflict is not ahead but aside.
+"""
+
+TIGHT_BEND = "in a bend too tight for the speed"
+
+FURTHER_M = (0.0, 10.0, 20.0, 30.0, 40.0)
+"""Distances by which the start moves away from the boards until the conflict is before the bend, metres."""
+
+BEND_M = 6.0
+"""Length of road over which the change of heading is taken, so that the corners of the centre line do not count as
+bends, metres.
+"""
+
 LEAST_GAP_M = 6.0
 REACH_M = 3.0
 """Distance that a person walks beyond the edges of the lane, metres."""
@@ -187,24 +202,22 @@ class StartSampler:
     def _place(self, what: Draw, rng: np.random.Generator) -> Start | str:
         speed_mps, scenario = what.speed_mps, what.scenario
         lane, view_s_m = self._sampler.spawner.lane_table.draw(self._sampler.places, rng)
-        if self._lanes.lanes[lane].is_junction:
-            return "in a junction"
         back_m = max(0.0, scenario.ttc_s - IN_VIEW_TTC_S) * speed_mps
         if scenario.red_light:
             line_m = self._stop_line_m(lane, view_s_m, scenario.ttc_s * speed_mps)
             if line_m is None:
                 return "without a red light ahead"
             back_m = view_s_m - (line_m - self._sampler.ego_type.front_m - scenario.ttc_s * speed_mps)
-        way = trace_back(self._lanes, lane, view_s_m, back_m, rng)
-        if way is None:
-            return "before the start of the road"
-        names, s_m = way
-        needed_m = scenario.ttc_s * speed_mps + BEYOND_M + 40.0
-        path = LanePath.along(self._lanes, (*names[:-1], *straight_on(self._lanes, names[-1], s_m + needed_m)))
-        if path.route.is_dead_end and path.route.line.length_m < s_m + scenario.ttc_s * speed_mps + BEYOND_M:
-            return "before the end of the road"
+        way: tuple[LanePath, float] | str = ""
+        for further_m in (0.0,) if scenario.red_light else FURTHER_M:
+            way = self._way(what, (lane, view_s_m), back_m + further_m, rng)
+            if way != TIGHT_BEND:
+                break
+        if isinstance(way, str):
+            return way
+        path, s_m = way
         road_users = self._sampler.empty()
-        ego = replace(self._sampler.ego_on_lane(road_users, names[0], s_m, rng), speed_mps=speed_mps)
+        ego = replace(self._sampler.ego_on_lane(road_users, path.route.lanes[0], s_m, rng), speed_mps=speed_mps)
         start = Start(road_users=road_users, path=path, s_m=s_m, speed_mps=speed_mps)
         if scenario.red_light:
             start = replace(start, conflict_s_m=s_m + scenario.ttc_s * speed_mps)
@@ -217,6 +230,34 @@ class StartSampler:
             return problem
         road_users.keep_out.extend(_kept_free(start))
         return start
+
+    def _way(
+        self, what: Draw, view: tuple[str, float], back_m: float, rng: np.random.Generator
+    ) -> tuple[LanePath, float] | str:
+        """Finds the lanes that lead to a place before the boards, and beyond.
+
+        Args:
+            what: scenario, speed and seed.
+            view: the place: name of its lane, and arc length on it.
+            back_m: distance of the start before the place, metres.
+            rng: generator of the choice between lanes that lead to the place.
+
+        Returns:
+            The path and the arc length of the start on it; or the reason why no drive is possible.
+        """
+        speed_mps, scenario = what.speed_mps, what.scenario
+        way = trace_back(self._lanes, *view, back_m, rng)
+        if way is None:
+            return "before the start of the road"
+        names, s_m = way
+        needed_m = scenario.ttc_s * speed_mps + BEYOND_M + 40.0
+        path = LanePath.along(self._lanes, (*names[:-1], *straight_on(self._lanes, names[-1], s_m + needed_m)))
+        if path.route.is_dead_end and path.route.line.length_m < s_m + scenario.ttc_s * speed_mps + BEYOND_M:
+            return "before the end of the road"
+        driven_s = max(scenario.ttc_s, scenario.duration_s if scenario.is_free else 0.0)
+        if lateral_mps2(path, s_m, s_m + driven_s * speed_mps + BEYOND_M, speed_mps) > MOST_LATERAL_MPS2:
+            return TIGHT_BEND
+        return path, s_m
 
     def _stop_line_m(self, lane: str, s_m: float, reach_m: float) -> float | None:
         """Finds the first red light ahead.
@@ -370,6 +411,21 @@ def _kept_free(start: Start) -> list[Footprint]:
         half_m = start.walker.line.length_m / 2
         areas.append(Footprint(float(middle[0]), float(middle[1]), float(middle[2]), yaw_rad, half_m + 1.5, 1.5))
     return areas
+
+
+def lateral_mps2(path: LanePath, from_m: float, to_m: float, speed_mps: float) -> float:
+    """Returns the largest lateral acceleration on a stretch of a path, in m/s².
+
+    Args:
+        path: the lanes that the car follows.
+        from_m, to_m: arc lengths of the stretch, metres.
+        speed_mps: speed of the car.
+    """
+    _, headings = path.route.line.sample(np.arange(from_m, max(to_m, from_m + BEND_M) + BEND_M, 1.0))
+    headings = np.unwrap(headings)
+    width = round(BEND_M)
+    turns = np.abs(headings[width:] - headings[:-width]) / BEND_M
+    return float(speed_mps**2 * turns.max())
 
 
 def straight_on(graph: LaneGraph, lane: str, length_m: float) -> tuple[str, ...]:
