@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -17,6 +17,8 @@ Raise = Callable[[int], BaseException | None]
 
 class Odd:
     """A session and a store that raise what is asked for, sample by sample."""
+
+    device: ClassVar[dict[str, str]] = {}
 
     def __init__(self, *, shoot: Raise = lambda _: None, finish: Raise = lambda _: None, write: Raise = lambda _: None):
         self._shoot, self._finish, self._write = shoot, finish, write
@@ -39,7 +41,8 @@ class Odd:
             raise error
         return (index,)
 
-    def write(self, index: int) -> None:
+    def write(self, index: int, *, device: dict[str, str]) -> None:
+        assert device is self.device
         if (error := self._write(index)) is not None:
             raise error
         self.written.append(index)

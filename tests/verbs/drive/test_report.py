@@ -120,7 +120,7 @@ def test_differences_have_an_interval_over_scenarios() -> None:
     assert paired.crash_difference == 0.5 and paired.score == pytest.approx(-0.25)
     assert paired.crash_interval is not None and paired.score_interval is not None
     low, high = paired.crash_interval
-    assert low == pytest.approx(0.5 - 3.182 * (1 / 12) ** 0.5, abs=1e-3), "Student's t over four scenarios"
+    assert low == pytest.approx(0.5 - 4.303 * (1 / 12) ** 0.5, abs=1e-3), "Student's t of two degrees of freedom"
     assert high == 1.0, "a difference of shares is at most 1"
     assert mean_difference([None, None], [1, 2]) == (None, None)
     assert mean_difference([2.0, None, 2.0], [1, 2, 3]) == (2.0, None)
