@@ -91,6 +91,8 @@ class Session:
         planner: decides the scene record of each sample.
         renderer: renderer of the world.
         pipeline: camera pipeline, which turns renders into pictures.
+        device: names of device, driver and processor for the samples' sidecars; empty unless the split has mixed
+            devices.
     """
 
     job: Job
@@ -100,11 +102,7 @@ class Session:
     planner: Planner
     renderer: Renderer
     pipeline: CameraPipeline
-
-    @property
-    def device(self) -> dict[str, str]:
-        """Names of device, driver and processor for the samples' sidecars; empty unless the split has mixed devices."""
-        return device_of(self.job.plan.content, self.renderer.info, versions())
+    device: Mapping[str, str]
 
     def record(self, index: int) -> SceneRecord:
         """The scene record of the sample `index` (actors, surfaces and cameras); it depends only on the job and the
@@ -227,7 +225,8 @@ def open_session(job: Job) -> Iterator[Session]:
     night = night_of(world, job.weather, job.config.renderer)
     renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
     try:
-        refuse_other_renderer(job.plan.content, renderer.info, versions())
+        here = versions()
+        refuse_other_renderer(job.plan.content, renderer.info, here)
         release_render_arrays(world.model)
         release_memory()
         planner = ScenePlanner(world, rig, job.split, split_name=job.config.split)
@@ -242,6 +241,7 @@ def open_session(job: Job) -> Iterator[Session]:
             planner=planner,
             renderer=renderer,
             pipeline=pipeline,
+            device=device_of(job.plan.content, renderer.info, here),
         )
     finally:
         renderer.close()
