@@ -75,8 +75,8 @@ def drawn(title: str, situation: Situation, picture: UInt8Image, seen: Any, acti
 
 
 def drawn_end(title: str, situation: Situation, picture: UInt8Image, height_px: int) -> UInt8Image:
-    """The last frame of a video: the picture at the end of the drive, and how the drive ended; red for a crash and for
-    a car that left the road.
+    """The last frame of a video: the picture at the end of the drive, and how the drive ended; red for a crash, for a
+    car that left the road, and for a red light that was run.
 
     Args:
         title: the drive in a few words; the first line.
@@ -88,7 +88,7 @@ def drawn_end(title: str, situation: Situation, picture: UInt8Image, height_px: 
         (height_px, W', 3) uint8 frame.
     """
     shown, _ = _fitted(picture)
-    is_bad = situation.crash is not None or situation.ending == "off_road"
+    is_bad = situation.crash is not None or situation.ending == "off_road" or situation.ran_red_light
     colour = RED if is_bad else GREEN
     cv2.rectangle(shown, (0, 0), (shown.shape[1] - 1, shown.shape[0] - 1), colour, 12)
     width = shown.shape[1]
@@ -103,6 +103,8 @@ def drawn_end(title: str, situation: Situation, picture: UInt8Image, height_px: 
 
 def outcome(situation: Situation) -> str:
     """The end of a drive in a few words, such as `CRASH with a vehicle: impact 23 km/h`."""
+    if situation.crash is None and situation.ran_red_light:
+        return "ran the red light"
     if situation.crash is None:
         return ENDINGS.get(situation.ending, situation.ending.replace("_", " "))
     hit = HIT.get(situation.crash.kind, situation.crash.kind)

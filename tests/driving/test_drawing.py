@@ -72,6 +72,7 @@ def test_an_emergency_is_red_and_notes_have_units(situation: Situation) -> None:
         ({"ending": "crash", "crash": CRASH}, "CRASH with a person: impact 18 km/h", RED),
         ({"ending": "stood"}, "no crash: the car stands", GREEN),
         ({"ending": "off_road"}, "left the road", RED),
+        ({"ending": "passed", "ran_red_light": True}, "ran the red light", RED),
         ({"ending": "ran_out"}, "ran out", GREEN),
     ],
 )
