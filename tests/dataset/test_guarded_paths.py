@@ -28,7 +28,7 @@ ALLOWED = {
     "dataset/scratch.py": {"unlink", "rmdir"},
     "dataset/store.py": {"rmdir"},  # of empty folders at and above the root, that this run has made
     "dataset/whole_tree.py": {"replace"},  # of the whole tree into its place
-    "plugins/loggers/event_file.py": {"open", "unlink"},  # of event files in a folder that `run_log` has checked
+    "plugins/loggers/event_file.py": {"open"},  # a new file, in a folder that `run_log` has checked
     "plugins/probe.py": {"replace"},  # gear's own cache
     "plugins/probe_process.py": {"open"},  # a temporary file of the parent process
     "verbs/scaffold/write.py": {"rename", "rmtree", "write_text"},  # of a folder that it has just made

@@ -15,6 +15,7 @@ from tensorboard.compat.proto.summary_pb2 import Summary
 from tensorboard.summary.writer.record_writer import RecordWriter
 from torch.utils.tensorboard.summary import text as text_summary
 
+from gear.dataset.guarded_paths import remove_files
 from gear.formats.png import encode_rgb
 from gear.values.frames import UInt8Image
 
@@ -38,13 +39,13 @@ class EventFile:
 
     Raises:
         OSError: the file cannot be written.
+        DatasetError: an event file of an earlier run is a link, or cannot be deleted.
     """
 
     def __init__(self, folder: Path, *, done: int, flush_s: float) -> None:
         earlier = {path: int(match[1]) for path in folder.iterdir() if (match := NAME.fullmatch(path.name))}
         if not done:
-            for path in earlier:
-                path.unlink()
+            remove_files(folder, [path.name for path in earlier])
         number = max([int(time.time()), *(last + 1 for last in earlier.values())])
         self._flush_s, self._flushed = flush_s, time.monotonic()
         self._records = RecordWriter((folder / f"events.out.tfevents.{number:010d}.gear").open("xb"))
