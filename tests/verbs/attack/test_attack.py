@@ -31,7 +31,6 @@ from gear.testing.compare import difference
 from gear.testing.tiny_networks import TinyConfig, TinySegmenter, tiny_segmenter
 from gear.values.errors import DatasetError, GearError, PluginError
 from gear.verbs.attack import folder
-from gear.verbs.attack.folder import read_patches
 from gear.verbs.attack.monitor import CHECKPOINT, Recorder
 from gear.verbs.attack.run import attack
 from gear.verbs.attack.scenes import Scenes
@@ -201,35 +200,6 @@ def test_the_best_on_validation_is_kept(small: Small, install: Install, tmp_path
     held_out = report.facts["achieved"]["validation"]
     assert held_out["patch"] == max(harm for _, harm in report.facts["validation_harm"])
     assert f"objective on {held_out['samples']} validation samples: " in report.summary()
-
-
-def test_patience_ends_it(tmp_path: Path) -> None:
-    harms = iter([1.0, 3.0, 2.0, 2.5, 2.9])
-    patches = [(Patch(name="patch_0", rgb=np.full((2, 2, 3), n, np.float32)),) for n in range(5)]
-    recorder = Recorder(root=tmp_path, key="k", steps=9, judge=lambda _: next(harms), every=1, patience=2)
-    asked = [recorder.step(n + 1, {"a": n}, lambda n=n: patches[n], dict) for n in range(4)]  # type: ignore[misc]
-    assert asked == [False, False, False, True] and "validation" in recorder.stopped
-    assert recorder.best is patches[1]
-
-
-def test_what_cannot_be_measured_is_never_the_best(tmp_path: Path) -> None:
-    harms = iter([float("nan"), 1.0, 2.0, float("nan"), 3.0])
-    patches = [(Patch(name="patch_0", rgb=np.full((2, 2, 3), n, np.float32)),) for n in range(5)]
-    recorder = Recorder(root=tmp_path, key="k", steps=9, judge=lambda _: next(harms), every=1, patience=2)
-    for n in range(5):
-        assert not recorder.step(n + 1, {"a": n}, lambda n=n: patches[n], dict)  # type: ignore[misc]
-    assert recorder.best is patches[4]
-
-
-def test_many_patches_stay_in_the_order_of_their_surfaces(tmp_path: Path) -> None:
-    patches = tuple(Patch(name=f"patch_{n}", rgb=np.full((2, 2, 3), n, np.float32)) for n in range(12))
-    recorder = Recorder(root=tmp_path, key="k", steps=9, best=patches)
-    recorder.save(1, {"done": np.int64(1)})
-    resumed = Recorder(root=tmp_path, key="k", steps=9)
-    resumed.resume()
-    assert [patch.name for patch in resumed.best or ()] == [patch.name for patch in patches]
-    (tmp_path / "patch.safetensors").write_bytes(to_bytes({patch.name: patch.rgb for patch in patches}))
-    assert [patch.name for patch in read_patches(tmp_path)] == [patch.name for patch in patches]
 
 
 def test_homography_needs_no_probes(small: Small, install: Install, tmp_path: Path) -> None:
