@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -159,6 +160,11 @@ def _eight_bits(picture: npt.NDArray[np.uint16]) -> UInt8Image:
     for row, values in zip(levels, picture, strict=True):
         row[:] = (values.astype(np.uint32) * 255 + 32767) // 65535
     return levels
+
+
+def as_printed(rgb: npt.NDArray[np.floating[Any]]) -> UInt8Image:
+    """Rounds the (H, W, 3) sRGB values of a patch, 0..1, to 8 bits, as a printed patch has them."""
+    return np.ascontiguousarray(np.floor(np.clip(rgb, 0, 1) * 255 + 0.5).astype(np.uint8))
 
 
 def digest_of(images: Iterable[UInt8Image]) -> str:

@@ -1,8 +1,8 @@
 """Drives as the samples of an attack: a patch goes in, the severity of the closed-loop drives comes out.
 
 Attacks without gradients (`square`, `nes`, and those of other packages) see drives as they see pictures:
-`AttackedDrive` is the sample, `TexturePassage` the compositor, `DriveObjective` the objective. No picture is composed,
-because the renderer shows the patch in every frame of the drive.
+`AttackedDrive` is the sample, `PassThroughCompositor` the compositor, `DriveObjective` the objective. No picture is
+composed, because the renderer shows the patch in every frame of the drive.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from gear.collecting.patch_sources import PatchSet, digest_of
+from gear.collecting.patch_sources import PatchSet, as_printed, digest_of
 from gear.contracts.attacks import Objective
 from gear.contracts.models import Model
 from gear.driving.drives import DriveRun
 from gear.driving.severity import severity
-from gear.driving.worker import Workshop, drive_once
+from gear.driving.worker import DriveWorker, drive_once
 from gear.values.frames import UInt8Image
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class AttackedDrive:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TexturePassage:
+class PassThroughCompositor:
     """The compositor of drives: returns the patch of a surface unchanged, because the renderer shows it.
 
     Attributes:
@@ -96,11 +96,11 @@ class DriveObjective:
     """The mean severity of drives with the tried patches (`gear.driving.severity`). Drives are made one after another.
 
     Attributes:
-        shop: the open place and the network.
+        worker: the open place and the network.
         drives_made: number of drives made so far.
     """
 
-    shop: Workshop
+    worker: DriveWorker
     drives_made: int = 0
     _known: dict[tuple[DriveRun, str], float] = field(default_factory=dict)
 
@@ -143,7 +143,7 @@ class DriveObjective:
         """
         key = (run, patch.digest)
         if key not in self._known:
-            self._known[key] = severity(drive_once(self.shop, run, patch).log)
+            self._known[key] = severity(drive_once(self.worker, run, patch).log)
             self.drives_made += 1
         return self._known[key]
 
@@ -154,13 +154,11 @@ def tried_patch(textures: Sequence[npt.NDArray[np.float32]]) -> PatchSet:
     Args:
         textures: (h, w, 3) sRGB values in 0..1, one per surface.
     """
-    images: list[UInt8Image] = [
-        np.ascontiguousarray(np.floor(np.clip(one, 0, 1) * 255 + 0.5).astype(np.uint8)) for one in textures
-    ]
+    images = [as_printed(one) for one in textures]
     return PatchSet(label=TRIED, images=tuple(images), digest=digest_of(images))
 
 
-class UnreadDriver:
+class PlaceholderModel:
     """Stands for the attacked network where an attack expects one: the network of a driver is asked only within its
     drives.
     """

@@ -21,7 +21,7 @@ from gear.dataset.plan import manifest_facts
 from gear.dataset.store import Store
 from gear.driving.drives import DriveRun
 from gear.driving.simulation import Situation
-from gear.driving.worker import Workshop, drive_once, with_pool
+from gear.driving.worker import DriveWorker, drive_once, with_pool
 from gear.plugins.build import blamed
 from gear.values.errors import GearError
 from gear.values.progress import Progress
@@ -78,18 +78,18 @@ def frame_weight(situation: Situation, conflict_s_m: float) -> float:
     return float(np.clip(needed_mps2 / situation.car.most_braking_mps2, LEAST_WEIGHT, 1.0))
 
 
-def frames_of(shop: Workshop, run: DriveRun, patch: PatchSet) -> tuple[list[WeightedFrame], list[Json]]:
+def frames_of(worker: DriveWorker, run: DriveRun, patch: PatchSet) -> tuple[list[WeightedFrame], list[Json]]:
     """Makes one drive and keeps the scene of each frame.
 
     Args:
-        shop: the open place and network.
+        worker: the open place and network.
         run: the drive.
         patch: the patch that the scene shows during the drive.
 
     Returns:
         The frames, and the log of the drive.
     """
-    place = shop.place_of(run)
+    place = worker.place_of(run)
     assert place.session is not None, "only drivers with cameras have pictures"
     simulation, rig = place.simulation, place.session.task.rig()
     frames: list[WeightedFrame] = []
@@ -98,7 +98,7 @@ def frames_of(shop: Workshop, run: DriveRun, patch: PatchSet) -> tuple[list[Weig
         weight = frame_weight(situation, simulation.start.conflict_s_m)
         frames.append(WeightedFrame(record=simulation.record(rig, situation.frame), weight=weight))
 
-    log = drive_once(shop, run, patch, watch).log
+    log = drive_once(worker, run, patch, watch).log
     return frames, log
 
 
@@ -118,13 +118,13 @@ def drawn_frames(frames: Sequence[WeightedFrame], count: int, rng: np.random.Gen
 
 
 def write_frames(
-    shop: Workshop, run: DriveRun, records: Sequence[SceneRecord], root: Path, origin: Json, on_progress: Progress
+    worker: DriveWorker, run: DriveRun, records: Sequence[SceneRecord], root: Path, origin: Json, on_progress: Progress
 ) -> None:
     """Renders scenes without a patch, with probes, and writes them as the split `SPLIT` of a dataset. Finished samples
     of an interrupted run are kept.
 
     Args:
-        shop: the open place.
+        worker: the open place.
         run: a drive in the same place.
         records: the scenes.
         root: folder of the dataset.
@@ -134,9 +134,9 @@ def write_frames(
     Raises:
         GearError: a sample cannot be made, or a file cannot be written.
     """
-    session = shop.place_of(run).session
+    session = worker.place_of(run).session
     assert session is not None, "only drivers with cameras have pictures"
-    job = _job(shop, run, root, len(records), origin)
+    job = _job(worker, run, root, len(records), origin)
     numbered = [
         replace(one, split=SPLIT, seed=job.split.seed, index=index, sequence=index, frame=0, time_s=0.0)
         for index, one in enumerate(records)
@@ -163,10 +163,10 @@ def write_frames(
             store.close(session.task, manifest_facts(store.plan))
 
 
-def _job(shop: Workshop, run: DriveRun, root: Path, samples: int, origin: Json) -> Job:
+def _job(worker: DriveWorker, run: DriveRun, root: Path, samples: int, origin: Json) -> Job:
     """The collection job of the frames; its plan has no recipe, because the frames follow from drives."""
     collection = replace(
-        shop.drives.collection(run), probes=True, root=str(root), split=SPLIT, samples=samples, patch="none"
+        worker.drives.collection(run), probes=True, root=str(root), split=SPLIT, samples=samples, patch="none"
     )
     job = resolve(collection)
     plan = replace(job.plan, content={**job.plan.content, "drives": origin}, recipe=None)

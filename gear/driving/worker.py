@@ -94,7 +94,7 @@ class _Place:
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
-class Workshop:
+class DriveWorker:
     """The place and the network that were opened last; runs are ordered so that they rarely change.
 
     Attributes:
@@ -192,14 +192,14 @@ def drive_all(drives: Drives, indices: Iterator[int], report: Report) -> None:
     Raises:
         GearError: a file cannot be written.
     """
-    shop = Workshop(drives=drives)
+    worker = DriveWorker(drives=drives)
     in_row = 0
-    with shop.open_places, Claims(drives.root, CLAIMS) as claims, single_thread(drives):
+    with worker.open_places, Claims(drives.root, CLAIMS) as claims, single_thread(drives):
         for index in indices:
             if not claims.take(index):
                 report(Outcome(index=index, kind="elsewhere"))
                 continue
-            outcome = _outcome(shop, index)
+            outcome = _outcome(worker, index)
             claims.release(index)
             in_row = in_row + 1 if outcome.kind == "failed" and not outcome.is_final else 0
             report(outcome)
@@ -207,14 +207,14 @@ def drive_all(drives: Drives, indices: Iterator[int], report: Report) -> None:
                 return
 
 
-def _outcome(shop: Workshop, index: int) -> Outcome:
+def _outcome(worker: DriveWorker, index: int) -> Outcome:
     """Makes one drive, unless it is there.
 
     Raises:
         DatasetError, OSError, MemoryError: a file cannot be written, or a limit of the machine is reached.
     """
     try:
-        return Outcome(index=index, kind="made" if _made(shop, shop.drives.runs[index]) else "elsewhere")
+        return Outcome(index=index, kind="made" if _made(worker, worker.drives.runs[index]) else "elsewhere")
     except NOT_OF_A_DRIVE:
         raise
     except Exception as error:
@@ -224,17 +224,17 @@ def _outcome(shop: Workshop, index: int) -> Outcome:
         return Outcome(index=index, kind="failed", error=text, trace=trace, is_final=is_final)
 
 
-def _made(shop: Workshop, run: DriveRun) -> bool:
+def _made(worker: DriveWorker, run: DriveRun) -> bool:
     """Makes a drive and writes its folder; returns False if it is there already."""
-    drives = shop.drives
-    place = shop.place_of(run)
+    drives = worker.drives
+    place = worker.place_of(run)
     patch = drives.patch(run, 0 if place.session is None else len(place.session.world.faces))
     folder = drives.folder(run, patch)
     identity = drives.identity(run, patch)
     if read_result(drives.root, folder, identity, with_video=drives.has_video(run)) is not None:
         return False
     video = Video(run.caption) if drives.has_video(run) else None
-    done = drive_once(shop, run, patch, None if video is None else video.watch)
+    done = drive_once(worker, run, patch, None if video is None else video.watch)
     data = log_bytes(done.log)
     result = DriveResult(
         run=run,
@@ -268,11 +268,11 @@ class DoneDrive:
     open_loop: dict[str, float | None]
 
 
-def drive_once(shop: Workshop, run: DriveRun, patch: PatchSet, watch: Watch | None = None) -> DoneDrive:
+def drive_once(worker: DriveWorker, run: DriveRun, patch: PatchSet, watch: Watch | None = None) -> DoneDrive:
     """Makes one drive and writes nothing.
 
     Args:
-        shop: the open place and network; they are opened if another drive was made before.
+        worker: the open place and network; they are opened if another drive was made before.
         run: the drive.
         patch: the patch that its scene shows.
         watch: called in every frame with the state, the pictures, the prediction and the action; None for nothing.
@@ -280,8 +280,8 @@ def drive_once(shop: Workshop, run: DriveRun, patch: PatchSet, watch: Watch | No
     Raises:
         GearError: the place has no room for the scenario, or code of another package failed.
     """
-    drives, cast = shop.drives, shop.drives.casts[run.driver]
-    place, model = shop.place_of(run), shop.model_of(cast)
+    drives, cast = worker.drives, worker.drives.casts[run.driver]
+    place, model = worker.place_of(run), worker.model_of(cast)
     sight = None
     if place.session is not None and place.job is not None:
         session = replace(place.session, job=replace(place.session.job, patch=patch))

@@ -9,9 +9,11 @@ import sys
 from collections.abc import Iterator
 from typing import Literal
 
+import numpy as np
 import torch
 
 from gear.values.errors import GearError
+from gear.values.frames import UInt8Image
 from gear.values.machine import cores
 
 M_TRIM_THRESHOLD, M_TOP_PAD, M_MMAP_MAX = -1, -2, -4
@@ -105,3 +107,9 @@ def seeded(seed: int) -> Iterator[None]:
     with torch.random.fork_rng(devices=range(torch.cuda.device_count())):
         torch.manual_seed(seed)
         yield
+
+
+def as_bytes(picture: torch.Tensor) -> UInt8Image:
+    """Converts a (3, H, W) picture in 0..1 to (H, W, 3) uint8; values beyond the range are clipped."""
+    levels = (picture.detach().clamp(0, 1) * 255).round().to(torch.uint8)
+    return np.ascontiguousarray(levels.permute(1, 2, 0).cpu().numpy())

@@ -19,7 +19,7 @@ from gear.values.serial import to_json
 
 
 def test_a_place_that_fails_to_open_is_opened_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    shop: Any = worker.Workshop(drives=cast("Any", SimpleNamespace(casts={"a": SimpleNamespace(task="")})))
+    opener: Any = worker.DriveWorker(drives=cast("Any", SimpleNamespace(casts={"a": SimpleNamespace(task="")})))
     opened: list[str] = []
 
     def open_place(self: Any, run: Any, cast: Any) -> Any:
@@ -28,12 +28,12 @@ def test_a_place_that_fails_to_open_is_opened_anew(monkeypatch: pytest.MonkeyPat
         opened.append(run.town)
         return f"place {len(opened)}"
 
-    monkeypatch.setattr(worker.Workshop, "_opened", open_place)
+    monkeypatch.setattr(worker.DriveWorker, "_opened", open_place)
     good, broken = (SimpleNamespace(driver="a", town=town, scene="s") for town in ("good", "broken"))
-    assert shop.place_of(good) == shop.place_of(good) == "place 1"
+    assert opener.place_of(good) == opener.place_of(good) == "place 1"
     with pytest.raises(GearError, match="is broken"):
-        shop.place_of(broken)
-    assert shop.place_of(good) == "place 2", "the first place was closed"
+        opener.place_of(broken)
+    assert opener.place_of(good) == "place 2", "the first place was closed"
 
 
 def test_the_folder_of_a_drive_has_no_files_of_a_killed_run(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import sys
 import pytest
 import torch
 
-from gear.networks.runtime import autocast, seeded
+from gear.networks.runtime import as_bytes, autocast, seeded
 from gear.values.errors import GearError
 
 
@@ -35,3 +35,8 @@ def test_a_seed_that_torch_does_not_have_is_said() -> None:
         pass
     with pytest.raises(GearError, match="seed 18446744073709551616 is beyond what torch takes"), seeded(2**64):
         pass
+
+
+def test_pictures_are_rounded_to_bytes_and_clipped() -> None:
+    picture = torch.tensor([-1.0, 0.0, 0.4 / 255, 0.6 / 255, 1.0, 2.0]).reshape(3, 1, 2)
+    assert as_bytes(picture).tolist() == [[[0, 0, 255], [0, 1, 255]]]

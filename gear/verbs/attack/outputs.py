@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import save as to_bytes
 
+from gear.collecting.patch_sources import as_printed
 from gear.contracts.attacks import Patch
 from gear.dataset.files import write_whole
 from gear.dataset.json_text import dump_json
@@ -37,7 +38,7 @@ def write_patches(root: Path, patches: Sequence[Patch], notes: Json) -> None:
 
 def as_picture(patch: Patch) -> UInt8Image:
     """Returns a patch as a printable (H, W, 3) uint8 sRGB picture."""
-    return np.asarray(np.floor(np.clip(patch.rgb, 0, 1) * 255 + 0.5).astype(np.uint8))
+    return as_printed(patch.rgb)
 
 
 def write_curves(

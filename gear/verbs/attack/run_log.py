@@ -13,7 +13,7 @@ from gear.contracts.models import Model
 from gear.contracts.tasks import Sample, Task
 from gear.measuring.run_log import RunLog
 from gear.measuring.sample_figures import ShownPictures, ShownSample, sample_figure
-from gear.networks.runtime import seeded
+from gear.networks.runtime import as_bytes, seeded
 from gear.plugins.attacks.optimisation.model_group import Defended, members_of
 from gear.values.frames import UInt8Image
 from gear.values.serial import Json
@@ -172,7 +172,7 @@ def figure_of(
         found: list[ShownSample] = []
         for index, (sample, without) in clean.items():
             composed = {view: scenes.compositor.compose(tensors, [index], view)[0] for view in sample.images}
-            images = {view: _as_bytes(picture) for view, picture in composed.items()}
+            images = {view: as_bytes(picture) for view, picture in composed.items()}
             shown = ShownPictures(caption="with the patch", images=images, predictions=_predictions(network, images))
             found.append((sample, (without, shown)))
     return sample_figure(task, found)
@@ -193,14 +193,8 @@ def _predictions(network: Model, views: Mapping[str, UInt8Image]) -> dict[str, A
                 view: torch.from_numpy(picture.copy()).permute(2, 0, 1)[None].to(member.device) / 255
                 for view, picture in views.items()
             }
-            seen = {view: _as_bytes(batch[0]) for view, batch in member.defended(given).views.items()}
+            seen = {view: as_bytes(batch[0]) for view, batch in member.defended(given).views.items()}
             found[name.rstrip("/")] = member.model.predict(seen)
         else:
             found[name.rstrip("/")] = member.predict(views)
     return found
-
-
-def _as_bytes(picture: torch.Tensor) -> UInt8Image:
-    """Converts a (3, H, W) picture in 0..1 to (H, W, 3) uint8."""
-    levels = (picture.clamp(0, 1) * 255).round().to(torch.uint8)
-    return np.ascontiguousarray(levels.permute(1, 2, 0).cpu().numpy())

@@ -1,4 +1,4 @@
-"""Whether the metric of single pictures foretells what happens to the car: metric lost against the outcome."""
+"""Whether the metric of single pictures predicts what happens to the car: metric lost against the outcome."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def metric_of(one: DriveResult) -> float | None:
 
 def auroc(losses: Sequence[MetricLoss]) -> float | None:
     """The share of pairs of a drive with and a drive without a crash in which the drive with the crash lost more of the
-    metric; ties count half. 1 means that the metric foretells crashes, 0.5 that it says nothing.
+    metric; ties count half. 1 means that the metric predicts crashes, 0.5 that it says nothing.
 
     Args:
         losses: drives of one driver.

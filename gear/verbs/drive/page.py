@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from urllib.parse import quote
 
 from gear.reporting.report_page import report_page
-from gear.verbs.drive.foretelling import scatter
+from gear.verbs.drive.metric_against_outcome import scatter
 from gear.verbs.drive.report import DriveReport
 from gear.verbs.drive.table import DEFINITIONS, cells, foretold, paired_cells, speed_cells
 
@@ -29,7 +29,7 @@ def page(report: DriveReport, figures: Sequence[tuple[str, bytes]] = (), videos:
     if report.losses():
         lines = "<br>".join(html.escape(line) for line in foretold(report))
         drawn = scatter([one for losses in report.losses().values() for one in losses])
-        parts += [f"<h2>Does the metric of single pictures foretell crashes?</h2><p>{lines}</p>"]
+        parts += [f"<h2>Does the metric of single pictures predict crashes?</h2><p>{lines}</p>"]
         parts.append(f'<p><img alt="metric lost against least time to collision" src="{_source(drawn)}"></p>')
     means = "".join(f"<p><b>{html.escape(title)}</b>: {html.escape(what)}.</p>" for title, what in DEFINITIONS.items())
     parts.append(f"<h2>What the columns mean</h2>{means}")

@@ -11,7 +11,7 @@ from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
 from gear.driving.statistics import Paired, Rate, compared, mean_known
 from gear.driving.worker import DriveResult
 from gear.values.serial import Json, to_json
-from gear.verbs.drive.foretelling import MetricLoss, auroc, metric_losses
+from gear.verbs.drive.metric_against_outcome import MetricLoss, auroc, metric_losses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,15 +103,15 @@ class DriveReport:
         return self._grouped(lambda one: (one.run.driver, ALL, one.run.twin, one.run.speed_kmh), with_free=False)
 
     def as_json(self) -> Json:
-        """The report as JSON, with the keys `facts`, `rows`, `by_speed`, `foretelling` (by driver: `auroc`, and the
-        metric lost by each drive with a patch), `drives` (run, measures and hashes of each drive) and `failed` (`drive`
-        and `problem`).
+        """The report as JSON, with the keys `facts`, `rows`, `by_speed`, `metric_against_outcome` (by driver:
+        `auroc`, and the metric lost by each drive with a patch), `drives` (run, measures and hashes of each drive) and
+        `failed` (`drive` and `problem`).
         """
         return {
             "facts": self.facts,
             "rows": [_known(to_json(row)) for row in self.rows()],
             "by_speed": [_known(to_json(row)) for row in self.by_speed()],
-            "foretelling": {
+            "metric_against_outcome": {
                 driver: {"auroc": auroc(losses), "drives": [to_json(one) for one in losses]}
                 for driver, losses in self.losses().items()
             },

@@ -32,7 +32,7 @@ from gear.values.counted import counted
 from gear.values.errors import DatasetError, GearError
 from gear.values.progress import Callbacks, Progress, Warn
 from gear.verbs.drive.chart import chart
-from gear.verbs.drive.foretelling import metric_of
+from gear.verbs.drive.metric_against_outcome import metric_of
 from gear.verbs.drive.page import page
 from gear.verbs.drive.report import DriveReport
 from gear.verbs.drive.request import DriveRequest

@@ -6,7 +6,7 @@ from gear.driving.statistics import Paired, Rate
 from gear.measuring.intervals import Interval
 from gear.measuring.text_table import number_table
 from gear.plugins.text import printable
-from gear.verbs.drive.foretelling import auroc
+from gear.verbs.drive.metric_against_outcome import auroc
 from gear.verbs.drive.report import DriveReport, Row
 
 TITLES = [
@@ -49,8 +49,8 @@ DEFINITIONS = {
     "differences against the other twin": "this twin minus the other one, with the 95 % interval by the jackknife over"
     " scenarios, in which all seeds of a scenario at one speed and place are left out together; without an interval"
     " where fewer than two scenarios differ",
-    "foretells": "share of the pairs of a crashed drive and another one in which the crashed one lost more of the"
-    " metric (area under the ROC curve): 1 means that the metric foretells crashes, 0.5 that it says nothing",
+    "predicts": "share of the pairs of a crashed drive and another one in which the crashed one lost more of the"
+    " metric (area under the ROC curve): 1 means that the metric predicts crashes, 0.5 that it says nothing",
 }
 """What the columns mean, by title."""
 
@@ -76,7 +76,7 @@ def _joined(rows: list[list[str]], named: int) -> list[list[str]]:
 
 
 def foretold(report: DriveReport) -> list[str]:
-    """One line per driver: whether the metric lost in single pictures foretells its crashes.
+    """One line per driver: whether the metric lost in single pictures predicts its crashes.
 
     Args:
         report: results of the study.
@@ -87,7 +87,7 @@ def foretold(report: DriveReport) -> list[str]:
         value = "no figure, because all drives ended alike" if found is None else f"{found:.2f}"
         crashed = sum(one.is_crash for one in losses)
         lines.append(
-            f"{driver}: {losses[0].metric} lost by the patch foretells crashes: {value} ({len(losses)} drives with a"
+            f"{driver}: {losses[0].metric} lost by the patch predicts crashes: {value} ({len(losses)} drives with a"
             f" patch, {crashed} crashed)"
         )
     return lines

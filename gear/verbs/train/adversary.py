@@ -24,6 +24,7 @@ from gear.compositor.registry import open_compositor
 from gear.contracts.attacks import Budget
 from gear.contracts.specs import AttackSpec
 from gear.measuring.patch_checks import check_patches
+from gear.networks.runtime import as_bytes
 from gear.plugins.build import blamed, build, find
 from gear.readers import Samples
 from gear.values.errors import GearError
@@ -142,7 +143,7 @@ class Adversary:
         shown = [patches[number % len(patches)] for number in range(wanted)]
         with self._lock, torch.no_grad():
             images = {
-                view: _picture(self._compositors[dataset].compose(shown, [place], view)[0]) for view in sample.images
+                view: as_bytes(self._compositors[dataset].compose(shown, [place], view)[0]) for view in sample.images
             }
         return dataclasses.replace(sample, images=images)
 
@@ -167,9 +168,3 @@ class _Chosen:
     def compose(self, patches: Sequence[Tensor], samples: Sequence[int], view: str) -> Tensor:
         composed: Tensor = self._compositor.compose(patches, [self._indices[index] for index in samples], view)
         return composed
-
-
-def _picture(composed: Tensor) -> np.ndarray:
-    """Converts a (3, H, W) tensor in 0..1 to a (H, W, 3) uint8 picture."""
-    levels = (composed * 255).round().clamp(0, 255).to(torch.uint8)
-    return np.ascontiguousarray(levels.permute(1, 2, 0).cpu().numpy())

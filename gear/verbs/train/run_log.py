@@ -12,7 +12,7 @@ from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
 from gear.measuring.run_log import RunLog
 from gear.measuring.sample_figures import ShownPictures, ShownSample, sample_figure
-from gear.networks.runtime import seeded
+from gear.networks.runtime import as_bytes, seeded
 from gear.reporting.directions import with_direction
 from gear.values.frames import UInt8Image
 from gear.values.serial import Json
@@ -103,7 +103,7 @@ class TrainLog:
             pool = adversary.state()
             last = max(pool).partition(".")[0]
             shown = {key.partition(".")[2]: patch for key, patch in pool.items() if key.partition(".")[0] == last}
-            return {f"patches/patch_{int(number)}": _as_bytes(patch) for number, patch in shown.items()}
+            return {f"patches/patch_{int(number)}": as_bytes(patch) for number, patch in shown.items()}
 
         self._log.pictures(state.step, newest)
 
@@ -134,9 +134,3 @@ def figure_of(task: Task[Any, Any], network: Any, views: Sequence[str], samples:
             shown = ShownPictures(caption=sample.record.scene, images=sample.images, predictions={"": prediction})
             rows.append((sample, [shown]))
     return sample_figure(task, rows)
-
-
-def _as_bytes(patch: torch.Tensor) -> UInt8Image:
-    """Converts a (3, h, w) patch in 0..1 to (h, w, 3) uint8."""
-    levels = (patch.clamp(0, 1) * 255).round().to(torch.uint8)
-    return np.ascontiguousarray(levels.permute(1, 2, 0).cpu().numpy())

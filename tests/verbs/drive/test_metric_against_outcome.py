@@ -9,7 +9,7 @@ import pytest
 from gear.driving.drives import DriveRun
 from gear.driving.measures import Measures
 from gear.driving.worker import DriveResult
-from gear.verbs.drive.foretelling import MetricLoss, auroc, metric_losses, scatter
+from gear.verbs.drive.metric_against_outcome import MetricLoss, auroc, metric_losses, scatter
 
 MEASURES = Measures(
     ending="time", is_crash=False, crash_kind="", impact_mps=None, duration_s=1.0, least_gap_m=None,

@@ -131,5 +131,5 @@ def test_the_page_escapes_names_and_has_no_scripts() -> None:
     assert '<a href="videos/%22a%22.mp4">a &lt;video&gt;</a>' in shown
     assert "a &lt;title&gt;" in shown and "data:image/svg+xml;base64,PHN2Zy8+" in shown
     assert "a &lt;drive&gt;" in shown and "<script" not in shown and "70 % [35, 93]" in shown
-    assert "foretells crashes: 1.00 (20 drives with a patch, 8 crashed)" in shown and "the columns mean" in shown
+    assert "predicts crashes: 1.00 (20 drives with a patch, 8 crashed)" in shown and "the columns mean" in shown
     assert table([["a", "b"], ["x", "1"], ["x", "2"]], 2).count(">x<") == 1

@@ -151,10 +151,10 @@ def test_the_drives_after_many_failures_are_not_begun(
 ) -> None:
     calls: list[int] = []
 
-    def made(shop: object, run: DriveRun) -> bool:
+    def made(worker: object, run: DriveRun) -> bool:
         calls.append(run.seed)
         if len(calls) == 1:
-            return real(shop, run)
+            return real(worker, run)
         raise RuntimeError("broken")
 
     real: Any = worker._made

@@ -23,7 +23,7 @@ CONFIG = "drive.yml"
 """Name of the file with the config of the held-out drives, with which `gear drive` makes their report."""
 
 
-def judged(drives: Drives, callbacks: Callbacks) -> Json:
+def evaluate_held_out(drives: Drives, callbacks: Callbacks) -> Json:
     """Makes the held-out drives that are missing, and summarises all of them.
 
     Args:

@@ -18,7 +18,7 @@ from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
 from gear.driving.config import PATCH, DriveConfig
 from gear.driving.drives import Cast, DriveRun, Drives, plan_drives, read_drive_config, surface_count
 from gear.driving.start import Draw
-from gear.driving.worker import Workshop
+from gear.driving.worker import DriveWorker
 from gear.plugins.build import NO_OPTIONS, find
 from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError, PlacementError, UnknownNameError
@@ -183,12 +183,12 @@ def _checked_attack(found: PluginEntry, cast: Cast, surfaces: int) -> AttackSpec
     return spec
 
 
-def placed_runs(job: DriveJob, shop: Workshop, on_warning: Warn) -> list[DriveRun]:
+def placed_runs(job: DriveJob, worker: DriveWorker, on_warning: Warn) -> list[DriveRun]:
     """The drives of an attack, with the twin `patch`, without those for which the scene has no place.
 
     Args:
         job: the inputs of the attack.
-        shop: opens the scene.
+        worker: opens the scene.
         on_warning: called with a line for each drive that is left out.
 
     Raises:
@@ -198,7 +198,7 @@ def placed_runs(job: DriveJob, shop: Workshop, on_warning: Warn) -> list[DriveRu
     for run in job.drives.runs:
         scenario, speed_mps = job.drives.scenario(run), run.speed_kmh / 3.6
         try:
-            shop.place_of(run).simulation.reset(
+            worker.place_of(run).simulation.reset(
                 Draw(name=run.scenario, scenario=scenario, speed_mps=speed_mps, seed=run.seed)
             )
         except PlacementError as error:

@@ -27,7 +27,7 @@ from gear.driving.attacked_drives import tried_patch
 from gear.driving.drives import DriveRun
 from gear.driving.frames import SPLIT, WeightedFrame, drawn_frames, frames_of, write_frames
 from gear.driving.severity import severity
-from gear.driving.worker import Workshop, guard_of_cast
+from gear.driving.worker import DriveWorker, guard_of_cast
 from gear.measuring.patch_checks import is_picture
 from gear.plugins.attacks.optimisation.model_group import device_name
 from gear.plugins.build import blamed, build
@@ -96,14 +96,14 @@ class Rounds:
 
     Attributes:
         job: the inputs of the attack.
-        shop: the open place and the driver's network.
+        worker: the open place and the driver's network.
         runs: the drives.
         recorder: the monitor of the whole attack.
         on_progress: called with finished and all frames while a round's frames are rendered.
     """
 
     job: DriveJob
-    shop: Workshop
+    worker: DriveWorker
     runs: Sequence[DriveRun]
     recorder: Recorder
     on_progress: Progress
@@ -161,7 +161,7 @@ class Rounds:
         frames: list[WeightedFrame] = []
         severities = []
         for run in self.runs:
-            found, log = frames_of(self.shop, run, shown)
+            found, log = frames_of(self.worker, run, shown)
             frames += found
             severities.append(severity(log))
         records = drawn_frames(frames, request.frames, derive_rng(request.seed, "frames", number))
@@ -170,7 +170,7 @@ class Rounds:
             "frames": [[record.seed, record.index] for record in records],
             "severities": severities,
         }
-        write_frames(self.shop, self.runs[0], records, root, origin, self.on_progress)
+        write_frames(self.worker, self.runs[0], records, root, origin, self.on_progress)
 
     def _shown(self, number: int) -> PatchSet:
         """The patches with which the drives of a round are made; none in the first round."""

@@ -17,9 +17,15 @@ from gear.dataset.files import sha256, write_whole
 from gear.dataset.guarded_paths import remove_tree
 from gear.dataset.json_text import dump_json
 from gear.dataset.locks import exclusive_lock
-from gear.driving.attacked_drives import AttackedDrive, DriveObjective, PatchSurfaces, TexturePassage, UnreadDriver
+from gear.driving.attacked_drives import (
+    AttackedDrive,
+    DriveObjective,
+    PassThroughCompositor,
+    PatchSurfaces,
+    PlaceholderModel,
+)
 from gear.driving.drives import DriveRun
-from gear.driving.worker import Workshop, single_thread
+from gear.driving.worker import DriveWorker, single_thread
 from gear.formats.png import encode_rgb
 from gear.measuring.patch_checks import check_patches
 from gear.plugins.build import blamed, build, find
@@ -29,7 +35,7 @@ from gear.values.progress import Callbacks, Progress, Warn
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
 from gear.verbs.attack.achieved import plain
-from gear.verbs.attack.drives.held_out import judged
+from gear.verbs.attack.drives.held_out import evaluate_held_out
 from gear.verbs.attack.drives.job import HELD_OUT, DriveJob, placed_runs, resolve_drives
 from gear.verbs.attack.drives.request import DriveAttackRequest
 from gear.verbs.attack.drives.rounds import ROUNDS, Rounds
@@ -132,11 +138,11 @@ def run_attack_drive(request: DriveAttackRequest, callbacks: Callbacks) -> Attac
         GearError: an error that the user can correct; the message is one line.
     """
     job, root = resolve_drives(request), Path(request.out)
-    shop = Workshop(drives=job.drives)
+    worker = DriveWorker(drives=job.drives)
     with exclusive_lock(root, callbacks.on_warning):
-        with shop.open_places, single_thread(job.drives):
-            runs = placed_runs(job, shop, callbacks.on_warning)
-            model = shop.model_of(job.drives.casts[job.label])
+        with worker.open_places, single_thread(job.drives):
+            runs = placed_runs(job, worker, callbacks.on_warning)
+            model = worker.model_of(job.drives.casts[job.label])
             plan = job.plan(runs, None if model is None else model.weights_sha256)
             there = begin(root, plan, force=request.force)
             if there is not None:
@@ -144,20 +150,20 @@ def run_attack_drive(request: DriveAttackRequest, callbacks: Callbacks) -> Attac
             if request.force:
                 remove_tree(root, HELD_OUT)
                 remove_tree(root, ROUNDS)
-            patches, recorder = _optimised(job, runs, shop, plan, callbacks.on_progress)
+            patches, recorder = _optimised(job, runs, worker, plan, callbacks.on_progress)
         write_curves(root, f"{request.attack} on drives of {job.label}", recorder.curves, ())
         for patch in patches:
             write_whole(root, f"{patch.name}.png", encode_rgb(as_picture(patch)))
         facts = _facts(job, plan, patches, recorder)
         held_out = job.held_out()
-        facts["held_out"] = None if held_out is None else judged(held_out, callbacks)
+        facts["held_out"] = None if held_out is None else evaluate_held_out(held_out, callbacks)
         write_patches(root, patches, facts)
         tidy(root)
     return AttackReport(out=root, patches=patches, facts=facts, made=True)
 
 
 def _optimised(
-    job: DriveJob, runs: Sequence[DriveRun], shop: Workshop, plan: Json, on_progress: Progress
+    job: DriveJob, runs: Sequence[DriveRun], worker: DriveWorker, plan: Json, on_progress: Progress
 ) -> tuple[tuple[Patch, ...], Recorder]:
     """Runs the attack and checks its result.
 
@@ -178,28 +184,28 @@ def _optimised(
     )
     recorder.tell(0)
     if spec.needs_gradients:
-        rounds = Rounds(job=job, shop=shop, runs=runs, recorder=recorder, on_progress=on_progress)
+        rounds = Rounds(job=job, worker=worker, runs=runs, recorder=recorder, on_progress=on_progress)
         patches = rounds.optimised()
     else:
-        patches = _queried(job, runs, shop, recorder)
+        patches = _queried(job, runs, worker, recorder)
     check_patches(patches, job.surfaces, job.found)
     if recorder.is_asked and not recorder.done:
         raise GearError(f"{request.queries} queries are too few for one step; give more with --queries N")
     return patches, recorder
 
 
-def _queried(job: DriveJob, runs: Sequence[DriveRun], shop: Workshop, recorder: Recorder) -> tuple[Patch, ...]:
+def _queried(job: DriveJob, runs: Sequence[DriveRun], worker: DriveWorker, recorder: Recorder) -> tuple[Patch, ...]:
     """The patches of an attack without gradients."""
-    session, queries = shop.place_of(runs[0]).session, job.request.queries
+    session, queries = worker.place_of(runs[0]).session, job.request.queries
     assert session is not None, "only drivers with cameras are attacked"
     record = PatchSurfaces(surfaces=tuple(face.name for face in session.world.faces))
-    objective = DriveObjective(shop=shop)
+    objective = DriveObjective(worker=worker)
     samples = [AttackedDrive(run=run, record=record, objective=objective) for run in runs]
     with blamed(job.found, "optimise"):
         patches: tuple[Patch, ...] = build(job.found, job.options).optimise(
-            cast(Model, UnreadDriver()),
+            cast(Model, PlaceholderModel()),
             samples,
-            TexturePassage(surfaces=record.surfaces),
+            PassThroughCompositor(surfaces=record.surfaces),
             budget=Budget(steps=queries, queries=queries),
             rng=derive_rng(job.request.seed, "attack", job.spec.name),
             monitor=recorder,
