@@ -52,7 +52,7 @@ def alarms(scores: Sequence[float], threshold: float) -> npt.NDArray[np.bool_]:
 
 
 def share_interval(count: int, total: int) -> tuple[float, float]:
-    """The exact 95 % confidence interval of a share (Clopper and Pearson, Biometrika 1934).
+    """Returns the exact 95 % confidence interval of a share (Clopper and Pearson, Biometrika 1934).
 
     Args:
         count: number of pictures with an alarm.

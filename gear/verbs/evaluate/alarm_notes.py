@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gear.contracts.tasks import NO_PATCH
+from gear.measuring.detection_rates import share_interval
 from gear.values.serial import Json
 from gear.verbs.evaluate.report import ALARMS, RowReport
 
@@ -38,7 +39,4 @@ def alarm_notes(rows: Sequence[RowReport], fit: Json) -> list[str]:
 
 def _least_share(row: RowReport) -> float:
     """Returns the lower end of the exact 95 % interval of a dataset's share of alarms."""
-    from scipy import stats
-
-    alarms = round(row.defense[ALARMS] * row.samples)
-    return float(stats.beta.ppf(0.025, alarms, row.samples - alarms + 1)) if alarms else 0.0
+    return share_interval(round(row.defense[ALARMS] * row.samples), row.samples)[0]
