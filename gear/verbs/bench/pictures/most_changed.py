@@ -10,7 +10,6 @@ from gear.measuring.reports import TASK
 from gear.values.serial import Json
 from gear.verbs.bench.plan import PATCH
 from gear.verbs.bench.report import FOUND_SHARE, Result, TaskResult
-from gear.verbs.evaluate.report import RowReport
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,15 +49,13 @@ def most_changed(task: TaskResult, one: Result, count: int) -> list[Chosen]:
     found = []
     for place, names in enumerate(zip(pools[NO_PATCH].rows, pools[PATCH].rows, strict=True)):
         clean, patched = (rows[name] for name in names)
-        found += [_compared(task, place, *pair) for pair in zip(_samples(clean), _samples(patched), strict=False)]
+        found += [_compared(task, place, *pair) for pair in zip(clean.per_sample, patched.per_sample, strict=False)]
     found.sort(key=lambda each: (-_harm(task, each), each.place, each.index))
-    first_of_scene = [each for n, each in enumerate(found) if each.place not in {other.place for other in found[:n]}]
-    others = [each for each in found if each not in first_of_scene]
-    return [*first_of_scene, *others][:count]
-
-
-def _samples(row: RowReport) -> list[Json]:
-    return list(row.per_sample)
+    worst_of_scene: dict[int, Chosen] = {}
+    for each in found:
+        worst_of_scene.setdefault(each.place, each)
+    others = (each for each in found if worst_of_scene[each.place] is not each)
+    return [*worst_of_scene.values(), *others][:count]
 
 
 def _compared(task: TaskResult, place: int, clean: Json, patched: Json) -> Chosen:
