@@ -18,6 +18,7 @@ from gear.reporting.legend import draw_legend
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
 from gear.verbs.bench.gains import is_failed
+from gear.verbs.bench.paper_tables import row_of
 from gear.verbs.bench.pictures.figure import figure
 from gear.verbs.bench.pictures.most_changed import Chosen, most_changed
 from gear.verbs.bench.plan import ADAPTIVE, PATCH
@@ -99,10 +100,9 @@ def _line(task: TaskResult, alone: Result, chosen: Chosen, scenes: Sequence[str]
 
 def _shown(one: Result, kind: str, chosen: Chosen) -> Shown | None:
     """Reads a sample and its stored prediction; None if there is no such kind of patch or no prediction."""
-    pool = next((each for each in one.evaluation.pools if each.name == kind), None)
-    if pool is None:
+    row = row_of(one, kind, chosen.place)
+    if row is None:
         return None
-    row = next(each for each in one.evaluation.rows if each.name == pool.rows[chosen.place])
     dataset = open_dataset(row.dataset)
     sample = dataset[chosen.index]
     stored = _stored(one, row.name)
