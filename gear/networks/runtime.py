@@ -109,7 +109,10 @@ def seeded(seed: int) -> Iterator[None]:
         yield
 
 
-def as_bytes(picture: torch.Tensor) -> UInt8Image:
-    """Converts a (3, H, W) picture in 0..1 to (H, W, 3) uint8; values beyond the range are clipped."""
-    levels = (picture.detach().clamp(0, 1) * 255).round().to(torch.uint8)
-    return np.ascontiguousarray(levels.permute(1, 2, 0).cpu().numpy())
+def as_bytes(pictures: torch.Tensor) -> UInt8Image:
+    """Converts one picture, (3, H, W) in 0..1, to (H, W, 3) uint8, or a batch, (B, 3, H, W), to (B, H, W, 3).
+
+    Values beyond the range are clipped.
+    """
+    levels = (pictures.detach().clamp(0, 1) * 255).round().to(torch.uint8)
+    return np.ascontiguousarray(levels.movedim(-3, -1).cpu().numpy())

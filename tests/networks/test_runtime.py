@@ -39,4 +39,7 @@ def test_a_seed_that_torch_does_not_have_is_said() -> None:
 
 def test_pictures_are_rounded_to_bytes_and_clipped() -> None:
     picture = torch.tensor([-1.0, 0.0, 0.4 / 255, 0.6 / 255, 1.0, 2.0]).reshape(3, 1, 2)
-    assert as_bytes(picture).tolist() == [[[0, 0, 255], [0, 1, 255]]]
+    rounded = [[[0, 0, 255], [0, 1, 255]]]
+    assert as_bytes(picture).tolist() == rounded
+    batch = as_bytes(torch.stack([1 - picture, picture]).requires_grad_(True))
+    assert batch.shape == (2, 1, 2, 3) and batch.flags.c_contiguous and batch[1].tolist() == rounded

@@ -115,6 +115,7 @@ def each_as_uint8(pictures: Tensor, clean: Any) -> Tensor:
     """
     import torch
 
-    levels = (pictures.detach().clamp(0, 1) * 255).round().to(torch.uint8).permute(0, 2, 3, 1).cpu().numpy()
-    cleaned = np.stack([clean(picture) for picture in levels])
+    from gear.networks.runtime import as_bytes
+
+    cleaned = np.stack([clean(picture) for picture in as_bytes(pictures)])
     return torch.from_numpy(cleaned).to(pictures).permute(0, 3, 1, 2) / 255

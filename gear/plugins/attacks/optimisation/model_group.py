@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from gear.contracts.defenses import DefendedBatch, Defense
 from gear.contracts.models import Model
+from gear.networks.runtime import as_bytes
 from gear.plugins.attacks.optimisation.frozen_model import networks_of
 from gear.values.frames import UInt8Image
 
@@ -199,7 +200,7 @@ def _cleaned_as_bytes(
     clean: Callable[[Mapping[str, UInt8Image]], Mapping[str, UInt8Image]], views: Mapping[str, Tensor]
 ) -> Mapping[str, Tensor]:
     """Cleans (B, 3, H, W) pictures in 0..1 one sample at a time, as uint8 pictures and without gradients."""
-    given = {name: _as_bytes(batch.detach()) for name, batch in views.items()}
+    given = {name: as_bytes(batch) for name, batch in views.items()}
     count = len(next(iter(given.values())))
     cleaned = [clean({name: batch[i] for name, batch in given.items()}) for i in range(count)]
     seen = {}
@@ -207,12 +208,6 @@ def _cleaned_as_bytes(
         pictures = torch.from_numpy(np.stack([one[name] for one in cleaned])).permute(0, 3, 1, 2)
         seen[name] = pictures.to(batch.device, batch.dtype) / 255
     return seen
-
-
-def _as_bytes(batch: Tensor) -> UInt8Image:
-    """Converts (B, 3, H, W) values in 0..1 to (B, H, W, 3) uint8."""
-    levels = (batch.clamp(0, 1) * 255).round().to(torch.uint8)
-    return levels.permute(0, 2, 3, 1).contiguous().cpu().numpy()
 
 
 def _networks(*models: Model) -> nn.ModuleList:

@@ -187,8 +187,10 @@ class Jedi(MaskAndFill):
         """
         import torch
 
+        from gear.networks.runtime import as_bytes
+
         height, width = pictures.shape[2:]
-        levels = (pictures.detach().clamp(0, 1) * 255).round().to(torch.uint8).permute(0, 2, 3, 1).cpu().numpy()
+        levels = as_bytes(pictures)
         masks = []
         for side, one in zip(window_sides(height, width), (state or UNCALIBRATED).statistics, strict=True):
             exact = np.stack([window_entropies(grey_levels(picture), side) for picture in levels])

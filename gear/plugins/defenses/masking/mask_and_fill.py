@@ -129,9 +129,11 @@ class MaskAndFill(ABC):
     def _defended(self, views: Mapping[str, Tensor], state: Any) -> DefendedBatch:
         import torch
 
+        from gear.networks.runtime import as_bytes
+
         cleaned, masks, shares = {}, {}, []
         for name, pictures in views.items():
-            levels = (pictures.detach().clamp(0, 1) * 255).round().to(torch.uint8).permute(0, 2, 3, 1).cpu().numpy()
+            levels = as_bytes(pictures)
             located = [self.locate(picture, state) for picture in levels]
             filled = [self.fill(picture, one) for picture, one in zip(levels, located, strict=True)]
             hard = torch.from_numpy(np.stack(located)).to(pictures)
