@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from gear.contracts.models import Model
 from gear.values.frames import UInt8Image
-from gear.values.progress import PhaseProgress
+from gear.values.progress import NO_CALLBACKS, PhaseProgress
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -100,7 +100,24 @@ class Defense(Protocol):
 
 @runtime_checkable
 class FitsInPhases(Protocol):
-    """A defense that reports the progress of its calibration, which takes long or has several phases."""
+    """A defense that reports the progress of its calibration, which takes long or has several phases.
+
+    A defense that names this class as its base gets `fit` from it.
+    """
+
+    def fit(
+        self,
+        clean: Sequence[Mapping[str, UInt8Image]],
+        patched: Sequence[Mapping[str, UInt8Image]],
+        model: Model | None,
+        rng: np.random.Generator,
+    ) -> Any:
+        """Calibrates the defense as `fit_in_phases` does, without reports of the progress.
+
+        Args:
+            clean, patched, model, rng: as in `fit_in_phases`.
+        """
+        return self.fit_in_phases(clean, patched, model, rng, NO_CALLBACKS.on_fit_phase)
 
     def fit_in_phases(
         self,

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gear.contracts.defenses import DefendedBatch, DefenseResult, FitReport
+from gear.contracts.defenses import DefendedBatch, DefenseResult, FitReport, FitsInPhases
 from gear.contracts.models import Model
 from gear.plugins.defenses.activations.feature_maps import deepest, feature_maps, tapped
 from gear.plugins.defenses.activations.z_scores import (
@@ -25,7 +25,7 @@ from gear.plugins.defenses.activations.z_scores import (
 )
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
-from gear.values.progress import NO_CALLBACKS, PhaseProgress
+from gear.values.progress import PhaseProgress
 
 Views = Mapping[str, UInt8Image]
 
@@ -59,7 +59,7 @@ class DetectorState:
         return self.report
 
 
-class Detector:
+class Detector(FitsInPhases):
     """A defense that only scores: pictures are unchanged, and the score grows with the suspicion of an attack.
 
     Args:
@@ -79,22 +79,6 @@ class Detector:
         self._layer, self._compress, self._aggregate = layer, compress, aggregate
         self._false_alarms = false_alarms
 
-    def fit(
-        self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
-    ) -> DetectorState:
-        """Calibrates the detector: statistics of features and the alarm level, from the clean pictures alone.
-
-        Args:
-            clean: pictures without a patch, (H, W, 3) uint8 by camera name, one mapping per sample.
-            patched: pictures of the same scenes with a patch; [] if there are none.
-            model: the network whose feature maps are read.
-            rng: random generator of the calibration.
-
-        Raises:
-            GearError: there are too few pictures, they differ in size, or the model has no such feature map.
-        """
-        return self.fit_in_phases(clean, patched, model, rng, NO_CALLBACKS.on_fit_phase)
-
     def fit_in_phases(
         self,
         clean: Sequence[Views],
@@ -103,14 +87,17 @@ class Detector:
         rng: np.random.Generator,
         on_phase: PhaseProgress,
     ) -> DetectorState:
-        """Calibrates the detector as `fit` does, and reports the progress of each phase.
+        """Calibrates the detector: statistics of features and the alarm level, from the clean pictures alone.
 
         Args:
-            clean, patched, model, rng: as in `fit`.
+            clean: pictures without a patch, (H, W, 3) uint8 by camera name, one mapping per sample.
+            patched: pictures of the same scenes with a patch; [] if there are none.
+            model: the network whose feature maps are read.
+            rng: random generator of the calibration.
             on_phase: called with the unit of the phase and the numbers of finished and of all steps.
 
         Raises:
-            GearError: as in `fit`.
+            GearError: there are too few pictures, they differ in size, or the model has no such feature map.
         """
         assert model is not None
         if len(clean) < FOLDS:

@@ -16,7 +16,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from gear.contracts.defenses import DefendedBatch, DefenseResult, FitReport
+from gear.contracts.defenses import DefendedBatch, DefenseResult, FitReport, FitsInPhases
 from gear.contracts.models import Model
 from gear.plugins.defenses.activations.feature_maps import feature_maps, spread, tapped
 from gear.plugins.defenses.activations.mask_block import COVERED_FROM, Example, Fit, MaskBlock, fit_of, learn
@@ -40,7 +40,7 @@ from gear.plugins.defenses.activations.zmask_layers import Layers, NetworkInput,
 from gear.plugins.defenses.activations.zmask_options import ZMaskConfig
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
-from gear.values.progress import NO_CALLBACKS, PhaseProgress
+from gear.values.progress import PhaseProgress
 
 LAYER_PICTURES = 12
 """Largest number of patched calibration pictures from which the layers are selected."""
@@ -79,7 +79,7 @@ class ZMaskState:
         return self.report
 
 
-class ZMask:
+class ZMask(FitsInPhases):
     """The defense Z-Mask: covers regions that over-activate shallow and deep layers of the protected network.
 
     Its statistics and its fusion block are calibrated on pictures of the reference camera.
@@ -92,8 +92,13 @@ class ZMask:
         self._settings = settings
         self._fill = torch.from_numpy(FILL / np.float32(255))[:, None, None]
 
-    def fit(
-        self, clean: Sequence[Views], patched: Sequence[Views], model: Model | None, rng: np.random.Generator
+    def fit_in_phases(
+        self,
+        clean: Sequence[Views],
+        patched: Sequence[Views],
+        model: Model | None,
+        rng: np.random.Generator,
+        on_phase: PhaseProgress,
     ) -> ZMaskState:
         """Calibrates the defense: statistics from clean pictures, and the fusion block from the same scenes with
         patches.
@@ -103,28 +108,10 @@ class ZMask:
             patched: pictures of the same scenes with a patch, in the same order.
             model: the network whose feature maps are read.
             rng: random generator of the calibration.
-
-        Raises:
-            GearError: there are no pictures, clean and patched pictures show different scenes, or no patch is visible.
-        """
-        return self.fit_in_phases(clean, patched, model, rng, NO_CALLBACKS.on_fit_phase)
-
-    def fit_in_phases(
-        self,
-        clean: Sequence[Views],
-        patched: Sequence[Views],
-        model: Model | None,
-        rng: np.random.Generator,
-        on_phase: PhaseProgress,
-    ) -> ZMaskState:
-        """Calibrates the defense as `fit` does, and reports the progress of each phase.
-
-        Args:
-            clean, patched, model, rng: as in `fit`.
             on_phase: called with the unit of the phase and the numbers of finished and of all steps.
 
         Raises:
-            GearError: as in `fit`.
+            GearError: there are no pictures, clean and patched pictures show different scenes, or no patch is visible.
         """
         assert model is not None
         if not len(clean) or not len(patched):
