@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,27 +67,21 @@ def detection_rates(one: Result, pool: Pool, place: int | None = None) -> tuple[
     Returns:
         One entry for each of `FALSE_ALARMS`; empty without scores, without a patch, or with a single scene.
     """
-    kinds = {
-        each.name: _scores(one, each) for each in one.evaluation.pools if each.name in (NO_PATCH, RANDOM, pool.name)
-    }
-    scores = [kinds[name] for name in (NO_PATCH, pool.name) if name in kinds]
-    clean_pool = next((each for each in one.evaluation.pools if each.name == NO_PATCH), None)
-    if pool.name == NO_PATCH or clean_pool is None or len(scores) < 2 or any(each is None for each in scores):
+    pools = {each.name: each for each in one.evaluation.pools}
+    if pool.name == NO_PATCH or NO_PATCH not in pools:
         return ()
-    clean, patched = kinds[NO_PATCH], kinds[pool.name]
-    assert clean is not None and patched is not None
-    scenes = [(row.facts.get("town"), row.facts.get("scene")) for row in _rows(one, clean_pool)]
-    if len(set(scenes)) < 2 or len(clean) != len(patched):
+    clean, patched = _scores(one, pools[NO_PATCH]), _scores(one, pool)
+    if clean is None or patched is None or len(clean) != len(patched):
         return ()
-    control = None if pool.name == RANDOM else kinds.get(RANDOM)
+    scenes = [(row.facts.get("town"), row.facts.get("scene")) for row in _rows(one, pools[NO_PATCH])]
+    if len(set(scenes)) < 2:
+        return ()
+    control = None if pool.name == RANDOM or RANDOM not in pools else _scores(one, pools[RANDOM])
+    places = range(len(scenes)) if place is None else [place]
+    others = {at: _scores_elsewhere(clean, scenes, at) for at in places}
     found = []
     for allowed in FALSE_ALARMS:
-        thresholds = [
-            threshold_at([score for other, there in zip(scenes, clean, strict=True) if other != at for score in there],
-                         allowed)
-            for at in scenes
-        ]  # fmt: skip
-        places = range(len(scenes)) if place is None else [place]
+        thresholds = {at: threshold_at(scores, allowed) for at, scores in others.items()}
         hits, false = (_alarms(each, thresholds, places) for each in (patched, clean))
         random = None if control is None or len(control) != len(clean) else _alarms(control, thresholds, places)
         found.append(DetectionRate(allowed=allowed, found=_share(hits), false_alarms=_share(false), p=_p(hits, random)))
@@ -110,8 +104,13 @@ def _scores(one: Result, pool: Pool) -> list[list[float]] | None:
     return found
 
 
+def _scores_elsewhere(clean: Sequence[Sequence[float]], scenes: Sequence[Hashable], place: int) -> list[float]:
+    """The clean scores of all datasets that show another scene than the dataset at a position."""
+    return [score for scene, scores in zip(scenes, clean, strict=True) if scene != scenes[place] for score in scores]
+
+
 def _alarms(
-    scores: Sequence[Sequence[float]], thresholds: Sequence[float], places: Sequence[int]
+    scores: Sequence[Sequence[float]], thresholds: Mapping[int, float], places: Sequence[int]
 ) -> npt.NDArray[np.bool_]:
     """Which pictures of some datasets raise an alarm, one dataset after the other."""
     return np.concatenate([alarms(scores[at], thresholds[at]) for at in places])
