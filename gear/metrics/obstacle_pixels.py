@@ -94,10 +94,8 @@ def _points(camera: CameraRecord, rows: Indices, columns: Indices, depth_m: Floa
     if moving := recorded_effects(camera):
         bent = moving[0].pixel_map(camera)  # each pixel of the distorted picture is elsewhere in the pinhole's picture
         x, y = bent.x[rows, columns].astype(np.float64), bent.y[rows, columns].astype(np.float64)
-    pinhole, depth = camera.intrinsics, depth_m.astype(np.float64)
-    rays = [(x - pinhole.cx_px) / pinhole.fx_px, (y - pinhole.cy_px) / pinhole.fy_px, np.ones(len(x))]
-    seen: Array = camera.world_from_camera_transform.apply(np.stack(rays, axis=1) * depth[:, None])
-    return seen
+    seen = camera.intrinsics.unproject(np.stack([x, y], axis=1), depth_m)
+    return camera.world_from_camera_transform.apply(seen)
 
 
 def _reach(actor: ActorRecord, points: Array) -> Array:
