@@ -26,7 +26,7 @@ from gear.plugins.defenses.masking.entropy import (
 )
 from gear.plugins.defenses.masking.jedi_options import JediConfig
 from gear.plugins.defenses.masking.mask_and_fill import Located, MaskAndFill
-from gear.plugins.defenses.masking.mask_iou import MaskIou
+from gear.plugins.defenses.masking.mask_iou import MaskIou, overlap_problems
 from gear.plugins.defenses.masking.visible_patches import visible_patches
 from gear.values.frames import UInt8Image
 
@@ -297,6 +297,4 @@ def _problems(statistics: Sequence[EntropyStatistics], iou: float) -> tuple[str,
             f"jedi: the calibration patches have {statistics[0].patch_mean:.2f} bits of local entropy and clean "
             f"pictures {statistics[0].clean_mean:.2f}, which is less than a standard deviation apart"
         )
-    if iou < 0.1:
-        lines.append(f"jedi learnt nothing: on its own calibration patches its mask has an IoU of {iou:.3f}")
-    return tuple(lines)
+    return (*lines, *overlap_problems("jedi", iou))

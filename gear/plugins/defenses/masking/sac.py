@@ -6,7 +6,7 @@ It follows the authors' code (patch_detector.py, train_coco.py); the segmenter i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -17,7 +17,7 @@ from torch.nn import functional
 from gear.contracts.defenses import FitReport
 from gear.contracts.models import Model
 from gear.plugins.defenses.masking.mask_and_fill import Located, MaskAndFill
-from gear.plugins.defenses.masking.mask_iou import MaskIou
+from gear.plugins.defenses.masking.mask_iou import MaskIou, overlap_problems
 from gear.plugins.defenses.masking.sac_options import SacConfig
 from gear.plugins.defenses.masking.segmenter import SegmenterNetwork, train
 from gear.plugins.defenses.masking.shape_completion import completed
@@ -87,7 +87,8 @@ class Sac(MaskAndFill):
         """
         pairs = visible_patches(clean, patched, self._settings.max_pictures, "sac")
         truths = [self._reduced_mask(area) for _, _, area in pairs]
-        seen = [i for i in range(len(pairs)) if i % HELD_OUT != HELD_OUT - 1 and bool(truths[i].any())]
+        is_held_out = [i % HELD_OUT == HELD_OUT - 1 for i in range(len(pairs))]
+        seen = [i for i, truth in enumerate(truths) if not is_held_out[i] and bool(truth.any())]
         if not seen:
             raise GearError("patches are too small in the reduced calibration pictures: raise width_px of sac")
         network = train(
@@ -101,17 +102,11 @@ class Sac(MaskAndFill):
         state = SacState(network=network, sizes=_sizes([truths[i] for i in seen]), report=FitReport(values={}))
         own, held_out = MaskIou(), MaskIou()
         for i, (_, picture, area) in enumerate(pairs):
-            (own if i % HELD_OUT != HELD_OUT - 1 else held_out).update(self.locate(picture, state), area)
+            (held_out if is_held_out[i] else own).update(self.locate(picture, state), area)
         values = {"pictures": float(len(seen)), "mask_iou": own.value}
         if len(pairs) >= HELD_OUT:
             values["mask_iou_held_out"] = held_out.value
-        problems = []
-        if own.value < 0.1:
-            problems.append(
-                f"sac learnt nothing: on its own calibration patches its mask has an IoU of {own.value:.3f}"
-            )
-        report = FitReport(values=values, problems=tuple(problems))
-        return SacState(network=network, sizes=state.sizes, report=report)
+        return replace(state, report=FitReport(values=values, problems=overlap_problems("sac", own.value)))
 
     def locate(self, picture: UInt8Image, state: SacState) -> Located:
         """Returns the (H, W) bool mask of the segmenter, completed to rectangles.
