@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,8 +22,8 @@ Located = npt.NDArray[np.bool_]
 class MaskAndFill(ABC):
     """The base class of defenses that treat each picture separately: locate patches, then fill their pixels.
 
-    Subclasses define `locate` and `fill` in NumPy, and `locate_tensor`, whose gradient an adaptive attack uses to hide
-    its patch. The score of a sample is the largest share of a picture that is located.
+    Subclasses define `locate` and `fill` in NumPy, `locate_tensor`, whose gradient an adaptive attack uses to hide its
+    patch, and `fit` of the protocol `Defense`. The score of a sample is the largest share of a picture that is located.
     """
 
     @abstractmethod
@@ -52,20 +52,6 @@ class MaskAndFill(ABC):
             picture: (H, W, 3) uint8 sRGB; never changed in place.
             located: (H, W) bool mask of the pixels to replace.
         """
-
-    def fit(
-        self,
-        clean: Sequence[Mapping[str, UInt8Image]],
-        patched: Sequence[Mapping[str, UInt8Image]],
-        model: Model | None,
-        rng: np.random.Generator,
-    ) -> Any:
-        """Does nothing; subclasses that are calibrated override it.
-
-        Args:
-            clean, patched, model, rng: not used.
-        """
-        return None
 
     def apply(
         self, views: Mapping[str, UInt8Image], model: Model | None, state: Any, rng: np.random.Generator
