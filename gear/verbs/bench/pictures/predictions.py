@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import functools
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from gear.contracts.tasks import NO_PATCH, Sample
@@ -26,6 +28,9 @@ from gear.verbs.bench.report import Result, TaskResult
 
 ROWS, WIDTH_PX = 2, 340
 """Number of pictures of each network, and the width of each picture in pixels."""
+
+Opened = Callable[[Path], tuple[StoredResults, ...]]
+"""A function that returns the stored results in the folder of an evaluation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -61,8 +66,9 @@ def predictions(task: TaskResult, scenes: Sequence[str]) -> Iterator[str]:
             continue
         failed = is_failed(task, one, one.pool(PATCH)) if any(p.name == PATCH for p in one.evaluation.pools) else False
         title = f"Predictions of {one.model}, where its patch does most harm{' (failed attack)' * failed}"
+        opened = functools.cache(open_evaluation)  # the results of all samples, which all figures of a network need
         try:
-            lines = [line for each in most_changed(task, one, ROWS) for line in _line(task, one, each, scenes)]
+            lines = [line for each in most_changed(task, one, ROWS) for line in _line(task, one, each, scenes, opened)]
             legends = legends or _legends(one)
         except Exception as error:  # a third party's task, or an evaluation that was changed
             yield f'<h3>{safe(title)}</h3><p class="dim">no pictures: {safe(one_line(error))}</p>'
@@ -72,9 +78,9 @@ def predictions(task: TaskResult, scenes: Sequence[str]) -> Iterator[str]:
     yield from legends
 
 
-def _line(task: TaskResult, alone: Result, chosen: Chosen, scenes: Sequence[str]) -> Iterator[str]:
+def _line(task: TaskResult, alone: Result, chosen: Chosen, scenes: Sequence[str], opened: Opened) -> Iterator[str]:
     """Yields the figures of one sample as one line of HTML."""
-    clean, patched = (_shown(alone, kind, chosen) for kind in (NO_PATCH, PATCH))
+    clean, patched = (_shown(alone, kind, chosen, opened) for kind in (NO_PATCH, PATCH))
     if clean is None or patched is None or not clean.drawn:
         return
     name = next(iter(clean.drawn))
@@ -87,7 +93,7 @@ def _line(task: TaskResult, alone: Result, chosen: Chosen, scenes: Sequence[str]
         if one.model != alone.model or one.defense is None:
             continue
         for kind, of in ((PATCH, "the patch"), (ADAPTIVE, "the adaptive patch")):
-            behind = _shown(one, kind, chosen)
+            behind = _shown(one, kind, chosen, opened)
             if behind is None or name not in behind.drawn:
                 continue
             if one.changes_pictures and camera in behind.defended:
@@ -98,24 +104,20 @@ def _line(task: TaskResult, alone: Result, chosen: Chosen, scenes: Sequence[str]
     yield f"<p>{safe(f'{scenes[chosen.place]}, picture {chosen.index}{value}')}</p><div class=row>{figures}</div>"
 
 
-def _shown(one: Result, kind: str, chosen: Chosen) -> Shown | None:
+def _shown(one: Result, kind: str, chosen: Chosen, opened: Opened) -> Shown | None:
     """Reads a sample and its stored prediction; None if there is no such kind of patch or no prediction."""
     row = row_of(one, kind, chosen.place)
     if row is None:
         return None
     dataset = open_dataset(row.dataset)
     sample = dataset[chosen.index]
-    stored = _stored(one, row.name)
+    stored = next(part for part in opened(one.evaluation.out) if part.name == row.name)
     try:
         prediction = stored.prediction(dataset, sample)
     except DatasetError:
         return None
     drawn = prediction_pictures(dataset.task, sample, prediction)
     return Shown(dataset=dataset, sample=sample, drawn=dict(drawn), defended=stored.defended(chosen.index))
-
-
-def _stored(one: Result, name: str) -> StoredResults:
-    return next(part for part in open_evaluation(one.evaluation.out) if part.name == name)
 
 
 def _legends(one: Result) -> list[str]:
