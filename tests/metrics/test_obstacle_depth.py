@@ -101,6 +101,7 @@ def test_predictions_that_are_no_depth_are_refused(wrong: float) -> None:
 
 def test_every_metric_has_a_range() -> None:
     ours = ObstacleDepth("left")
-    for name in ours.result():
-        low, high = ours.range_of(name)
-        assert low in (-1.0, 0.0) and high in (1.0, math.inf)
+    assert {name: ours.range_of(name) for name in ours.result()} == {
+        "mae_m": (0.0, math.inf), "abs_rel": (0.0, math.inf), "bias_rel": (-1.0, math.inf),
+        "farther_share": (0.0, 1.0), "is_much_farther": (0.0, 1.0), "has_obstacle": (0.0, 1.0),
+    }  # fmt: skip
