@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from gear.measuring.metric_json import known_json
 from gear.values.serial import Json
 from gear.verbs.bench.detection import DetectionRate, detection_rates
-from gear.verbs.bench.paper_tables import scenes_of
+from gear.verbs.bench.paper.tables import scenes_of
 from gear.verbs.bench.plan import RANDOM
 from gear.verbs.bench.report import BenchReport, Result
 from gear.verbs.evaluate.report import Difference, Estimate, Metrics, Pool, RowReport

@@ -21,8 +21,8 @@ from gear.reporting.html_table import Cell, Link, html_table, safe
 from gear.reporting.report_page import report_page
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.drives.results import LEGEND, DriveSection
-from gear.verbs.bench.paper_page import paper_table
-from gear.verbs.bench.paper_tables import paper_tables, scenes_of
+from gear.verbs.bench.paper.page import paper_table
+from gear.verbs.bench.paper.tables import paper_tables, scenes_of
 from gear.verbs.bench.pictures.figure import figure
 from gear.verbs.bench.pictures.predictions import predictions
 from gear.verbs.bench.plan import Plan, Weather

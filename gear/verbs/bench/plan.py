@@ -43,7 +43,7 @@ class Step:
         verb: name of the called function.
         title: one line for the progress display.
         arguments: keyword arguments of the call.
-        inputs: folders, made by other steps, that the step reads and that no argument names by itself.
+        inputs: folders, made by other steps, that the step reads and that are named only inside its `settings`.
     """
 
     verb: Verb

@@ -41,9 +41,9 @@ from gear.verbs.bench.config import BenchConfig, settings_of
 from gear.verbs.bench.drives.results import COLUMNS as DRIVE_COLUMNS
 from gear.verbs.bench.drives.results import DriveSection, drive_section
 from gear.verbs.bench.drives.steps import check_drives, every_step, planned_drives
-from gear.verbs.bench.latex import document, tabular
 from gear.verbs.bench.page import page
-from gear.verbs.bench.paper_tables import paper_tables
+from gear.verbs.bench.paper.latex import document, tabular
+from gear.verbs.bench.paper.tables import paper_tables
 from gear.verbs.bench.plan import Plan, PlannedEvaluation, Step
 from gear.verbs.bench.recording import write_records
 from gear.verbs.bench.report import COLUMNS, BenchReport, Metric, Result, SceneMetric, TaskResult

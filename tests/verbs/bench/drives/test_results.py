@@ -12,8 +12,8 @@ import pytest
 from gear.driving.worker import DriveResult
 from gear.verbs.bench.drives.results import COLUMNS, DriveSection, drive_section
 from gear.verbs.bench.drives.steps import PlannedDrives, Seat
-from gear.verbs.bench.paper_page import paper_table
-from gear.verbs.bench.paper_tables import paper_tables
+from gear.verbs.bench.paper.page import paper_table
+from gear.verbs.bench.paper.tables import paper_tables
 from gear.verbs.drive.report import DriveReport
 from tests.verbs.bench.synthetic import report as bench_report
 from tests.verbs.drive.test_report import result

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 
-from gear.verbs.bench.paper_tables import Cell, PaperTable
+from gear.verbs.bench.paper.tables import Cell, PaperTable
 
 COLOURS = {"worse": "B00000", "better": "00B000", "same": "0000B0"}
 """The paper's text colours."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gear.reporting.html_table import safe
-from gear.verbs.bench.paper_tables import PaperTable
+from gear.verbs.bench.paper.tables import PaperTable
 
 TITLES = {
     "table1": "Table 1: detection of patches by scene",

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from gear.verbs.bench.latex import document, safe, tabular
-from gear.verbs.bench.paper_tables import paper_tables
+from gear.verbs.bench.paper.latex import document, safe, tabular
+from gear.verbs.bench.paper.tables import paper_tables
 from tests.verbs.bench.synthetic import report
 
 
