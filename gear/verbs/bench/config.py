@@ -15,6 +15,7 @@ from gear.config.nodes import Mapping as MappingNode
 from gear.config.nodes import Node, Place, Scalar
 from gear.contracts.tasks import CONTROLS
 from gear.values.errors import FieldError
+from gear.values.serial import Json
 
 LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
@@ -238,10 +239,15 @@ def settings_of(node: Node, above: str = "") -> Iterable[str]:
         for key, (_, below) in node.entries.items():
             yield from settings_of(below, f"{above}.{key}" if above else key)
     elif not isinstance(node, Scalar):
-        flow = yaml.safe_dump(node_to_json(node), default_flow_style=True, allow_unicode=True, width=1 << 20)
-        yield f"{above}={flow.strip()}"
+        yield f"{above}={flow_text(node_to_json(node))}"
     elif above:
         yield f"{above}={_quoted(node)}"
+
+
+def flow_text(value: Json) -> str:
+    """Returns a value as one line of YAML in flow style, such as `{speeds: [20, 40]}`."""
+    text: str = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=1 << 20)
+    return text.removesuffix("\n...\n").strip()
 
 
 def _quoted(node: Scalar) -> str:

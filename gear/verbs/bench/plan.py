@@ -412,6 +412,14 @@ def _keywords(guard: Guard | None) -> dict[str, Any]:
     """Returns the keyword arguments of a verb for a defense with its calibration data."""
     if guard is None:
         return {}
-    calibration = {"calibration": guard.calibration, "calibration_patched": guard.calibration_patched}
-    given = {name: root for name, root in calibration.items() if root is not None}
-    return {"defense": guard.defense, "defense_settings": guard.settings, **given}
+    return {"defense": guard.defense, "defense_settings": guard.settings, **calibration_arguments(guard)}
+
+
+def calibration_arguments(guard: Guard) -> dict[str, Any]:
+    """Returns the keyword arguments `calibration` and `calibration_patched` of a verb; those of None are left out.
+
+    Args:
+        guard: the defense with its calibration data.
+    """
+    given = {"calibration": guard.calibration, "calibration_patched": guard.calibration_patched}
+    return {name: root for name, root in given.items() if root is not None}

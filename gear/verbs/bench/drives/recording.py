@@ -23,7 +23,7 @@ def label_of(planned: PlannedDrives, evaluation: PlannedEvaluation) -> str | Non
         return None
     defense = None if evaluation.defense is None else evaluation.defense.label
     wanted = (evaluation.model.label, defense)
-    return next((label for label, seat in planned.seats.items() if (seat.model, seat.defense) == wanted), None)
+    return next((label for label, one in planned.drivers.items() if (one.model, one.defense) == wanted), None)
 
 
 def drive_claims(section: DriveSection | None, evaluation: PlannedEvaluation) -> tuple[DriveClaim, ...]:
@@ -48,8 +48,9 @@ def drive_claims(section: DriveSection | None, evaluation: PlannedEvaluation) ->
             log_sha256=one.log_sha256,
         )
         for planned, report in section.made
+        if (label := label_of(planned, evaluation)) is not None
         for one in report.results
-        if one.run.driver == label_of(planned, evaluation)
+        if one.run.driver == label
     )
 
 
@@ -66,6 +67,6 @@ def controller_facts(plan: Plan, evaluation: PlannedEvaluation) -> Plugin | None
     for planned in planned_drives(plan):
         label = label_of(planned, evaluation)
         if label is not None:
-            found = find("controller", planned.seats[label].controller)
+            found = find("controller", planned.drivers[label].controller)
             return plugin_facts(Chosen(found=found, options=NO_OPTIONS))
     return None

@@ -11,7 +11,7 @@ from gear.contracts.tasks import NO_PATCH
 from gear.driving.statistics import Paired, Rate, compared
 from gear.driving.worker import DriveResult
 from gear.values.serial import Json
-from gear.verbs.bench.drives.steps import PlannedDrives, Seat
+from gear.verbs.bench.drives.steps import BenchDriver, PlannedDrives
 from gear.verbs.bench.plan import ADAPTIVE, PATCH, RANDOM
 from gear.verbs.drive.report import ALL, DriveReport
 from gear.verbs.drive.table import rate
@@ -26,6 +26,12 @@ COLUMNS = (
 """Columns of drives.csv. `p_none` and `p_random` are McNemar's exact test against the twins without a patch and with a
 random patch.
 """
+
+Key = tuple[str, BenchDriver, str, str]
+"""Task, driver, scenario and kind of patch of the drives in one line."""
+
+Situation = tuple[str, str, str, float, int]
+"""What `DriveRun.situation` returns."""
 
 TITLES = ("network", "defense", "controller", "patch", "drives", "collision rate", "impact km/h", "score", "p none",
           "p random")  # fmt: skip
@@ -45,7 +51,7 @@ class DriveLine:
 
     Attributes:
         task: name of the task.
-        seat: network, defense and controller.
+        driver: network, defense and controller.
         scenario: name of the scenario; `all` for all scenarios that are not free roads.
         patch: kind of patch, such as `none` or `adaptive patch`.
         crashes, phantoms: shares of drives with a crash, and with a phantom braking.
@@ -55,7 +61,7 @@ class DriveLine:
     """
 
     task: str
-    seat: Seat
+    driver: BenchDriver
     scenario: str
     patch: str
     crashes: Rate
@@ -73,9 +79,9 @@ class DriveLine:
         low, high = self.crashes.interval or (None, None)
         return {
             "task": self.task,
-            "network": self.seat.model or "",
-            "defense": self.seat.defense or "",
-            "controller": self.seat.controller,
+            "network": self.driver.model or "",
+            "defense": self.driver.defense or "",
+            "controller": self.driver.controller,
             "scenario": self.scenario,
             "patch": self.patch,
             "drives": self.crashes.total,
@@ -94,8 +100,8 @@ class DriveLine:
         """The cells of the line in the report's table (`TITLES`)."""
         ps = ["" if p is None else f"{p:.2g}" for p in (self.p(NO_PATCH), self.p(RANDOM))]
         impact = "" if self.impact_mps is None else f"{3.6 * self.impact_mps:.0f}"
-        who = [self.seat.model or "-", self.seat.defense or "-", self.seat.controller, self.patch]
-        return [*who, str(self.crashes.total), rate(self.crashes), impact, f"{self.score:.2f}", *ps]
+        first = [self.driver.model or "-", self.driver.defense or "-", self.driver.controller, self.patch]
+        return [*first, str(self.crashes.total), rate(self.crashes), impact, f"{self.score:.2f}", *ps]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -135,20 +141,20 @@ def drive_section(made: Sequence[tuple[PlannedDrives, DriveReport]], root: Path)
         made: the planned drives with their results.
         root: folder of the benchmark.
     """
-    groups: dict[tuple[str, Seat, str, str], list[DriveResult]] = {}
+    found: dict[Key, dict[Situation, DriveResult]] = {}
     studies: list[str] = []
     failed: list[tuple[str, str]] = []
     for planned, report in made:
         studies.append(planned.out.relative_to(root).as_posix())
         failed += report.failed
         for one in report.results:
-            seat, kind = planned.seats[one.run.driver], planned.kind(one.run.twin)
-            task = planned.task_plugins.name if seat.model else ""
+            driver, kind = planned.drivers[one.run.driver], planned.kind(one.run.twin)
+            task = planned.task_plugins.name if driver.model else ""
             names = [one.run.scenario] if one.run.scenario in report.free else [one.run.scenario, ALL]
             for name in names:
-                group = groups.setdefault((task, seat, name, kind), [])
-                if seat.model or one.run.situation not in {other.run.situation for other in group}:
-                    group.append(one)  # references drive once per scene, not once per task
+                group = found.setdefault((task, driver, name, kind), {})
+                group.setdefault(one.run.situation, one)  # references drive again for each task, and count once
+    groups = {key: list(group.values()) for key, group in found.items()}
     return DriveSection(
         lines=tuple(_line(key, groups) for key in sorted(groups, key=lambda key: _order(key, groups))),
         studies=tuple(studies),
@@ -157,30 +163,28 @@ def drive_section(made: Sequence[tuple[PlannedDrives, DriveReport]], root: Path)
     )
 
 
-def _order(key: tuple[str, Seat, str, str], groups: Mapping[tuple[str, Seat, str, str], Any]) -> tuple[int, bool, int]:
+def _order(key: Key, groups: Mapping[Key, Any]) -> tuple[int, bool, int]:
     """Drivers in the order of the config, each with its scenarios, all scenarios last, kinds of patches in order."""
-    seats = list(dict.fromkeys((task, seat) for task, seat, _, _ in groups))
+    drivers = list(dict.fromkeys((task, driver) for task, driver, _, _ in groups))
     scenarios = list(dict.fromkeys(name for _, _, name, _ in groups if name != ALL))
-    task, seat, name, kind = key
+    task, driver, name, kind = key
     place = len(scenarios) if name == ALL else scenarios.index(name)
-    return seats.index((task, seat)), name == ALL, place * len(KINDS) + KINDS.index(kind)
+    return drivers.index((task, driver)), name == ALL, place * len(KINDS) + KINDS.index(kind)
 
 
-def _line(
-    key: tuple[str, Seat, str, str], groups: Mapping[tuple[str, Seat, str, str], Sequence[DriveResult]]
-) -> DriveLine:
-    task, seat, scenario, kind = key
+def _line(key: Key, groups: Mapping[Key, Sequence[DriveResult]]) -> DriveLine:
+    task, driver, scenario, kind = key
     here = groups[key]
     others = {NO_PATCH: (), RANDOM: (NO_PATCH,)}.get(kind, (NO_PATCH, RANDOM))
     paired = [
-        compared(here, groups[task, seat, scenario, other], other)
+        compared(here, groups[task, driver, scenario, other], other)
         for other in others
-        if (task, seat, scenario, other) in groups
+        if (task, driver, scenario, other) in groups
     ]
     impacts = [one.measures.impact_mps for one in here if one.measures.impact_mps is not None]
     return DriveLine(
         task=task,
-        seat=seat,
+        driver=driver,
         scenario=scenario,
         patch=kind,
         crashes=Rate.of(one.measures.is_crash for one in here),

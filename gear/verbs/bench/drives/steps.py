@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from gear.config.dump import node_to_json, to_plain
 from gear.config.nodes import Node
 from gear.config.overrides import with_overrides
@@ -23,8 +21,8 @@ from gear.driving.drives import plan_drives
 from gear.plugins.build import NO_OPTIONS
 from gear.values.errors import GearError
 from gear.values.serial import Json
-from gear.verbs.bench.config import DriveBench
-from gear.verbs.bench.plan import ADAPTIVE, PATCH, RANDOM, Plan, Step
+from gear.verbs.bench.config import DriveBench, flow_text
+from gear.verbs.bench.plan import ADAPTIVE, PATCH, RANDOM, Plan, Step, calibration_arguments
 from gear.verbs.bench.scenes import Scene, located
 from gear.verbs.bench.validation import Candidate, TaskPlugins
 
@@ -36,8 +34,8 @@ FOLDER = "drives"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Seat:
-    """Who drives.
+class BenchDriver:
+    """A driver of the benchmark: a controller, with the network and the defense through which it sees.
 
     Attributes:
         model, defense: names of network and defense in the bench config; None without one.
@@ -59,7 +57,7 @@ class PlannedDrives:
         is_adaptive: whether the twin `patch` shows the patches that were optimised against a network behind its
             defense; otherwise those against the network alone.
         out: folder of the results.
-        seats: drivers by their names in the results.
+        drivers: drivers by their names in the results.
         config: the drive config, as JSON with all keys.
         inputs: folders of patches and calibration data that must exist first.
     """
@@ -68,7 +66,7 @@ class PlannedDrives:
     scene: Scene
     is_adaptive: bool
     out: Path
-    seats: dict[str, Seat]
+    drivers: dict[str, BenchDriver]
     config: Json
     inputs: tuple[str, ...]
 
@@ -121,12 +119,7 @@ def check_drives(plan: Plan, node: Node) -> None:
 
 def settings(config: Json) -> tuple[str, ...]:
     """The keys of a drive config as `KEY=VALUE` texts, one per key, with values in YAML's flow style."""
-    return tuple(f"{key}={_flow(value)}" for key, value in config.items())
-
-
-def _flow(value: Json) -> str:
-    text: str = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=1 << 20)
-    return text.removesuffix("\n...\n").strip()
+    return tuple(f"{key}={flow_text(value)}" for key, value in config.items())
 
 
 def _step(planned: PlannedDrives, plan: Plan) -> Step:
@@ -154,17 +147,17 @@ def _planned(
     pictures = node_to_json(with_overrides(NO_OPTIONS, plan.picture_settings(task_plugins)))
     options = pictures.pop("options", {})
     guards = plan.adaptive_defenses(task_plugins)[1:] if adaptive else task_plugins.guards
-    seats: dict[str, Seat] = {}
-    drivers: dict[str, Json] = {}
+    drivers: dict[str, BenchDriver] = {}
+    configs: dict[str, Json] = {}
     inputs: list[str] = []
     for model in task_plugins.models:
         for defense in guards:
             label = model.label if defense is None else f"{model.label}-behind-{defense.label}"
-            if label in drivers:
+            if label in configs:
                 raise GearError(f"drives: two drivers would be called {label!r}; rename a network or a defense")
             patch = plan.patch(task_plugins, scene, plan.name(model, defense if adaptive else None))
             guard = _guard(plan, task_plugins, model, defense)
-            drivers[label] = {
+            configs[label] = {
                 "controller": controller,
                 "task": task_plugins.name,
                 "model": model.plugin,
@@ -174,20 +167,20 @@ def _planned(
                 **guard,
             }
             inputs += [str(patch), *(guard[name] for name in ("calibration", "calibration_patched") if name in guard)]
-            seats[label] = Seat(
+            drivers[label] = BenchDriver(
                 model=model.label, defense=None if defense is None else defense.label, controller=controller
             )
     for name in () if adaptive else asked.references:
-        drivers[name], seats[name] = {"controller": name}, Seat(model=None, defense=None, controller=name)
+        configs[name], drivers[name] = {"controller": name}, BenchDriver(model=None, defense=None, controller=name)
     folder = f"{scene.label}-adaptive" if adaptive else scene.label
     return PlannedDrives(
         task_plugins=task_plugins,
         scene=scene,
         is_adaptive=adaptive,
         out=plan.root / FOLDER / task_plugins.folder / folder,
-        seats=seats,
+        drivers=drivers,
         config={
-            "drivers": drivers,
+            "drivers": configs,
             "towns": {scene.town: [scene.name]},
             "scenarios": {name: list(speeds) for name, speeds in asked.scenarios.items()},
             "library": asked.library,
@@ -209,8 +202,7 @@ def _guard(plan: Plan, task_plugins: TaskPlugins, model: Candidate, defense: Can
     guard = plan.guard(task_plugins, model, defense)
     if guard is None or defense is None:
         return {}
-    given = {"calibration": guard.calibration, "calibration_patched": guard.calibration_patched}
-    keys = {name: str(root) for name, root in given.items() if root is not None}
+    keys = {name: str(root) for name, root in calibration_arguments(guard).items()}
     return {"defense": defense.plugin, "defense_set": _plain(defense), **keys}
 
 

@@ -90,7 +90,7 @@ def _collisions(section: DriveSection) -> PaperTable:
     """Collision rates over all scenes: one line per network and defense, one column per kind of patch."""
     lines = [line for line in section.lines if line.scenario == ALL]
     kinds = [kind for kind in KINDS if any(line.patch == kind for line in lines)]
-    found = {(line.task, line.seat, line.patch): line for line in lines}
+    found = {(line.task, line.driver, line.patch): line for line in lines}
     return PaperTable(
         name="drives",
         caption=f"Collision rates by network, defense and kind of patch: {LEGEND}.",
@@ -98,17 +98,17 @@ def _collisions(section: DriveSection) -> PaperTable:
         columns=tuple(kinds),
         lines=tuple(
             Line(
-                scene=seat.model or seat.controller,
-                label=seat.defense or "-",
+                scene=driver.model or driver.controller,
+                label=driver.defense or "-",
                 cells=tuple(
                     Cell(
-                        text=rate(found[task, seat, kind].crashes) if (task, seat, kind) in found else "",
+                        text=rate(found[task, driver, kind].crashes) if (task, driver, kind) in found else "",
                         is_grey=kind in (PATCH, ADAPTIVE),
                     )
                     for kind in kinds
                 ),
             )
-            for task, seat in dict.fromkeys((line.task, line.seat) for line in lines)
+            for task, driver in dict.fromkeys((line.task, line.driver) for line in lines)
         ),
     )
 

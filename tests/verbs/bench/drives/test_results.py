@@ -11,15 +11,18 @@ import pytest
 
 from gear.driving.worker import DriveResult
 from gear.verbs.bench.drives.results import COLUMNS, DriveSection, drive_section
-from gear.verbs.bench.drives.steps import PlannedDrives, Seat
+from gear.verbs.bench.drives.steps import BenchDriver, PlannedDrives
 from gear.verbs.bench.paper.page import paper_table
 from gear.verbs.bench.paper.tables import paper_tables
 from gear.verbs.drive.report import DriveReport
 from tests.verbs.bench.synthetic import report as bench_report
 from tests.verbs.drive.test_report import result
 
-NET, GUARDED = Seat(model="net<", defense=None, controller="base"), Seat(model="net<", defense="d", controller="base")
-TRUTH = Seat(model=None, defense=None, controller="truth")
+NET, GUARDED = (
+    BenchDriver(model="net<", defense=None, controller="base"),
+    BenchDriver(model="net<", defense="d", controller="base"),
+)
+TRUTH = BenchDriver(model=None, defense=None, controller="truth")
 
 
 def planned(scene: str, *, is_adaptive: bool = False) -> PlannedDrives:
@@ -27,7 +30,7 @@ def planned(scene: str, *, is_adaptive: bool = False) -> PlannedDrives:
     place: Any = SimpleNamespace(label=scene)
     return PlannedDrives(
         task_plugins=plugins, scene=place, is_adaptive=is_adaptive, out=Path("out/drives/depth") / scene,
-        seats={"net": NET, "net-d": GUARDED, "truth": TRUTH}, config={}, inputs=(),
+        drivers={"net": NET, "net-d": GUARDED, "truth": TRUTH}, config={}, inputs=(),
     )  # fmt: skip
 
 
@@ -57,7 +60,7 @@ def section() -> DriveSection:
 
 
 def test_drives_of_all_scenes_are_gathered_and_paired() -> None:
-    found = {(line.seat, line.scenario, line.patch): line for line in section().lines}
+    found = {(line.driver, line.scenario, line.patch): line for line in section().lines}
     patch, adaptive = found[NET, "all", "patch"], found[GUARDED, "all", "adaptive patch"]
     assert (patch.crashes.count, patch.crashes.total) == (10, 10) and patch.crashes.interval is not None
     assert patch.crashes.interval[0] == pytest.approx(0.025**0.1)

@@ -54,11 +54,11 @@ def test_every_network_drives_alone_and_behind_each_defense(written: Callable[..
     assert [(one.scene.label, one.is_adaptive) for one in found] == [
         ("tiny-board", False), ("tiny-board", True), ("tiny-double", False), ("tiny-double", True),
     ]  # fmt: skip
-    assert list(found[0].seats) == [
+    assert list(found[0].drivers) == [
         "small", "small-behind-blur", "small-behind-fpda", "second", "second-behind-blur", "second-behind-fpda",
         "truth",
     ]  # fmt: skip
-    assert list(found[1].seats) == ["small-behind-blur", "second-behind-blur"], "defenses with adaptive patches"
+    assert list(found[1].drivers) == ["small-behind-blur", "second-behind-blur"], "defenses with adaptive patches"
     config = read_node(DriveConfig, with_overrides(NO_OPTIONS, settings(found[0].config)))
     assert config.drivers["second"].patch == str(tmp_path / "out/patches/semseg/second/tiny-board")
     assert config.drivers["small-behind-fpda"].calibration.endswith("calibrate-none")
@@ -104,7 +104,7 @@ def test_the_whole_way_with_drives(made: Callable[..., Path], written: Callable[
     out, config = made(FEW), written(*FEW, drives(tmp_path, "  references: [truth]\n"))
     report = gear.bench(config, out=out)
     assert report.drives is not None and report.drives.failed == ()
-    lines = {(line.seat.model, line.seat.defense, line.scenario, line.patch): line for line in report.drives.lines}
+    lines = {(line.driver.model, line.driver.defense, line.scenario, line.patch): line for line in report.drives.lines}
     alone = [lines["small", None, "all", kind] for kind in ("none", "random", "patch")]
     assert [line.crashes.total for line in alone] == [1, 1, 1] and alone[2].paired[0].pairs == 1
     assert ("small", "blur", "near", "patch") in lines and (None, None, "all", "none") in lines
