@@ -58,8 +58,8 @@ class BoardReport:
 def build_leaderboard(
     records: str | Path, *, out: str | Path, checks: str | Path | None = None, commitment: str | None = None
 ) -> BoardReport:
-    """Makes static pages of a folder of records: `index.html`, `drives.html` about drives,
-    one page per record, and `board.json`.
+    """Makes static pages of a folder of records: `index.html`, `drives.html` about drives, one page per record, and
+    `board.json`.
 
     Pages of records that are no longer listed are removed.
 

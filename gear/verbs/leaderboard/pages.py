@@ -5,7 +5,8 @@ nothing.
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
 
 from gear.driving.statistics import Rate
 from gear.leaderboard.board import Row, Table
@@ -16,7 +17,7 @@ from gear.leaderboard.verdict import Verdict
 from gear.verbs.drive.table import rate
 from gear.verbs.leaderboard.drive_page import HEAD as DRIVE_HEAD
 from gear.verbs.leaderboard.drive_page import LEGEND as DRIVE_LEGEND
-from gear.verbs.leaderboard.drive_page import DriveTable, drive_cells
+from gear.verbs.leaderboard.drive_page import DriveRow, DriveTable, drive_cells
 from gear.verbs.leaderboard.texts import (
     ATTACKS,
     BY_KNOWLEDGE,
@@ -27,6 +28,8 @@ from gear.verbs.leaderboard.texts import (
     named,
     shown,
 )
+
+R = TypeVar("R", Row, DriveRow)
 
 STYLE = """
 body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, "Noto Sans", sans-serif; color: #1b2027; background: #fff;
@@ -60,15 +63,8 @@ def drives_page(tables: Sequence[DriveTable]) -> str:
     """
     parts = ['<p><a href="index.html">leaderboard</a></p>', f'<p class="dim">{_safe(DRIVE_LEGEND)}</p>']
     for table in tables:
-        lines, rank = [], 0
-        for one in table.rows:
-            rank += one.is_ranked
-            cells = [_cell(cell) for cell in drive_cells(one, rank if one.is_ranked else None)]
-            network = _safe(named(one.row.first.record.entry.network))
-            cells[1] = f'<td><a href="records/{one.row.first.sha256}.html">{network}</a></td>'
-            cells[4] = f'<td class="{one.state}">{one.state}</td>'
-            lines.append("".join(cells))
-        parts += [f"<h2>Benchmark {_safe(table.title)}</h2>", _rows(DRIVE_HEAD, lines)]
+        ranked = _ranked(DRIVE_HEAD, table.rows, [one.row.first for one in table.rows], drive_cells)
+        parts += [f"<h2>Benchmark {_safe(table.title)}</h2>", ranked]
     return _page("gear leaderboard: drives", parts if tables else [*parts, "<p>No record has drives.</p>"])
 
 
@@ -89,7 +85,8 @@ def index_page(tables: Sequence[Table], refused: Sequence[str], commitment: str 
     for table in tables:
         better = "lower" if table.lower_is_better else "higher"
         title = f"{table.task}: {table.metric} ({better} is better), benchmark {table.benchmark} {table.data_key[:8]}"
-        parts += [f"<h2>{_safe(title)}</h2>", _defenses(table), _notes(table)]
+        ranked = _ranked(HEAD, table.rows, [row.first for row in table.rows], defense_cells)
+        parts += [f"<h2>{_safe(title)}</h2>", ranked, _notes(table)]
         parts += [_titled("Attacks", ATTACKS, attack_rows(table))]
         parts += [_titled("Worst figure by the attack's knowledge", BY_KNOWLEDGE, knowledge_rows(table))]
     if refused:
@@ -154,16 +151,27 @@ def is_record_page(data: bytes) -> bool:
     return data.startswith(START.encode()) and BACK.encode() in data
 
 
-def _defenses(table: Table) -> str:
+def _ranked(
+    head: Sequence[str], rows: Sequence[R], records: Sequence[Filed], cells_of: Callable[[R, int | None], list[str]]
+) -> str:
+    """Returns a table of rows with ranks; the network links to the page of a record, and the state has a colour.
+
+    Args:
+        head: titles of the columns, with `network` and `state`.
+        rows: the rows, ranked ones first.
+        records: the record of each row to which the row links.
+        cells_of: makes the cells of a row from the row and its rank.
+    """
+    network, state = head.index("network"), head.index("state")
     lines, rank = [], 0
-    for row in table.rows:
+    for row, record in zip(rows, records, strict=True):
         rank += row.is_ranked
-        cells = [_cell(cell) for cell in defense_cells(row, rank if row.is_ranked else None)]
-        network = _safe(named(row.first.record.entry.network))
-        cells[1] = f'<td><a href="records/{row.first.sha256}.html">{network}</a></td>'
-        cells[3] = f'<td class="{row.state}">{row.state}</td>'
+        texts = cells_of(row, rank if row.is_ranked else None)
+        cells = [_cell(text) for text in texts]
+        cells[network] = f'<td><a href="records/{record.sha256}.html">{_safe(texts[network])}</a></td>'
+        cells[state] = f'<td class="{row.state}">{row.state}</td>'
         lines.append("".join(cells))
-    return _rows(HEAD, lines)
+    return _rows(head, lines)
 
 
 def _notes(table: Table) -> str:

@@ -61,6 +61,12 @@ def test_other_scenarios_are_another_table() -> None:
 def test_rows_without_all_kinds_and_broken_rows_have_no_rank() -> None:
     partial = driving(record(), {"none": 0, "patch": 0})
     assert not drive_tables(tables([filed(partial)], {}))[0].rows[0].is_ranked
+    unadapted = driving(record(), {"none": 0, "random": 0, "patch": 1})
+    assert not drive_tables(tables([filed(unadapted)], {}))[0].rows[0].is_ranked, "it has a defense"
+    alone = dataclasses.replace(
+        unadapted, entry=dataclasses.replace(unadapted.entry, kind="model", defense=None, gradient=None)
+    )
+    assert drive_tables(tables([filed(alone)], {}))[0].rows[0].is_ranked, "a network alone needs no adaptive patches"
     one = filed(GOOD)
     row = drive_tables(tables([one], verdict(one, "differs")))[0].rows[0]
     assert row.state == "broken" and not row.is_ranked
