@@ -20,7 +20,7 @@ from gear.reporting.legend import draw_legend
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
 from gear.verbs.bench.gains import is_failed
-from gear.verbs.bench.paper_tables import row_of
+from gear.verbs.bench.paper.tables import row_of
 from gear.verbs.bench.pictures.figure import figure
 from gear.verbs.bench.pictures.most_changed import Chosen, most_changed
 from gear.verbs.bench.plan import ADAPTIVE, PATCH
