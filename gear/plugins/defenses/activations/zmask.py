@@ -125,7 +125,7 @@ class ZMask(FitsInPhases):
             )
         layers = layers_of(model, self._settings.shallow, self._settings.deep)
         statistics = self._statistics(clean, model, layers, on_phase)
-        layers = self._telling(clean, patched, model, layers, statistics, on_phase)
+        layers = self._selected_layers(clean, patched, model, layers, statistics, on_phase)
         examples = list(self._examples(clean, patched, model, layers, statistics, on_phase))
         if not examples:
             raise GearError("no patch is seen in the patched calibration data: Z-Mask has nothing to learn from")
@@ -319,7 +319,7 @@ class ZMask(FitsInPhases):
                 heats["deep"][name] = refined([pooled[rows] for rows in deep])
         return heats
 
-    def _telling(
+    def _selected_layers(
         self,
         clean: Sequence[Views],
         patched: Sequence[Views],
