@@ -133,7 +133,7 @@ class Jedi(MaskAndFill):
         Raises:
             GearError: there are no pictures, clean and patched pictures show different scenes, or no patch is visible.
         """
-        pairs = list(visible_patches(clean, patched, self._settings.max_pictures, "jedi"))
+        pairs = visible_patches(clean, patched, self._settings.max_pictures, "jedi")
         entropies = [_entropies(picture) for _, picture, _ in pairs]
         areas = [area for _, _, area in pairs]
         measured = _statistics([clean for clean, _, _ in pairs], entropies, areas)
