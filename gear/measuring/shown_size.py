@@ -33,29 +33,29 @@ def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str
         dataset: dataset on which the model predicts.
         flag: the command-line flag that sets options of the model, for the message.
     """
-    spec = model.found.spec
-    assert isinstance(spec, ModelSpec)
-    config = read_node(spec.config, model.options, "")
+    network = _network_with_free_scale(model)
+    if network is None:
+        return None
+    spec, weights = network
     task = find("task", name_of_task(dataset.plan.task)).spec
     assert isinstance(task, TaskSpec)
     width_px, usual_px = dataset.plan.options.get("width_px"), getattr(task.config(), "width_px", None)
-    if getattr(config, OPTION, 1.0) is not None or not width_px or not usual_px or width_share(width_px, usual_px) == 1:
+    if not width_px or not usual_px or width_share(width_px, usual_px) == 1:
         return None
-    weights = getattr(config, "weights", NONE)
     said = trained_option(weights, spec.name, OPTION)
     share = spec.input_scale if said is None else said
-    if weights == NONE or not isinstance(share, (int, float)):
+    if not isinstance(share, (int, float)):
         return None
     wanted = round(share * usual_px / width_px, 4)
     try:
         read_node(spec.config, with_value(model.options, (OPTION,), Scalar(f"{wanted:g}", False, Place("size"))), "")
-        remedy = f"{flag}{OPTION}={wanted:g} shows it these so"
+        remedy = f"{flag}{OPTION}={wanted:g} corrects this"
     except ConfigError:
         remedy = "collect larger ones"
     look = "smaller" if width_px < usual_px else "larger"
     return (
         f"{dataset.root}: pictures are {width_px} px wide and {spec.name} sees them at {share * width_px:.0f} px; it "
-        f"learnt from {share * usual_px:.0f} px, so things look {look} than it knows them: {remedy}"
+        f"learnt from {share * usual_px:.0f} px, so objects look {look} than in its training pictures: {remedy}"
     )
 
 
@@ -69,15 +69,13 @@ def focal_note(model: Chosen, task: str, options: Node, where: str) -> str | Non
         model: the network with its options.
         task: name of the task.
         options: options of the task, which decide the camera.
-        where: who takes the pictures, for the message, such as `driver depth`.
+        where: the driver that takes the pictures, for the message, such as `driver depth`.
     """
-    spec = model.found.spec
-    assert isinstance(spec, ModelSpec)
-    found = find("task", task)
-    config = read_node(spec.config, model.options, "")
-    weights = getattr(config, "weights", NONE)
-    if getattr(config, OPTION, 1.0) is not None or weights == NONE:
+    network = _network_with_free_scale(model)
+    if network is None:
         return None
+    spec, _ = network
+    found = find("task", task)
     here_px, usual_px = (build(found, one).rig().cameras[0].intrinsics.fx_px for one in (options, NO_OPTIONS))
     share = width_share(round(here_px), round(usual_px))
     if share == 1:
@@ -85,6 +83,17 @@ def focal_note(model: Chosen, task: str, options: Node, where: str) -> str | Non
     look = "smaller" if share < 1 else "larger"
     return (
         f"{where}: its camera has a focal length of {here_px:.0f} px, and {spec.name} learnt from pictures of"
-        f" {usual_px:.0f} px, so things look {look} than it knows them: set options.focal_px={usual_px:.0f}, or"
-        f" model_set.{OPTION}"
+        f" {usual_px:.0f} px, so objects look {look} than in its training pictures: set"
+        f" options.focal_px={usual_px:.0f}, or model_set.{OPTION}"
     )
+
+
+def _network_with_free_scale(model: Chosen) -> tuple[ModelSpec[Any], str] | None:
+    """The spec and the weights of a network with an input scale that the user did not set; None for other networks and
+    for networks without weights.
+    """
+    spec = model.found.spec
+    assert isinstance(spec, ModelSpec)
+    config = read_node(spec.config, model.options, "")
+    weights = getattr(config, "weights", NONE)
+    return None if getattr(config, OPTION, 1.0) is not None or weights == NONE else (spec, weights)

@@ -50,7 +50,7 @@ def test_attack_and_gap_tell_of_it(
         out = f"--out={tmp_path / words[0]}"
         assert main([*words, f"{flag}=weights={weights}", out]) == 0
         (line,) = [one for one in capsys.readouterr().err.splitlines() if "note:" in one]
-        assert re.fullmatch(f"{PATTERN}{flag} input_scale=1.6 shows it these so", line)
+        assert re.fullmatch(f"{PATTERN}{flag} input_scale=1.6 corrects this", line)
         assert main([*words, f"{flag}=weights={weights}", f"{flag}=input_scale=1", f"{out}-given"]) == 0
         assert "note:" not in capsys.readouterr().err
     # What the user can put right in the models is not an option of the attack.
@@ -79,6 +79,6 @@ def test_a_driver_whose_camera_has_another_focal_length_is_told(install: Callabl
     small, weights = ["width_px=1024", "height_px=512"], "weights=trained"
     shown = note(small, weights)
     assert shown is not None and shown.startswith("driver a: its camera has a focal length of 512 px")
-    assert "learnt from pictures of 1024 px, so things look smaller" in shown and "options.focal_px=1024" in shown
+    assert "learnt from pictures of 1024 px, so objects look smaller" in shown and "options.focal_px=1024" in shown
     assert note([], weights) is None and note([*small, "focal_px=1024"], weights) is None
     assert note(small, weights, "input_scale=1") is None and note(small) is None

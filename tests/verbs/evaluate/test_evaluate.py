@@ -375,8 +375,9 @@ class ScaledConfig(Config):
 
 
 @pytest.mark.parametrize(
-    ("said", "remedy"), [(0.25, "sees them at 80 px; it learnt from 512 px, .* smaller .* --set input_scale=1.6 shows"),
-                         (0.75, "collect larger ones")]
+    ("said", "remedy"),
+    [(0.25, "sees them at 80 px; it learnt from 512 px, .* smaller .* --set input_scale=1.6 corrects this"),
+     (0.75, "collect larger ones")]
 )  # fmt: skip
 def test_pictures_of_another_size_than_the_weights_are_for_are_noted(
     tmp_path: Path, small: Small, install: Install, said: float, remedy: str
