@@ -14,6 +14,7 @@ from gear.metrics.semantic import (
     SegmentedSample,
     SemanticEvaluator,
     Values,
+    by_class,
     mean_known,
     quotient,
 )
@@ -60,8 +61,7 @@ class CriticalClasses(SemanticEvaluator):
             totals: counts by name, as `totals` gives them.
         """
         confusion = totals["confusion"]
-        classes = self._classes(confusion)
-        return self._shares(confusion) | {f"iou_{name.replace(' ', '_')}": iou for name, iou in classes.items()}
+        return self._shares(confusion) | by_class(self._classes(confusion))
 
     def _shares(self, confusion: npt.NDArray[Any]) -> dict[str, Values]:
         rows = confusion[..., IDS, :]

@@ -171,7 +171,7 @@ class SemanticEvaluator:
             ),
             "pixel_accuracy": _accuracy(confusion),
         }
-        return metrics | {f"iou_{name.replace(' ', '_')}": value for name, value in classes.items()}
+        return metrics | by_class(classes)
 
     def _classes(self, confusion: npt.NDArray[Any]) -> dict[str, Values]:
         """IoU by name of the classes over which the mean is taken, for one picture or for all."""
@@ -193,7 +193,7 @@ class PresentClasses(SemanticEvaluator):
             totals: counts by name, as `totals` gives them.
         """
         classes = self._classes(totals["confusion"])
-        return {"miou": mean_known(classes)} | {f"iou_{name.replace(' ', '_')}": iou for name, iou in classes.items()}
+        return {"miou": mean_known(classes)} | by_class(classes)
 
     def _classes(self, confusion: npt.NDArray[Any]) -> dict[str, Values]:
         """IoU by name of the classes over which the mean is taken; NaN for classes that do not occur."""
@@ -203,6 +203,15 @@ class PresentClasses(SemanticEvaluator):
             for label, iou in zip(EVALUATED, _class_iou(confusion).values(), strict=True)
             if label.name != "train"
         }
+
+
+def by_class(classes: Mapping[str, Values]) -> dict[str, Values]:
+    """Returns the metrics `iou_<class>`, such as `iou_traffic_sign`.
+
+    Args:
+        classes: IoU by name of the class.
+    """
+    return {f"iou_{name.replace(' ', '_')}": iou for name, iou in classes.items()}
 
 
 def _ids(category: str, among: Sequence[CityscapesLabel] = EVALUATED) -> list[int]:
