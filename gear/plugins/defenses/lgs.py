@@ -10,6 +10,7 @@ import numpy as np
 
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import DefenseSpec
+from gear.plugins.defenses.masking.entropy import GREY, grey_tensor
 from gear.plugins.defenses.per_picture import Mask, PerPicture
 from gear.values.errors import FieldError
 from gear.values.frames import UInt8Image
@@ -17,7 +18,6 @@ from gear.values.frames import UInt8Image
 if TYPE_CHECKING:
     from torch import Tensor
 
-GREY = (0.299, 0.587, 0.114)
 LEAST_SPREAD = 1e-7
 
 
@@ -107,7 +107,7 @@ class Lgs(PerPicture):
         """
         import torch
 
-        grey = (pictures * pictures.new_tensor(GREY).view(1, 3, 1, 1)).sum(1, keepdim=True)
+        grey = grey_tensor(pictures)[:, None]
         dx, dy = torch.zeros_like(grey), torch.zeros_like(grey)
         dx[..., :-1] = grey[..., :-1] - grey[..., 1:]
         dy[..., :-1, :] = grey[..., :-1, :] - grey[..., 1:, :]

@@ -47,6 +47,15 @@ def grey_levels(picture: UInt8Image) -> npt.NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_RGB2GRAY), np.uint8)
 
 
+def grey_tensor(pictures: Tensor) -> Tensor:
+    """Returns the (B, H, W) grey values of pictures in 0..1; differentiable.
+
+    Args:
+        pictures: (B, 3, H, W) in 0..1.
+    """
+    return (pictures * pictures.new_tensor(GREY).view(1, 3, 1, 1)).sum(1)
+
+
 def window_entropies(grey: npt.NDArray[np.uint8], side: int) -> npt.NDArray[np.float32]:
     """Returns the entropies in bits of square windows at half a side's distance, (rows, columns) float32.
 
@@ -122,7 +131,7 @@ def _shares(pictures: Tensor, side: int) -> Tensor:
     import torch
 
     rows, columns = (torch.from_numpy(_source_pixels(size, side)) for size in pictures.shape[2:])
-    grey = (pictures * pictures.new_tensor(GREY).view(1, 3, 1, 1)).sum(1)
+    grey = grey_tensor(pictures)
     extended = grey[:, rows.to(grey.device)][:, :, columns.to(grey.device)] * (SOFT_LEVELS - 1)
     half = side // 2
     batch, down, across = len(grey), len(rows) // half, len(columns) // half
