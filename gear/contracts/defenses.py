@@ -100,10 +100,7 @@ class Defense(Protocol):
 
 @runtime_checkable
 class FitsInPhases(Protocol):
-    """A defense that reports the progress of its calibration, which takes long or has several phases.
-
-    A defense that names this class as its base gets `fit` from it.
-    """
+    """A defense that reports the progress of its calibration, which takes long or has several phases."""
 
     def fit(
         self,
@@ -112,7 +109,7 @@ class FitsInPhases(Protocol):
         model: Model | None,
         rng: np.random.Generator,
     ) -> Any:
-        """Calibrates the defense as `fit_in_phases` does, without reports of the progress.
+        """Calls `fit_in_phases` without a callback. Defenses with this class as their base inherit this method.
 
         Args:
             clean, patched, model, rng: as in `fit_in_phases`.
