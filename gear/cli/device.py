@@ -47,4 +47,4 @@ class _AsSetting(argparse.Action):
         values: str | Sequence[Any] | None,
         option_string: str | None = None,
     ) -> None:
-        setattr(namespace, self.dest, [*getattr(namespace, self.dest, []), f"device={values}"])
+        setattr(namespace, self.dest, [*getattr(namespace, self.dest, []), f"{DEVICE}{values}"])

@@ -12,7 +12,7 @@ import hashlib
 import html
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.resources import files
 
 from gear.values.serial import Json
@@ -99,22 +99,43 @@ def document(title: str, entries: Sequence[Entry], about: dict[str, Json]) -> It
         entries: the samples of the page.
         about: metadata of the split.
     """
-    style, code = asset("style.css"), script()
-    fillings = {
-        "policy": html.escape(policy(style, code)),
-        "title": html.escape(title),
-        "style": style,
-        "index": embedded(index_of(entries, about)),
-        "script": code,
-    }
-    head, tail = asset("page.html").split("{{pictures}}")
-    yield filled(head, fillings)
+    blocks = _blocks(entries)
+    return framed(
+        "page.html", title=title, style=asset("style.css"), code=script(), index=index_of(entries, about), blocks=blocks
+    )
+
+
+def _blocks(entries: Sequence[Entry]) -> Iterator[str]:
+    """Yields the script blocks with metadata and pictures of the samples."""
     channels = channels_of(entries)
     for number, entry in enumerate(entries):
         yield block(f"d{number}", entry.detail)
         for place, channel in enumerate(channels):
             if channel in entry.pictures:
                 yield block(f"p{number}.{place}", entry.pictures[channel].data)
+
+
+def framed(template: str, *, title: str, style: str, code: str, index: Json, blocks: Iterable[str]) -> Iterator[str]:
+    """Yields an HTML page in pieces of text, with its content security policy.
+
+    Args:
+        template: name of the HTML file in `gear/view/page`; data blocks replace its placeholder `{{blocks}}`.
+        title: title of the page; it is escaped.
+        style: text of the style sheet.
+        code: text of the script.
+        index: what the script reads first, as JSON.
+        blocks: script blocks with data, as `block` makes them.
+    """
+    fillings = {
+        "policy": html.escape(policy(style, code)),
+        "title": html.escape(title),
+        "style": style,
+        "index": embedded(index),
+        "script": code,
+    }
+    head, tail = asset(template).split("{{blocks}}")
+    yield filled(head, fillings)
+    yield from blocks
     yield tail
 
 

@@ -6,18 +6,18 @@ Like the page of a dataset, it is one file that opens from disk. Texts and numbe
 from __future__ import annotations
 
 import base64
-import html
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from gear.driving.drawing import HIT
 from gear.driving.measures import Measures
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
 from gear.values.progress import Progress
 from gear.values.serial import Json, to_json
 from gear.view.build import deflated
-from gear.view.document import asset, block, embedded, filled, policy, script
+from gear.view.document import asset, block, framed, script
 from gear.view.drives import StoredDrive, motion, pictures, stored_drives
 from gear.view.encoding import MEDIA_TYPE, SCALES, encode, largest_scale
 from gear.view.rows import finite
@@ -35,8 +35,8 @@ LEAST_SCALE = 0.5
 PROBES = 4
 """Number of drives from whose pictures the size of the page is estimated."""
 
-HIT = {"vehicle": "a vehicle", "person": "a person", "static": "the town"}
 END = {"stood": "stopped", "passed": "passed the person", "time": "drove to the end", "off_road": "left the road"}
+"""Words for the ends of drives without a crash; other ends are shown with their own name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -62,22 +62,16 @@ class DrivePage:
     def document(self) -> Iterator[str]:
         """Yields the HTML page in pieces of text."""
         style = asset("style.css") + asset("drives.css")
-        code = script(SCRIPTS)
-        fillings = {
-            "policy": html.escape(policy(style, code)),
-            "title": html.escape(self.title),
-            "style": style,
-            "index": embedded(self.index),
-            "script": code,
-        }
-        head, tail = asset("drives.html").split("{{drives}}")
-        yield filled(head, fillings)
+        code, blocks = script(SCRIPTS), self._blocks()
+        return framed("drives.html", title=self.title, style=style, code=code, index=self.index, blocks=blocks)
+
+    def _blocks(self) -> Iterator[str]:
+        """Yields the script blocks with motions and pictures of the drives."""
         for number, data in enumerate(self.motions):
             yield block(f"d{number}", data)
         for number, film in enumerate(self.films):
             if film:
                 yield f'<script type="text/plain" id="f{number}">{film}</script>\n'
-        yield filled(tail, fillings)
 
 
 def drive_page(

@@ -101,7 +101,6 @@ def stored_drives(root: Path) -> Iterator[StoredDrive | str]:
         if not (folder / RESULT).is_file():
             continue
         try:
-            inside(root, relative)
             content: Json = load_sealed(inside(root, f"{relative}/{RESULT}"))
             run = from_json(DriveRun, content["result"]["run"])
             measures = from_json(Measures, content["result"]["measures"])

@@ -152,9 +152,7 @@ def write_drives(
         DatasetError: there is no drive to show, or `out` cannot be written.
     """
     target = Path(out)
-    refuse_folder(target)
-    with explained(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
+    _check_target(target)
     page = drive_page(studies, most=drives, budget_bytes=max_mb * MEGABYTE / BASE64, on_progress=on_progress)
     size = _write(target, page.document())
     return ViewReport(
@@ -180,9 +178,7 @@ def write_sources(
         on_progress: called after every sample with the numbers of finished and of all samples.
     """
     target, dataset = Path(out), sources[0].dataset
-    refuse_folder(target)
-    with explained(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
+    _check_target(target)
     total = len(dataset)
     count = total if samples is None else min(samples, total)
     builder = Builder(sources=sources)
@@ -233,6 +229,17 @@ def _legends(dataset: Dataset[Any]) -> Json:
         return legends_json(picture_legends(dataset.task))
     except Exception:  # a third party's code; the page is useful without legends
         return {}
+
+
+def _check_target(target: Path) -> None:
+    """Makes the folder of the page before the work begins.
+
+    Raises:
+        DatasetError: the page would be a folder, or its folder cannot be made.
+    """
+    refuse_folder(target)
+    with explained(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
 
 
 def _write(target: Path, pieces: Iterable[str]) -> int:

@@ -20,6 +20,15 @@ SEED = 0
 """Seed of the paired tests, so that a report is the same each time it is written."""
 
 
+def rate_title(allowed: float) -> str:
+    """The title of a detection rate in tables, such as `TPR at 1 %`.
+
+    Args:
+        allowed: share of clean pictures that may raise an alarm.
+    """
+    return f"TPR at {100 * allowed:g} %"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectionRate:
     """The detections at one allowed share of false alarms.
@@ -42,7 +51,7 @@ class DetectionRate:
     @property
     def title(self) -> str:
         """The title in tables, such as `TPR at 1 %`."""
-        return f"TPR at {100 * self.allowed:g} %"
+        return rate_title(self.allowed)
 
     def as_json(self) -> Json:
         """Returns `allowed`, `found`, `false_alarms` and `p` as JSON."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from gear.measuring.detection_rates import FALSE_ALARMS
 from gear.measuring.text_table import number_table
-from gear.verbs.bench.detection import detection_rates
+from gear.verbs.bench.detection import detection_rates, rate_title
 from gear.verbs.bench.drives.results import LEGEND as DRIVE_LEGEND
 from gear.verbs.bench.gains import against_clean, gain, is_failed
 from gear.verbs.bench.report import BenchReport, Result, TaskResult
@@ -22,7 +22,7 @@ OBJECT_COLUMNS = {
 }
 """Column titles for tasks with detected objects, each with the key of the count in `ObjectChanges.counts`."""
 
-REST = ("AUROC", *(f"TPR at {100 * share:g} %" for share in FALSE_ALARMS), "mask IoU", "s/picture")
+REST = ("AUROC", *map(rate_title, FALSE_ALARMS), "mask IoU", "s/picture")
 
 FAILED = " (failed)"
 """Mark of an optimised patch that is no worse than a random one."""
