@@ -53,12 +53,12 @@ def main() -> None:
     optimiser = TextureOptimiser(problem.surfaces(), problem.settings, derive_rng(0, "benchmark"), None)
 
     def seen(step: int) -> PatchedBatch:
-        textures = optimiser.textures.clone().requires_grad_(True)
+        textures = optimiser.parameters.clone().requires_grad_(True)
         indices = batch_of(step, len(scenes.samples), args.batch, optimiser.seed)
         return problem.compose_batch(textures, indices, step, optimiser.seed)
 
     def attack_step(step: int) -> int:
-        textures = optimiser.textures.clone().requires_grad_(True)
+        textures = optimiser.parameters.clone().requires_grad_(True)
         indices = batch_of(step, len(scenes.samples), args.batch, optimiser.seed)
         direction, values = ascend(textures, problem.compose_batch(textures, indices, step, optimiser.seed))
         optimiser.step(direction, 1.0)

@@ -121,7 +121,14 @@ def collect_both(world: World, clean: Job, twin: Job) -> None:
     try:
         planner = ScenePlanner(world, task.rig(), clean.split, split_name=clean.config.split)
         session = Session(
-            job=clean, plugin=plugin, task=task, world=world, planner=planner, renderer=renderer, pipeline=pipeline
+            job=clean,
+            plugin=plugin,
+            task=task,
+            world=world,
+            planner=planner,
+            renderer=renderer,
+            pipeline=pipeline,
+            device={},
         )
         for one in (clean, twin):
             store = Store(one.root, one.plan)
