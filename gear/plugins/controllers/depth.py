@@ -1,4 +1,8 @@
-"""The baseline on depth: the 5th percentile of the distances of all points in the corridor."""
+"""The baseline on depth: the 5th percentile of the distances of all points in the corridor that stand on the road.
+
+The road itself calibrates the depth map (`road_profile`), so that a road that the network reads too near is no
+obstacle.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +15,18 @@ from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import ControllerSpec
 from gear.plugins.controllers.baseline import Baseline, BaselineConfig
 from gear.plugins.controllers.corridor import Corridor, pixel_rays
+from gear.plugins.controllers.road_profile import calibrated_depth_m
 from gear.plugins.controllers.tracker import Sighting
 from gear.values.errors import FieldError
 
-HEIGHTS_M = (0.5, 2.0)
-"""Heights above the flat ground of the points that count: above the ground's own errors and below signs and bridges."""
+HEIGHTS_M = (0.4, 2.0)
+"""Heights above the road of the points that count: above the road's own errors and below signs and bridges."""
 
 FARTHEST_M = 50.0
 """Arc length on the path beyond which points do not count, metres: errors of depth and of the ground grow with it."""
 
-LEAST_SHARE = 5e-4
-"""Smallest share of the picture's pixels that an obstacle must have."""
+LEAST_SHARE = 1e-3
+"""Smallest share of the picture's pixels that an obstacle must have; a person at 15 m has 5e-3 of a depth picture."""
 
 STRIDE_PX = 2
 """Step in pixels, in both directions, at which the depth map is read."""
@@ -55,8 +60,8 @@ class DepthDriver(Baseline):
         self._percentile = config.percentile
 
     def nearest(self, observation: Observation, corridor: Corridor) -> Sighting | None:
-        """Returns the nearest part (a percentile) of the points in the corridor that are higher than the ground;
-        None if there are too few.
+        """Returns the nearest part (a percentile) of the points in the corridor that are higher than the road; None
+        if there are too few.
 
         Args:
             observation: the frame; its prediction is the (H, W) depth map of the first camera, metres.
@@ -64,6 +69,7 @@ class DepthDriver(Baseline):
         """
         camera = observation.cameras[0]
         depth_m = np.asarray(observation.prediction, np.float64)[::STRIDE_PX, ::STRIDE_PX]
+        depth_m = calibrated_depth_m(depth_m, camera, STRIDE_PX)
         rows, columns = np.mgrid[0 : camera.height_px : STRIDE_PX, 0 : camera.width_px : STRIDE_PX]
         rays = pixel_rays(camera, np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.float64))
         points_m = camera.ego_from_camera.translation_m + rays * depth_m.reshape(-1, 1)
@@ -80,7 +86,7 @@ class DepthDriver(Baseline):
 
 spec = ControllerSpec(
     name="depth_baseline",
-    summary="Brakes for points of a depth map that stand in the corridor.",
+    summary="Brakes for points of a depth map that stand on the road in the corridor.",
     config=DepthDriverConfig,
     build=DepthDriver,
     tasks=("depth",),
