@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +14,18 @@ from gear.plugins.controllers.baseline import Baseline, BaselineConfig
 from gear.plugins.controllers.corridor import Corridor, ground_pixels
 from gear.plugins.controllers.tracker import Sighting
 from gear.values.errors import FieldError
+from gear.values.rig import CameraMount
 
 DRIVABLE = (6, 7, 9, 10)
 """Cityscapes' label ids of ground on which cars drive: ground, road, parking and rail track."""
 
 FARTHEST_M = 45.0
-"""Arc length on the path up to which the ground is searched, metres; beyond it a row of pixels is several metres."""
+"""Arc length on the path up to which the ground is searched, metres, in any picture."""
+
+MOST_ROW_M = 0.5
+"""Largest length of ground in one row of pixels, metres; the ground is not searched beyond it, since borders of a label
+map are wrong by some rows.
+"""
 
 STEP_M, ACROSS = 0.5, 9
 """Step along the path in metres, and number of points across the corridor."""
@@ -65,7 +72,7 @@ class SemsegDriver(Baseline):
             corridor: the strip of road that the car needs, in the ego frame.
         """
         labels = np.asarray(observation.prediction)
-        arc_m = np.arange(corridor.front_m, min(FARTHEST_M, corridor.length_m), STEP_M)
+        arc_m = np.arange(corridor.front_m, min(_reach_m(observation.cameras[0]), corridor.length_m), STEP_M)
         if not len(arc_m):
             return None
         points_m = _across(corridor, arc_m)
@@ -84,6 +91,15 @@ class SemsegDriver(Baseline):
                 gap_m = float(arc_m[known[first]]) - corridor.front_m
                 return Sighting(gap_m=min(gap_m, NEAR_GAP_M) if first == 0 else gap_m)
         return None
+
+
+def _reach_m(camera: CameraMount) -> float:
+    """Arc length up to which the ground is searched. On a flat ground in the distance z, a row of pixels covers
+    z² / (f h), with the focal length f in pixels and the height h of the camera.
+    """
+    position_m = camera.ego_from_camera.translation_m
+    seen_m = math.sqrt(MOST_ROW_M * camera.intrinsics.fy_px * max(0.0, float(position_m[2])))
+    return min(FARTHEST_M, float(position_m[0]) + seen_m)
 
 
 def _across(corridor: Corridor, arc_m: Points) -> Points:

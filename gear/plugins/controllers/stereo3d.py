@@ -29,7 +29,7 @@ class Stereo3dDriverConfig(BaselineConfig):
         min_score: smallest confidence of a detection that counts, 0 to 1.
     """
 
-    min_score: float = 0.3
+    min_score: float = 0.5
 
     def __post_init__(self) -> None:
         BaselineConfig.__post_init__(self)

@@ -21,7 +21,10 @@ from gear.testing.things import PERSON, Thing
 
 READERS = {"detect2d": detect2d, "stereo3d": stereo3d, "depth": depth, "semseg": semseg}
 TOLERANCE_M = {"detect2d": 1.2, "stereo3d": 0.1, "depth": 0.8, "semseg": 1.5}
-"""Largest error of a gap at 20 m in pictures of 640 x 320: the grid of the ground, of the pixels, of the percentile."""
+"""Largest error of a gap at 20 m in these pictures: the grid of the ground, of the pixels, of the percentile."""
+
+WIDTH_PX = {"detect2d": 640, "stereo3d": 640, "depth": 640, "semseg": 1280}
+"""Width of the pictures, twice their height. The semseg reader does not look far in small pictures."""
 
 
 def car(ahead_m: float, left_m: float = 0.0, number: int = 2) -> Thing:
@@ -32,12 +35,13 @@ def person(ahead_m: float, left_m: float = 0.0) -> Thing:
     return Thing(parts=PERSON, position_m=(ahead_m, left_m, 0.0), object_id=3, role="pedestrian")
 
 
-def sighting(name: str, things: list[Thing]) -> Sighting | None:
-    """What a reader sees when its network is perfect."""
+def sighting(name: str, things: list[Thing], width_px: int | None = None) -> Sighting | None:
+    """What a reader sees when its network is perfect, in pictures of a width; None for that of `WIDTH_PX`."""
     spec = READERS[name].spec
     task = catalogue().get("task", name).spec
     assert isinstance(task, TaskSpec)
-    built: Any = task.build(task.config(width_px=640, height_px=320))
+    width_px = WIDTH_PX[name] if width_px is None else width_px
+    built: Any = task.build(task.config(width_px=width_px, height_px=width_px // 2))
     frame, record = synthetic_frame(built.rig(), things)
     observation = straight_road(built.as_prediction(built.ground_truth(frame, record)), rig=built.rig())
     controller: Any = spec.build(spec.config())
@@ -67,6 +71,13 @@ def test_cars_in_the_next_lanes_are_no_obstacles(name: str) -> None:
 def test_the_nearer_of_two_counts(name: str) -> None:
     found = sighting(name, [car(30.0), person(14.0)])
     assert found is not None and found.gap_m < 13.0
+
+
+def test_the_semseg_reader_does_not_search_where_a_row_of_pixels_is_long() -> None:
+    """A row of pixels is 0.5 m long at 23 m with 640 px of focal length, and at 16 m with 320 px."""
+    assert sighting("semseg", [car(22.0)]) is not None
+    assert sighting("semseg", [car(22.0)], width_px=640) is None
+    assert sighting("semseg", [car(15.0)], width_px=640) is not None
 
 
 def test_the_blind_one_sees_nothing() -> None:
