@@ -38,12 +38,12 @@ class Needs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """The outcome of one item, such as a sample: made, failed, or made by another run.
+    """The outcome of one item, such as a sample: made, failed, or made by another run; or a report before its end.
 
     Attributes:
         index: index of the item.
-        kind: `made` if all its files are written; `elsewhere` if another run has made it or is making it; otherwise
-            `failed`.
+        kind: `made` if all its files are written; `elsewhere` if another run has made it or is making it; `underway`
+            for a report on the progress of an item that has not ended; otherwise `failed`.
         error: the error of a failure, in one line.
         trace: the traceback of a failure; empty if there is none.
         is_final: whether another attempt would fail in the same way.
@@ -52,7 +52,7 @@ class Outcome:
     """
 
     index: int
-    kind: Literal["made", "elsewhere", "failed"] = "made"
+    kind: Literal["made", "elsewhere", "failed", "underway"] = "made"
     error: str = ""
     trace: str = ""
     is_final: bool = False
@@ -64,8 +64,8 @@ Report = Callable[[Outcome], None]
 
 Work = Callable[[Iterator[int], Report], None]
 """Type of a function that makes the items with the given indices one after the other, and reports one outcome for
-each. After `MOST_FAILURES` consecutive failures the function ends without taking further items. It can be
-pickled and sent to another process, and opens its resources once for all items.
+each, which reports of the kind `underway` may precede. After `MOST_FAILURES` consecutive failures the function ends
+without taking further items. It can be pickled and sent to another process, and opens its resources once for all items.
 """
 
 
@@ -78,8 +78,9 @@ class Executor(Protocol):
         Args:
             work: called once in each worker, or several times with a part of the items.
             indices: indices of the missing items; each is made once.
-            report: called in this process with one outcome for each item, in any order. Items whose worker was lost are
-                reported as failed. Items are left out only when all workers have ended after failures.
+            report: called in this process with one outcome for each item, in any order; reports of the kind `underway`
+                are passed on by engines that get them before the item ends. Items whose worker was lost are reported as
+                failed. Items are left out only when all workers have ended after failures.
 
         Raises:
             GearError: a worker raised an error that does not concern a single item.

@@ -16,6 +16,7 @@ from gear.contracts.executors import MOST_FAILURES, Outcome, Report
 from gear.contracts.rendering import RendererInfo
 from gear.contracts.specs import TaskSpec
 from gear.dataset.claims import Claims
+from gear.dataset.executors.calibrations import CalibrationReports
 from gear.dataset.files import explained, read_bytes, write_alone
 from gear.dataset.guarded_paths import owned, remove_tree
 from gear.dataset.json_text import dump_json, parse_json
@@ -35,6 +36,7 @@ from gear.measuring.metric_json import known_json
 from gear.plugins.build import build
 from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, GearError, PlacementError
+from gear.values.progress import NO_CALLBACKS, Callbacks
 from gear.values.serial import Json, from_json, to_json
 from gear.world.compilation.world_cache import load_or_compile
 from gear.world.scene_spec import SceneSpec
@@ -102,6 +104,7 @@ class DriveWorker:
         place_key, place: what decides the open place, and the place; None before the first drive.
         open_places: closes the open place.
         model_key, model: driver whose network is loaded, and the network with its defense; None without one.
+        callbacks: callbacks that receive the progress of calibrations.
     """
 
     drives: Drives
@@ -110,6 +113,7 @@ class DriveWorker:
     open_places: contextlib.ExitStack = field(default_factory=contextlib.ExitStack)
     model_key: str = ""
     model: GuardedModel | None = None
+    callbacks: Callbacks = NO_CALLBACKS
 
     def place_of(self, run: DriveRun) -> _Place:
         """World, simulation and renderer of a drive."""
@@ -144,7 +148,7 @@ class DriveWorker:
         if cast.model is None:
             return None
         if self.model is None or self.model_key != cast.label:
-            self.model = GuardedModel(cast.model, guard_of_cast(cast), seed=self.drives.config.seed)
+            self.model = GuardedModel(cast.model, guard_of_cast(cast, self.callbacks), seed=self.drives.config.seed)
             self.model_key = cast.label
         return self.model
 
@@ -169,15 +173,20 @@ def with_any_number(scene: SceneSpec) -> SceneSpec:
     )
 
 
-def guard_of_cast(cast: Cast) -> OpenedGuard:
-    """The defense of the driver `cast` with its calibration data; an empty guard without a defense."""
+def guard_of_cast(cast: Cast, callbacks: Callbacks = NO_CALLBACKS) -> OpenedGuard:
+    """The defense of a driver with its calibration data; an empty guard without a defense.
+
+    Args:
+        cast: the driver.
+        callbacks: callbacks that receive the progress of the calibration.
+    """
     if cast.defense is None or cast.model is None:
         return OpenedGuard()
     driver = cast.driver
     calibration = NOTHING
     if driver.calibration:
         patched = driver.calibration_patched or None
-        calibration = opened_calibration(driver.calibration, patched, [cast.model], driver.defense)
+        calibration = opened_calibration(driver.calibration, patched, [cast.model], driver.defense, callbacks=callbacks)
     return OpenedGuard(defense=cast.defense, calibration=calibration)
 
 
@@ -187,18 +196,20 @@ def drive_all(drives: Drives, indices: Iterator[int], report: Report) -> None:
     Args:
         drives: the study.
         indices: indices of the drives; those that another run has made or claimed are not made.
-        report: called with the outcome of each drive.
+        report: called with the outcome of each drive, and with the progress of calibrations.
 
     Raises:
         GearError: a file cannot be written.
     """
-    worker = DriveWorker(drives=drives)
+    calibrations = CalibrationReports(report=report)
+    worker = DriveWorker(drives=drives, callbacks=calibrations.callbacks())
     in_row = 0
     with worker.open_places, Claims(drives.root, CLAIMS) as claims, single_thread(drives):
         for index in indices:
             if not claims.take(index):
                 report(Outcome(index=index, kind="elsewhere"))
                 continue
+            calibrations.index = index
             outcome = _outcome(worker, index)
             claims.release(index)
             in_row = in_row + 1 if outcome.kind == "failed" and not outcome.is_final else 0

@@ -10,7 +10,7 @@ from gear.dataset import executors
 from gear.dataset.executors.in_process import InThisProcess
 from gear.values.errors import UnknownNameError
 
-NO_ENGINES = ("engines", "in_process", "jobs", "parts", "threads")
+NO_ENGINES = ("calibrations", "engines", "in_process", "jobs", "parts", "threads")
 """Modules of the room that are no engine."""
 
 DEFAULT = "processes"

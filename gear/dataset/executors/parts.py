@@ -41,11 +41,17 @@ def run_part(work: Work, indices: Sequence[int]) -> list[Outcome] | str:
         indices: indices of the items of the part.
 
     Returns:
-        One outcome per item, or the text of an error that does not concern a single item.
+        One outcome per item, or the text of an error that does not concern a single item. Reports of the kind
+        `underway` are dropped, because they would arrive with the end of the part.
     """
     outcomes: list[Outcome] = []
+
+    def report(outcome: Outcome) -> None:
+        if outcome.kind != "underway":
+            outcomes.append(outcome)
+
     try:
-        work(iter(indices), outcomes.append)
+        work(iter(indices), report)
     except GearError as error:
         return str(error)
     return outcomes

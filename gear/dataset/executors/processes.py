@@ -180,8 +180,9 @@ class _Pool:
                 worker.pipe.send(index)
             return
         assert isinstance(message, Outcome)
-        worker.held.remove(message.index)
-        self.deaths = self.deaths if message.kind == "failed" else 0
+        if message.kind != "underway":
+            worker.held.remove(message.index)
+            self.deaths = self.deaths if message.kind == "failed" else 0
         self.report(message)
 
     def _ended(self, worker: _Worker) -> None:

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from gear.contracts.executors import Executor, Needs, Outcome, Report
+from gear.dataset.executors.calibrations import CalibrationReports
 from gear.dataset.executors.engines import DEFAULT, open_executor
-from gear.dataset.executors.jobs import carry_out_jobs, run_jobs, shared_folder
+from gear.dataset.executors.jobs import JobNotes, carry_out_jobs, run_jobs, shared_folder
 from gear.dataset.json_text import load_json
 from gear.dataset.store import plan_of, splits_of
 from gear.measuring.guard import Guard
@@ -21,7 +22,7 @@ from gear.networks.runtime import has_cuda
 from gear.plugins.datasets import root_and_split, roots_of
 from gear.reporting.display import displayed
 from gear.values.errors import GearError
-from gear.values.progress import Callbacks, Progress, Warn
+from gear.values.progress import Callbacks, PhaseProgress, Progress, Warn
 from gear.verbs.attack.folder import NOTES, read_patches
 from gear.verbs.attack.report import AttackReport
 from gear.verbs.attack.request import AttackRequest
@@ -80,6 +81,8 @@ def attack_scenes(
     engine_workers: int = 1,
     progress: bool = False,
     on_progress: Progress | None = None,
+    on_fit_progress: Progress | None = None,
+    on_fit_phase: PhaseProgress | None = None,
     on_warning: Warn | None = None,
     **arguments: Any,
 ) -> dict[str, AttackReport]:
@@ -101,6 +104,9 @@ def attack_scenes(
             `if __name__ == "__main__":`.
         progress: shows a progress bar.
         on_progress: called after every scene.
+        on_fit_progress: called while a defense reads its calibration samples, for one scene at a time.
+        on_fit_phase: called with (unit, done, total) during a phase of the calibration, such as training steps, if the
+            defense reports its phases.
         on_warning: called with lines on settings that may be unintended, and on scenes that failed.
         **arguments: further arguments of `gear.attack`, the same for all scenes.
 
@@ -119,7 +125,9 @@ def attack_scenes(
         guard=Guard.of(defense, defense_settings, calibration, calibration_patched),
         **arguments,
     )
-    callbacks = Callbacks.of(on_progress=on_progress, on_warning=on_warning)
+    callbacks = Callbacks.of(
+        on_progress=on_progress, on_fit_progress=on_fit_progress, on_fit_phase=on_fit_phase, on_warning=on_warning
+    )
     with displayed(callbacks, "attack", progress=progress, unit="scene") as shown:
         return run_attack_scenes(request, Engine(name=engine, address=address, workers=engine_workers), shown)
 
@@ -201,11 +209,10 @@ def run_attack_scenes(request: AttackRequest, engine: Engine, callbacks: Callbac
     devices = [setting.partition("=")[2] for setting in request.model_settings if setting.startswith("device=")]
     executor = engine.opened(gpus=int(has_cuda(devices[-1] if devices else None)))
     work = partial(attack_in_worker, tuple(requests.values()), str(Path.cwd()))
-    failed = run_jobs(executor, work, range(len(scenes)), report)
+    notes = JobNotes(root=Path(request.out), names=scenes)
+    failed = run_jobs(executor, work, range(len(scenes)), report, callbacks=callbacks, notes=notes)
     if failed:
-        first = min(failed)
-        more = f"; {len(failed) - 1} more of {len(scenes)} scenes failed" if len(failed) > 1 else ""
-        raise GearError(f"{scenes[first]}: {failed[first].error}{more}")
+        raise GearError(notes.summary(failed, "scenes"))
     return {
         scene: AttackReport(
             out=Path(one.out),
@@ -247,7 +254,8 @@ def attack_in_worker(
 
     def call(index: int) -> _Attacked:
         warnings: list[str] = []
-        made = run_attack(requests[index], Callbacks.of(on_warning=warnings.append)).made
+        calibrations = CalibrationReports(report=report, index=index)
+        made = run_attack(requests[index], calibrations.callbacks(warnings.append)).made
         return _Attacked(made=made, warnings=tuple(warnings))
 
     with shared_folder(folder):

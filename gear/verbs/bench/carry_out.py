@@ -31,7 +31,7 @@ def carry_out(step: Step, root: Path, callbacks: Callbacks, *, changed: Mapping[
         GearError: the step fails; the message names the step.
     """
     keywords: dict[str, Any] = {"on_progress": callbacks.on_progress, "on_warning": callbacks.on_warning}
-    if step.verb in ("attack", "evaluate"):
+    if step.verb != "collect":
         keywords["on_fit_progress"] = callbacks.on_fit_progress
         keywords["on_fit_phase"] = callbacks.on_fit_phase
     try:

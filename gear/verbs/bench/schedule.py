@@ -12,8 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gear.contracts.executors import Executor, Outcome, Report
-from gear.dataset.executors.jobs import carry_out_jobs, run_jobs, shared_folder
+from gear.contracts.executors import Executor, Outcome, Report, Work
+from gear.dataset.executors.calibrations import CalibrationReports
+from gear.dataset.executors.in_process import InThisProcess
+from gear.dataset.executors.jobs import FAILURES, JobNotes, carry_out_jobs, run_jobs, shared_folder
 from gear.values.errors import GearError
 from gear.values.progress import Callbacks
 from gear.verbs.bench.carry_out import carry_out
@@ -133,13 +135,15 @@ class _Running:
 
     def carry_out_here(self, collections: Sequence[int]) -> None:
         """Carries out the collections at some positions, one after the other; workers share the samples of each."""
-        if collections:
-            make_steps(self.steps, self.root, None, {}, collections, self._report)
+        self._run(InThisProcess(), partial(make_steps, self.steps, self.root, None, {}), collections)
 
     def carry_out_in_workers(self, executor: Executor, positions: Sequence[int]) -> None:
         """Carries out the steps at some positions in parallel; steps whose worker was lost are tried again."""
-        work = partial(make_steps, self.steps, self.root, str(Path.cwd()), ALONE)
-        run_jobs(executor, work, positions, self._report)
+        self._run(executor, partial(make_steps, self.steps, self.root, str(Path.cwd()), ALONE), positions)
+
+    def _run(self, executor: Executor, work: Work, positions: Sequence[int]) -> None:
+        notes = JobNotes(root=self.root, names=[step.title for step in self.steps])
+        run_jobs(executor, work, positions, self._report, callbacks=self.callbacks, notes=notes)
 
     def _report(self, outcome: Outcome) -> None:
         """Notes the outcome of a step."""
@@ -166,7 +170,8 @@ class _Running:
         first = min(self.failed)
         left = len(self.steps) - len(self.results) - 1
         more = f"; {left} more of {len(self.steps)} steps were not carried out" if left else ""
-        raise GearError(f"{_problem(self.steps[first], self.failed[first])}{more}")
+        noted = f"; the errors are noted in {self.root / FAILURES}"
+        raise GearError(f"{_problem(self.steps[first], self.failed[first])}{more}{noted}")
 
 
 def _problem(step: Step, outcome: Outcome) -> str:
@@ -199,7 +204,7 @@ def make_steps(
 
     def call(index: int) -> StepResult:
         step, warnings = steps[index], list[str]()
-        callbacks = Callbacks.of(on_warning=warnings.append)
+        callbacks = CalibrationReports(report=report, index=index).callbacks(warnings.append)
         value = carry_out(step, root, callbacks, changed=changed if step.verb in ("collect", "drive") else None)
         return StepResult(value=value if step.verb in ("evaluate", "drive") else None, warnings=tuple(warnings))
 

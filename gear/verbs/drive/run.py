@@ -18,6 +18,7 @@ from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import NO_PATCH
 from gear.dataset.claims import clear_claims
 from gear.dataset.executors.engines import DEFAULT, open_executor
+from gear.dataset.executors.jobs import JobNotes, try_jobs
 from gear.dataset.files import clear_scratch, write_whole
 from gear.dataset.guarded_paths import remove_empty_folders
 from gear.dataset.json_text import dump_json
@@ -30,7 +31,7 @@ from gear.plugins.build import find
 from gear.reporting.display import displayed
 from gear.values.counted import counted
 from gear.values.errors import DatasetError, GearError
-from gear.values.progress import Callbacks, Progress, Warn
+from gear.values.progress import Callbacks, PhaseProgress, Progress, Warn
 from gear.verbs.drive.chart import chart
 from gear.verbs.drive.metric_against_outcome import metric_of
 from gear.verbs.drive.page import page
@@ -62,6 +63,8 @@ def drive(
     address: str | None = None,
     progress: bool = False,
     on_progress: Progress | None = None,
+    on_fit_progress: Progress | None = None,
+    on_fit_phase: PhaseProgress | None = None,
     on_warning: Warn | None = None,
 ) -> DriveReport:
     """Drives cars in the closed loop, with and without patches. Resumes an interrupted study drive by drive.
@@ -84,6 +87,9 @@ def drive(
         address: address of the engine's cluster; None without a cluster.
         progress: shows a progress bar.
         on_progress: called after every drive.
+        on_fit_progress: called after every calibration sample that a defense reads for the first time.
+        on_fit_phase: called with (unit, done, total) after every step of a phase of the calibration, such as a training
+            step, if the defense reports its phases.
         on_warning: called with lines on drives that could not be made.
 
     Raises:
@@ -98,7 +104,9 @@ def drive(
         engine=engine,
         address=address,
     )
-    callbacks = Callbacks.of(on_progress=on_progress, on_warning=on_warning)
+    callbacks = Callbacks.of(
+        on_progress=on_progress, on_fit_progress=on_fit_progress, on_fit_phase=on_fit_phase, on_warning=on_warning
+    )
     with displayed(callbacks, "drive", progress=progress, unit="drive") as shown:
         return run_drive(request, shown)
 
@@ -182,26 +190,28 @@ def _executor(request: DriveRequest) -> Executor:
 
 
 def _made(drives: Drives, executor: Executor, callbacks: Callbacks) -> dict[int, Outcome]:
-    """Makes the missing drives; returns the outcomes by index of the drive, without those of drives never begun."""
+    """Makes the missing drives; a drive that fails for an unexpected reason is tried again twice.
+
+    Returns:
+        The last outcomes by index of the drive, without those of drives never begun.
+    """
     missing = [
         index
         for index, (run, patch) in enumerate(zip(drives.runs, patches_of(drives, drives.runs), strict=True))
         if _stored(drives, run, patch, with_video=drives.has_video(run)) is None
     ]
     total = len(drives.runs)
-    done, outcomes = total - len(missing), {}
+    done, outcomes = total - len(missing), dict[int, Outcome]()
     callbacks.on_progress(done, total)
 
     def report(outcome: Outcome) -> None:
-        nonlocal done
-        done += 1
         outcomes[outcome.index] = outcome
         if outcome.kind == "failed":
             callbacks.on_warning(f"{drives.runs[outcome.index].title}: {outcome.error}")
-        callbacks.on_progress(done, total)
+        callbacks.on_progress(done + len(outcomes), total)
 
-    if missing:
-        executor.run(partial(drive_all, drives), missing, report)
+    notes = JobNotes(root=drives.root, names=[run.title for run in drives.runs])
+    try_jobs(executor, partial(drive_all, drives), missing, report, callbacks=callbacks, notes=notes)
     return outcomes
 
 

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from gear.contracts.executors import Needs, Outcome, Report
+from gear.dataset.executors.calibrations import CalibrationReports
 from gear.dataset.executors.engines import open_engine
-from gear.dataset.executors.jobs import carry_out_jobs, run_jobs, shared_folder
+from gear.dataset.executors.jobs import JobNotes, carry_out_jobs, run_jobs, shared_folder
 from gear.dataset.files import write_whole
 from gear.dataset.json_text import dump_json
 from gear.dataset.reading import Dataset
@@ -100,7 +101,8 @@ def predict_in_workers(
         request: the evaluation, whose folder has its `plan.json`.
         datasets: all datasets of the evaluation.
         guarded: the model, from which the workers' device is known.
-        callbacks: callbacks that receive the number of finished datasets, and one line for each that failed.
+        callbacks: callbacks that receive the number of finished datasets, the progress of calibrations, and one line
+            for each dataset that failed.
 
     Returns:
         What the workers did, one entry per dataset.
@@ -131,11 +133,11 @@ def predict_in_workers(
 
     callbacks.on_progress(0, len(datasets))
     work = partial(predict_datasets, request, str(Path.cwd()))
-    failed = run_jobs(engine, work, range(len(datasets)), report)
+    task = datasets[0].plan.task["name"]
+    notes = JobNotes(root=request.folder(task), names=[str(one.root) for one in datasets])
+    failed = run_jobs(engine, work, range(len(datasets)), report, callbacks=callbacks, notes=notes)
     if failed:
-        first = min(failed)
-        more = f"; {len(failed) - 1} more of {len(datasets)} datasets failed" if len(failed) > 1 else ""
-        raise GearError(f"{datasets[first].root}: {failed[first].error}{more}")
+        raise GearError(notes.summary(failed, "datasets"))
     return found
 
 
@@ -155,9 +157,12 @@ def predict_datasets(request: EvaluateRequest, folder: str | None, indices: Iter
         chosen = chosen_model(request.model, request.model_settings)
         datasets = opened(request.data, request.split, chosen, request.reports)
         task, names = datasets[0].plan.task["name"], row_names(datasets)
-        guarded = GuardedModel(chosen, open_guard(request.guard, [chosen], task), seed=request.seed)
+        calibrations = CalibrationReports(report=report)
+        guard = open_guard(request.guard, [chosen], task, callbacks=calibrations.callbacks())
+        guarded = GuardedModel(chosen, guard, seed=request.seed)
 
         def call(index: int) -> Predicted:
+            calibrations.index = index
             row = measure_dataset(request, datasets[index], names[index], guarded, lambda: None)
             store_fit(request.folder(task), guarded)
             return Predicted(made=row.made, damaged=row.damaged)

@@ -20,7 +20,7 @@ from gear.leaderboard.rules import NONE, faults, warnings
 from gear.leaderboard.verdict import Finding, State, Verdict, finding
 from gear.reporting.display import displayed
 from gear.values.errors import GearError
-from gear.values.progress import Callbacks, Progress
+from gear.values.progress import Callbacks, PhaseProgress, Progress
 from gear.values.rng import derive_rng
 from gear.verbs.leaderboard.compare import (
     compare_fresh,
@@ -56,6 +56,8 @@ def check_record(
     device: str | None = None,
     progress: bool = False,
     on_progress: Progress | None = None,
+    on_fit_progress: Progress | None = None,
+    on_fit_phase: PhaseProgress | None = None,
 ) -> Verdict:
     """Checks a record: the rules of the leaderboard, the installed plugins, and results of samples that are made and
     measured again.
@@ -83,11 +85,14 @@ def check_record(
         device: device of the networks; by default that of the config.
         progress: shows a progress bar.
         on_progress: called after every sample.
+        on_fit_progress: called after every calibration sample that the defense reads for the first time.
+        on_fit_phase: called with (unit, done, total) after every step of a phase of the calibration, such as a training
+            step, if the defense reports its phases.
 
     Raises:
         GearError: the record is refused, a plugin or a patch is missing, or the check would render too many pictures.
     """
-    callbacks = Callbacks.of(on_progress=on_progress)
+    callbacks = Callbacks.of(on_progress=on_progress, on_fit_progress=on_fit_progress, on_fit_phase=on_fit_phase)
     with ExitStack() as stack, displayed(callbacks, "leaderboard check", progress=progress) as shown:
         folder = work if work is not None else stack.enter_context(tempfile.TemporaryDirectory(prefix="gear-check-"))
         request = CheckRequest(
@@ -123,7 +128,7 @@ def run_check(request: CheckRequest, callbacks: Callbacks) -> Verdict:
     record = filed.record
     secret = None if request.withheld is None else read_withheld(Path(request.withheld), request.commitment)
     patches = Path(request.patches) if request.patches is not None else filed.path.parent / "patches"
-    rerun = Rerun(record, Path(request.work), patches, request.settings, request.device)
+    rerun = Rerun(record, Path(request.work), patches, request.settings, request.device, callbacks)
     check_data(record, places=len(rerun.plan.places()), samples=rerun.plan.config.samples.measure)
     chosen = _chosen(record, request)
     _refuse_many(rerun, chosen, request)
@@ -139,7 +144,7 @@ def run_check(request: CheckRequest, callbacks: Callbacks) -> Verdict:
     is_every = len(again) == sum(one.samples for one in record.data if one.patch in _kinds(rerun))
     alone = _again(rerun, chosen, count, with_defense=False) if is_every and record.entry.defense is not None else []
     found += compare_reference(record, alone, rerun.ranked)
-    found += check_drives(rerun, request, is_same=is_same)
+    found += check_drives(rerun, request, callbacks, is_same=is_same)
     if request.fresh:
         found += _fresh(rerun, request, secret, count)
     verdict = Verdict(

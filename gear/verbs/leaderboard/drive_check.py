@@ -9,6 +9,7 @@ from pathlib import Path
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.executors import Outcome
+from gear.dataset.executors.calibrations import ShownCalibrations
 from gear.driving.config import DriveConfig
 from gear.driving.drives import DriveRun, Drives, patches_of, plan_drives
 from gear.driving.simulation import FRAME_S
@@ -17,6 +18,7 @@ from gear.leaderboard.drive_claims import DriveClaim, Key
 from gear.leaderboard.verdict import Finding, Level, finding
 from gear.plugins.build import NO_OPTIONS
 from gear.values.errors import GearError
+from gear.values.progress import Callbacks
 from gear.values.rng import derive_rng
 from gear.verbs.bench.drives.recording import label_of
 from gear.verbs.bench.drives.steps import PlannedDrives, planned_drives, settings
@@ -65,12 +67,13 @@ class Repeated:
         return self.drives.scenario(self.run).is_free
 
 
-def check_drives(rerun: Rerun, request: CheckRequest, *, is_same: bool) -> list[Finding]:
+def check_drives(rerun: Rerun, request: CheckRequest, callbacks: Callbacks, *, is_same: bool) -> list[Finding]:
     """Makes some of the drives of a record again.
 
     Args:
         rerun: the record on this machine.
         request: arguments of the check: the number of drives, and the seed by which they are chosen.
+        callbacks: callbacks that receive the progress of calibrations.
         is_same: whether this machine should give equal bytes.
 
     Returns:
@@ -94,7 +97,7 @@ def check_drives(rerun: Rerun, request: CheckRequest, *, is_same: bool) -> list[
     if frames > request.most_pictures:
         problem = f"{len(chosen)} drives would render up to {frames} pictures, at most {request.most_pictures} are"
         raise GearError(f"{request.record}: {problem} allowed; raise --most-pictures, or lower --drives")
-    made = [(one, _driven(one)) for one in chosen]
+    made = [(one, _driven(one, callbacks)) for one in chosen]
     return list(_compared(made, claimed, len(every), is_same=is_same))
 
 
@@ -123,15 +126,21 @@ def _frames(one: Repeated) -> int:
     return round(one.drives.scenario(one.run).duration_s / FRAME_S)
 
 
-def _driven(one: Repeated) -> DriveResult | str:
+def _driven(one: Repeated, callbacks: Callbacks) -> DriveResult | str:
     """Drives again; the reason in one line if the drive cannot be made.
 
     Raises:
         DatasetError: a file cannot be written.
     """
     outcomes: list[Outcome] = []
+    calibrations = ShownCalibrations(callbacks=callbacks)
+
+    def report(outcome: Outcome) -> None:
+        if not calibrations.takes(outcome):
+            outcomes.append(outcome)
+
     one.drives.root.mkdir(parents=True, exist_ok=True)
-    drive_all(one.drives, iter([one.number]), outcomes.append)
+    drive_all(one.drives, iter([one.number]), report)
     (patch,) = patches_of(one.drives, [one.run])
     found = read_result(one.drives.root, one.drives.folder(one.run, patch), one.drives.identity(one.run, patch))
     return found if found is not None else next((each.error for each in outcomes if each.error), "was not made")

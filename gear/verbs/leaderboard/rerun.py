@@ -27,6 +27,7 @@ from gear.measuring.statistics import AnyEvaluator
 from gear.plugins.datasets import open_dataset, task_of
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
+from gear.values.progress import NO_CALLBACKS, Callbacks
 from gear.verbs.bench.drives.recording import controller_facts
 from gear.verbs.bench.plan import RANDOM, SPLITS, Plan, PlannedEvaluation, Step
 from gear.verbs.bench.plugin_facts import plugin_facts
@@ -80,7 +81,13 @@ class Rerun:
     """
 
     def __init__(
-        self, record: Record, work: Path, patches: Path, settings: Sequence[str] = (), device: str | None = None
+        self,
+        record: Record,
+        work: Path,
+        patches: Path,
+        settings: Sequence[str] = (),
+        device: str | None = None,
+        callbacks: Callbacks = NO_CALLBACKS,
     ) -> None:
         """Looks up the plugins and copies the patches; nothing is rendered.
 
@@ -90,12 +97,14 @@ class Rerun:
             patches: folder with the patches, `<sha256>.png`.
             settings: `KEY=VALUE` texts that replace keys of the record's config, such as the path of a town's file.
             device: device of the networks; None for that of the config.
+            callbacks: callbacks that receive the progress of calibrations.
 
         Raises:
             GearError: a plugin is not installed, the config does not fit, or it names several tasks, networks or
                 defenses.
         """
         self.record, self._work, self._patches = record, work, patches
+        self._callbacks = callbacks
         refuse_enormous(record.benchmark.config)
         write_whole(work, "bench.yml", yaml.safe_dump(record.benchmark.config, sort_keys=False).encode())
         asked = tuple(settings)
@@ -144,7 +153,7 @@ class Rerun:
             if guard is not None:
                 if guard.calibration is not None:
                     self._calibration()
-                opened = open_guard(guard, [chosen], self.planned.task_plugins.name)
+                opened = open_guard(guard, [chosen], self.planned.task_plugins.name, callbacks=self._callbacks)
             self._guarded[with_defense] = GuardedModel(chosen, opened, seed=self.plan.config.seed)
         return self._guarded[with_defense]
 
@@ -213,7 +222,8 @@ class Rerun:
         Raises:
             GearError: a place does not exist, or has more surfaces than the first scene, or no patches are named.
         """
-        other = Rerun(self.record, self._work / "withheld", self._patches, (*self._asked, *settings), self._device)
+        asked = (*self._asked, *settings)
+        other = Rerun(self.record, self._work / "withheld", self._patches, asked, self._device, self._callbacks)
         moved = moved_patches(self.record, self.planned.model.label, [scene.label for scene in other.plan.scenes])
         other.record = replace(self.record, patches=(*moved, *self.record.patches))
         return other

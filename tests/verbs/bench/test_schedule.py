@@ -73,9 +73,15 @@ def carried_out(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return there
 
 
-def run_all(steps: Sequence[Step], executor: Executor, callbacks: Callbacks | None = None, **given: Any) -> Any:
+def run_all(
+    steps: Sequence[Step],
+    executor: Executor,
+    callbacks: Callbacks | None = None,
+    root: Path = Path(),
+    **given: Any,
+) -> Any:
     given = {"workers": 1, "callbacks": callbacks or Callbacks(), **given}
-    return run_steps(steps, Path(), rendering=executor, networks=executor, **given)
+    return run_steps(steps, root, rendering=executor, networks=executor, **given)
 
 
 def test_a_step_needs_the_steps_whose_folders_it_reads() -> None:
@@ -109,39 +115,41 @@ def test_workers_share_the_samples_of_a_few_collections(carried_out: list[str]) 
     assert carried_out[:2] == ["clean", "control"]
 
 
-def test_a_failed_step_costs_those_alone_that_need_it(carried_out: list[str]) -> None:
+def test_a_failed_step_costs_those_alone_that_need_it(carried_out: list[str], tmp_path: Path) -> None:
     steps = list(STEPS)
     steps[2] = step("attack", "patch", data=["clean"], bad=True)
     with pytest.raises(GearError) as caught:
-        run_all(steps, Backwards())
+        run_all(steps, Backwards(), root=tmp_path)
     assert carried_out == ["control", "clean", "small"]
-    assert str(caught.value) == "attack patch: no such picture; 2 more of 6 steps were not carried out"
+    noted = f"; the errors are noted in {tmp_path}/failures"
+    assert str(caught.value) == f"attack patch: no such picture; 2 more of 6 steps were not carried out{noted}"
+    assert [path.name for path in (tmp_path / "failures").iterdir()] == ["2.json"]
 
 
-def test_a_step_whose_worker_is_lost_is_tried_again(carried_out: list[str]) -> None:
+def test_a_step_whose_worker_is_lost_is_tried_again(carried_out: list[str], tmp_path: Path) -> None:
     notes: list[str] = []
-    run_all(STEPS, Backwards(lost=[2]), Callbacks.of(on_warning=notes.append))
+    run_all(STEPS, Backwards(lost=[2]), Callbacks.of(on_warning=notes.append), root=tmp_path)
     assert carried_out.count("patch") == 1 and carried_out[-1] == "guarded"
     assert "attack patch: a worker was lost" in notes
 
 
-def test_a_step_whose_worker_is_lost_each_time_is_named() -> None:
+def test_a_step_whose_worker_is_lost_each_time_is_named(tmp_path: Path) -> None:
     class Losing:
         def run(self, work: Work, indices: Sequence[int], report: Report) -> None:
             for index in indices:
                 report(Outcome(index=index, kind="failed", error="a worker was lost"))
 
     with pytest.raises(GearError, match=r"collect clean: a worker was lost; 5 more of 6 steps were not carried out"):
-        run_all(STEPS, Losing())
+        run_all(STEPS, Losing(), root=tmp_path)
 
 
-def test_a_worker_whose_steps_all_fail_takes_no_more(carried_out: list[str]) -> None:
+def test_a_worker_whose_steps_all_fail_takes_no_more(carried_out: list[str], tmp_path: Path) -> None:
     reported: list[Outcome] = []
     steps = [step("collect", str(number), bad=True) for number in range(9)]
     make_steps(steps, Path(), None, {}, range(9), reported.append)
     assert [outcome.index for outcome in reported] == list(range(5))
     with pytest.raises(GearError, match=r"collect 0: no such picture; 8 more of 9"):
-        run_all(steps, InThisProcess())
+        run_all(steps, InThisProcess(), root=tmp_path)
 
 
 def test_a_machine_without_the_folder_is_one_line(tmp_path: Path) -> None:

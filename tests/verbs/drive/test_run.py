@@ -146,6 +146,33 @@ def test_drives_that_no_worker_has_begun_are_told_from_those_of_another_run() ->
     assert _problem(Outcome(index=0, kind="failed", error="broken")) == "broken"
 
 
+def test_a_drive_that_fails_is_tried_again_and_calibrations_are_shown(
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[int] = []
+
+    def made(one: worker.DriveWorker, run: DriveRun) -> bool:
+        calls.append(run.seed)
+        one.callbacks.on_fit_phase("training step", 3, 3)
+        if len(calls) < 3:
+            raise RuntimeError("broken")
+        return real(one, run)
+
+    real: Any = worker._made
+    monkeypatch.setattr(worker, "_made", made)
+    settings = ["scenarios={free_road: [30]}", "drivers={blind: {controller: blind}}"]
+    seen: list[Any] = []
+    report = gear.drive(
+        config,
+        out=tmp_path,
+        settings=settings,
+        on_progress=lambda *progress: seen.append(progress),
+        on_fit_phase=lambda *phase: seen.append(phase),
+    )
+    assert calls == [calls[0]] * 3 and not report.failed and not (tmp_path / "failures").exists()
+    assert seen == [(0, 1), *[("training step", 3, 3), (1, 1)] * 3]
+
+
 def test_the_drives_after_many_failures_are_not_begun(
     config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

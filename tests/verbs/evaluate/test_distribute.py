@@ -6,16 +6,19 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from gear.contracts.defenses import DefenseResult
 from gear.contracts.executors import Outcome
+from gear.contracts.specs import DefenseSpec
 from gear.dataset.executors.in_process import InThisProcess
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.values.errors import GearError
 from gear.verbs.evaluate import distribute
 from gear.verbs.evaluate.request import EvaluateRequest
 from gear.verbs.evaluate.run import evaluate
-from tests.verbs.conftest import Small, put_package
+from tests.verbs.conftest import Nothing, Small, put_package
 from tests.verbs.evaluate.test_evaluate import timeless
 
 
@@ -36,6 +39,40 @@ def engines(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
     monkeypatch.setattr(distribute, "open_engine", opened)
     return asked
+
+
+class Learner:
+    """A defense that looks at all calibration pictures and changes nothing."""
+
+    def fit(self, clean: Any, patched: Any, model: Any, rng: np.random.Generator) -> int:
+        return sum(len(views) for views in clean)
+
+    def apply(self, views: Any, model: Any, state: int, rng: np.random.Generator) -> DefenseResult:
+        return DefenseResult(views=views)
+
+    def wrap(self, model: Any) -> Any:
+        return model
+
+
+def test_a_calibration_in_a_worker_is_shown(
+    tmp_path: Path, data: list[Path], engines: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec: DefenseSpec[Any] = DefenseSpec(
+        name="learner", summary="Learns.", config=Nothing, build=lambda _: Learner(),  # type: ignore[arg-type, return-value]
+        needs_calibration=True, needs_model=True, outputs=frozenset({"images"}),
+    )  # fmt: skip
+    put_package(monkeypatch, [spec, tiny_segmenter])
+    seen: list[tuple[int, int]] = []
+    evaluate(
+        data[:1],
+        out=tmp_path,
+        model="tiny_segmenter",
+        defense="learner",
+        calibration=data[0],
+        engine="ray",
+        on_fit_progress=lambda done, total: seen.append((done, total)),
+    )
+    assert engines and seen[-1] == (2, 2)
 
 
 @pytest.mark.parametrize("defense", [None, "gaussian"])
@@ -88,7 +125,8 @@ def test_a_dataset_that_fails_is_named_and_the_others_are_predicted(
     monkeypatch.setattr(distribute, "open_engine", lambda *names, **given: Losing())
     with pytest.raises(GearError) as caught:
         evaluate(data, out=tmp_path / "out", model="tiny_segmenter", engine_workers=2)
-    assert str(caught.value) == f"{data[0]}: a worker was lost"
+    assert str(caught.value) == f"{data[0]}: a worker was lost; the errors are noted in {tmp_path}/out/failures"
+    assert json.loads((tmp_path / "out/failures/0.json").read_text())["tries"] == 3
     assert len(list((tmp_path / "out").rglob("samples/*.json"))) == 2
     assert not (tmp_path / "out/results.json").exists()
     assert json.loads((tmp_path / "out/plan.json").read_text())

@@ -5,17 +5,23 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 import gear
+from gear.contracts.executors import Outcome, Report
+from gear.dataset.executors.calibrations import CalibrationReports
 from gear.dataset.locks import dataset_lock
 from gear.leaderboard.reading import encoded, read_record
 from gear.leaderboard.record import Record
 from gear.leaderboard.verdict import Verdict
 from gear.values.errors import GearError
+from gear.values.progress import Callbacks
+from gear.verbs.leaderboard import drive_check
 from tests.shared import shared_folder
 from tests.verbs.bench.conftest import write
 from tests.verbs.leaderboard.conftest import ADAPTIVE, HERE
@@ -45,6 +51,23 @@ def forge(path: Path, change: Callable[[Record], Record]) -> Path:
     forged = path.with_name("forged.json")
     forged.write_bytes(encoded(change(read_record(path).record)))
     return forged
+
+
+def test_calibrations_are_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def drive_all(drives: Any, indices: Iterator[int], report: Report) -> None:
+        for index in indices:
+            CalibrationReports(report=report, index=index).callbacks().on_fit_phase("training step", 2, 2)
+            report(Outcome(index=index, kind="failed", error="no place"))
+
+    monkeypatch.setattr(drive_check, "drive_all", drive_all)
+    monkeypatch.setattr(drive_check, "patches_of", lambda *given: ["patch"])
+    monkeypatch.setattr(drive_check, "read_result", lambda *given: None)
+    drives = SimpleNamespace(root=tmp_path, folder=lambda *given: "", identity=lambda *given: None)
+    one = drive_check.Repeated(planned=cast("Any", None), drives=cast("Any", drives), number=3, run=cast("Any", None))
+    seen: list[Any] = []
+    callbacks = Callbacks.of(on_fit_phase=lambda *phase: seen.append(phase))
+    assert drive_check._driven(one, callbacks) == "no place"
+    assert seen == [("training step", 2, 2)]
 
 
 def test_drives_repeat_and_forged_ones_are_seen(

@@ -9,9 +9,24 @@ from typing import Any, cast
 import pytest
 
 from gear.values.errors import GearError
+from gear.values.progress import Callbacks
 from gear.verbs.bench.plan import Plan
+from gear.verbs.leaderboard import rerun
 from gear.verbs.leaderboard.rerun import check_data, moved_patches, only_evaluation, refuse_enormous
 from tests.leaderboard.conftest import SAMPLES, record
+
+
+def test_calibrations_are_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr(rerun, "guard_of", lambda *given: SimpleNamespace(calibration=None))
+    monkeypatch.setattr(rerun, "open_guard", lambda *given, callbacks: asked.append(callbacks))
+    monkeypatch.setattr(rerun, "GuardedModel", lambda *given, **named: "guarded")
+    shown = Callbacks.of()
+    planned = SimpleNamespace(model=SimpleNamespace(chosen=None), task_plugins=SimpleNamespace(name="semseg"))
+    config = SimpleNamespace(seed=0)
+    one = SimpleNamespace(planned=planned, plan=SimpleNamespace(config=config), _guarded={}, _callbacks=shown)
+    assert rerun.Rerun.guarded(cast(rerun.Rerun, one)) == "guarded"
+    assert asked == [shown]
 
 
 def plan(tasks: int, defenses: list[str | None]) -> Plan:

@@ -8,6 +8,7 @@ from gear.config.dump import to_yaml
 from gear.contracts.executors import Outcome
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
 from gear.dataset.claims import clear_claims
+from gear.dataset.executors.calibrations import ShownCalibrations
 from gear.dataset.files import write_whole
 from gear.dataset.guarded_paths import remove_empty_folders
 from gear.dataset.layout import split_folder
@@ -40,8 +41,12 @@ def evaluate_held_out(drives: Drives, callbacks: Callbacks) -> Json:
     total, done = len(drives.runs), 0
     broken: list[str] = []
 
+    calibrations = ShownCalibrations(callbacks=callbacks)
+
     def report(outcome: Outcome) -> None:
         nonlocal done
+        if calibrations.takes(outcome):
+            return
         done += 1
         if outcome.kind == "failed":
             line = f"held-out drive {drives.runs[outcome.index].title}: {outcome.error}"

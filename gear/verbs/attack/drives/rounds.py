@@ -119,7 +119,7 @@ class Rounds:
         first = self.recorder.done // request.redrive
         cast = self.job.drives.casts[self.job.label]
         assert cast.model is not None, "attacks with gradients need a network"
-        model = build_model([cast.model], guard_of_cast(cast), request.seed)
+        model = build_model([cast.model], guard_of_cast(cast, self.worker.callbacks), request.seed)
         patches: tuple[Patch, ...] = ()
         for number in range(first, -(-self._steps // request.redrive)):
             scenes = self._scenes(number, device_name(model))

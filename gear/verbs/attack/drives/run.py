@@ -31,7 +31,7 @@ from gear.measuring.patch_checks import check_patches
 from gear.plugins.build import blamed, build, find
 from gear.reporting.display import displayed
 from gear.values.errors import GearError
-from gear.values.progress import Callbacks, Progress, Warn
+from gear.values.progress import Callbacks, PhaseProgress, Progress, Warn
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
 from gear.verbs.attack.achieved import plain
@@ -63,6 +63,8 @@ def attack_drive(
     force: bool = False,
     progress: bool = False,
     on_progress: Progress | None = None,
+    on_fit_progress: Progress | None = None,
+    on_fit_phase: PhaseProgress | None = None,
     on_warning: Warn | None = None,
 ) -> AttackReport:
     """Optimises patches by what closed-loop drives do: by crashes, times to collision and distances, or by braking for
@@ -94,6 +96,9 @@ def attack_drive(
         progress: shows a progress bar.
         on_progress: called after every query or step with the used and the allowed number, after every frame of a new
             round, and after every held-out drive.
+        on_fit_progress: called after every calibration sample that the driver's defense reads for the first time.
+        on_fit_phase: called with (unit, done, total) after every step of a phase of the calibration, such as a training
+            step, if the defense reports its phases.
         on_warning: called with lines on drives that could not be made.
 
     Raises:
@@ -115,7 +120,9 @@ def attack_drive(
         device=device,
         force=force,
     )
-    callbacks = Callbacks.of(on_progress=on_progress, on_warning=on_warning)
+    callbacks = Callbacks.of(
+        on_progress=on_progress, on_fit_progress=on_fit_progress, on_fit_phase=on_fit_phase, on_warning=on_warning
+    )
     with displayed(callbacks, "attack", progress=progress, unit=unit_of_drives(request)) as shown:
         return run_attack_drive(request, shown)
 
@@ -138,7 +145,7 @@ def run_attack_drive(request: DriveAttackRequest, callbacks: Callbacks) -> Attac
         GearError: an error that the user can correct; the message is one line.
     """
     job, root = resolve_drives(request), Path(request.out)
-    worker = DriveWorker(drives=job.drives)
+    worker = DriveWorker(drives=job.drives, callbacks=callbacks)
     with exclusive_lock(root, callbacks.on_warning):
         with worker.open_places, single_thread(job.drives):
             runs = placed_runs(job, worker, callbacks.on_warning)
