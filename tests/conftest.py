@@ -12,9 +12,19 @@ from pathlib import Path
 import pytest
 
 import authoring
+from tests import compiled_worlds
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 assert authoring.KERNELS in os.environ
+
+
+COMPILED = compiled_worlds.install(pytest.MonkeyPatch())
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Tests of the room `world` compile every world; all others share those of the tiny town."""
+    COMPILED.is_on = "tests/world/" not in item.path.as_posix()
 
 
 @pytest.fixture(scope="module")
