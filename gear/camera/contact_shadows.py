@@ -15,7 +15,7 @@ range of a few decimetres. Without them, cars seem to float under an overcast sk
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import cv2
@@ -82,7 +82,7 @@ class SkyOcclusion:
         Args:
             shape: triangles of the asset in the actor frame; it stands on z = 0.
         """
-        rows, columns, cells_per_m = _grid(shape)
+        rows, columns, cells_per_m = grid_of(shape)
         layers = _layers(_points(shape, 1.5 * cells_per_m) * cells_per_m, rows, columns)
         hidden = _shadow_count(layers) / np.float32(DIRECTIONS)
         hidden = cv2.blur(hidden, (3, 3), borderType=cv2.BORDER_CONSTANT)
@@ -99,8 +99,12 @@ def _reach_m(shape: Shape) -> float:
     return min(max(_REACH_HEIGHTS * top_m, _LEAST_REACH_M), _MOST_REACH_M)
 
 
-def _grid(shape: Shape) -> tuple[int, int, float]:
-    """Rows, columns and cells per metre of an asset's `SkyOcclusion`."""
+def grid_of(shape: Shape) -> tuple[int, int, float]:
+    """Rows, columns and cells per metre of an asset's `SkyOcclusion`.
+
+    Args:
+        shape: triangles of the asset in the actor frame.
+    """
     cells_per_m = _CELLS_PER_M["large" if max(shape.box_size_m[:2]) > _LARGE_M else "small"]
     half_m = np.abs(shape.box_centre_m[:2]) + shape.box_size_m[:2] / 2 + _reach_m(shape)
     columns, rows = (2 * math.ceil(side * cells_per_m) + 1 for side in half_m)
@@ -109,7 +113,7 @@ def _grid(shape: Shape) -> tuple[int, int, float]:
 
 def _radius_m(shape: Shape) -> float:
     """Distance from an actor's origin within which its contact shadows lie, metres."""
-    rows, columns, cells_per_m = _grid(shape)
+    rows, columns, cells_per_m = grid_of(shape)
     return math.hypot(columns, rows) / (2 * cells_per_m) + _STEP_M + _FADE_M
 
 
@@ -178,11 +182,13 @@ class ContactShadows:
         shapes: triangles of every asset that may take part in a scene, by name.
         even_share: share of the light on open level ground that does not come from the sun directly, 0..1.
         is_display: whether frames hold display values instead of light (the classic renderer).
+        occlusion_of: computes the map of one asset, or reads it from a cache.
     """
 
     shapes: Mapping[str, Shape]
     even_share: float
     is_display: bool
+    occlusion_of: Callable[[Shape], SkyOcclusion] = SkyOcclusion.of
     _known: dict[str, SkyOcclusion] = field(default_factory=dict, init=False, repr=False)
 
     def apply(
@@ -259,7 +265,7 @@ class ContactShadows:
 
     def _sky(self, asset: str, shape: Shape) -> SkyOcclusion:
         if asset not in self._known:
-            self._known[asset] = SkyOcclusion.of(shape)
+            self._known[asset] = self.occlusion_of(shape)
         return self._known[asset]
 
     def _beside(
@@ -339,7 +345,7 @@ def _box_in_picture(
     actor_from_camera: RigidTransform, shape: Shape, camera: CameraRecord
 ) -> tuple[slice, slice] | None:
     """Rows and columns that contain all ground near an actor; None where it is out of view."""
-    rows, columns, cells_per_m = _grid(shape)
+    rows, columns, cells_per_m = grid_of(shape)
     half_m = np.array((columns // 2, rows // 2)) / cells_per_m
     corners = _CUBE * (*half_m, _STEP_M + _FADE_M)
     camera_from_actor = actor_from_camera.inverse()

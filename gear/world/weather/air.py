@@ -12,6 +12,7 @@ from gear.camera.air import Air, Fog
 from gear.camera.contact_shadows import ContactShadows
 from gear.camera.effects import CameraEffects
 from gear.camera.night import Night
+from gear.camera.occlusion_cache import cached_occlusion
 from gear.camera.pipeline import CameraPipeline
 from gear.camera.rain import Rain
 from gear.camera.response import encode_srgb, response_for
@@ -116,7 +117,12 @@ def contact_shadows_of(weather: Weather, renderer_name: str, shapes: Mapping[str
         shapes: triangles of the assets by name.
     """
     light = lighting_of(weather, sky_face_px=SHADE_SKY_FACE_PX)
-    return ContactShadows(shapes=shapes, even_share=even_share(weather, light), is_display=renderer_name == "classic")
+    return ContactShadows(
+        shapes=shapes,
+        even_share=even_share(weather, light),
+        is_display=renderer_name == "classic",
+        occlusion_of=cached_occlusion,
+    )
 
 
 def even_share(weather: Weather, light: Lighting) -> float:
