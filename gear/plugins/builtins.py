@@ -25,6 +25,7 @@ BUILTINS: tuple[str, ...] = (
     "gear.plugins.defenses.fpda",
     "gear.plugins.defenses.jedi",
     "gear.plugins.defenses.object_seeker",
+    "gear.plugins.defenses.nutnet",
     "gear.plugins.defenses.sac",
     "gear.plugins.defenses.lgs",
     "gear.plugins.defenses.jpeg",

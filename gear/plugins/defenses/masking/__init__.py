@@ -1,1 +1,1 @@
-"""What defenses share that locate patches in a picture and replace the located pixels: Jedi, PAD, SAC."""
+"""What defenses share that locate patches in a picture and replace the located pixels: Jedi, NutNet, SAC."""
