@@ -22,6 +22,9 @@ MOST_CLEAN_LOSS = 0.02
 SEEDS = 3
 """Number of seeds with which a random defense must be measured."""
 
+LEAST_RETAINED = 0.5
+"""Share of its gain under static patches that a defense must keep under adaptive patches."""
+
 LEAST_KEPT = 0.5
 """Share of the predicted rise of an objective along its gradient below which gradients count as masked."""
 
@@ -100,6 +103,35 @@ def clean_loss(record: Record) -> float | None:
     return loss / there.value if record.entry.lower_is_better and there.value else loss
 
 
+def survives_only_static(record: Record) -> bool:
+    """Whether a defense helps under patches that were made without knowledge of it, and adaptive patches leave less
+    than half of this gain. Both gains are against the network alone under patches made against it.
+
+    The static gain must be clear: the value of the network alone lies outside the interval of the defended network.
+    The adaptive patches must be clearly worse than the static ones in the same sense.
+
+    Args:
+        record: the record of the network with its defense.
+    """
+    alone = record.figure(PATCH, is_reference=True)
+    static, adaptive = record.figure(PATCH), record.figure(ADAPTIVE)
+    if alone is None or static is None or adaptive is None:
+        return False
+    if alone.value is None or static.value is None or adaptive.value is None:
+        return False
+    gained, kept = harm(record, alone, static), harm(record, alone, adaptive)
+    is_clear = gained > 0 and _is_clearly_better(record, static, alone) and is_clearly_worse(record, adaptive, static)
+    return is_clear and kept < LEAST_RETAINED * gained
+
+
+def _is_clearly_better(record: Record, one: Figure, other: Figure) -> bool:
+    far = one.high if record.entry.lower_is_better else one.low
+    assert other.value is not None
+    if far is None:
+        return harm(record, other, one) > 0
+    return other.value > far if record.entry.lower_is_better else other.value < far
+
+
 def faults(records: Sequence[Record]) -> list[str]:
     """The reasons why a row must not be ranked, one line each.
 
@@ -150,6 +182,8 @@ def _within(record: Record) -> Iterator[str]:
             yield f"optimised {name} are not clearly worse than random ones"
     if patch is not None and adaptive is not None and harm(record, adaptive, patch) <= 0:
         yield "adaptive patches are no worse than patches made without knowledge of the defense"
+    if survives_only_static(record):
+        yield "the defense survives only static attacks: adaptive patches leave less than half of its gain"
     own = [one for one in record.patches if "+" in one.target or record.entry.defense is None]
     kept = [one.gradient_kept for one in own if one.gradient_kept is not None]
     if kept and min(kept) < LEAST_KEPT:

@@ -67,6 +67,23 @@ def test_flags_within_a_record() -> None:
     ]
 
 
+@pytest.mark.parametrize(("adaptive", "is_flagged"), [(0.50, False), (0.46, False), (0.44, True), (0.20, True)])
+def test_a_defense_that_survives_only_static_attacks_is_flagged(adaptive: float, is_flagged: bool) -> None:
+    """The defense lifts 0.30 to 0.60 under static patches; half of that gain remains at 0.45."""
+    lines = warnings([record({**VALUES, "adaptive patch": adaptive})])
+    assert any("survives only static attacks" in line for line in lines) is is_flagged
+
+
+def test_errors_survive_only_static_attacks_in_their_direction() -> None:
+    values = {"none": 5.0, "random": 5.1, "patch": 6.0, "adaptive patch": 7.8}
+    worse = record(
+        values, reference=figures({"none": 5.0, "patch": 8.0}), entry={"lower_is_better": True}
+    )  # fmt: skip
+    assert any("survives only static attacks" in line for line in warnings([worse]))
+    alone = record(values, reference=figures({"none": 5.0}), entry={"lower_is_better": True})
+    assert not any("survives only" in line for line in warnings([alone])), "the network alone was not attacked"
+
+
 def test_a_black_box_attack_that_beats_white_box_is_flagged() -> None:
     black = {"knowledge": "black-box", "steps": 0, "queries": 500}
     assert any("black-box" in line for line in warnings([record()], [attacking(record(), 0.2, **black)]))

@@ -11,6 +11,12 @@ from gear.verbs.bench.plan import ADAPTIVE, PATCH
 from gear.verbs.bench.report import Result, TaskResult
 from gear.verbs.evaluate.report import Estimate, Pool
 
+LEAST_RETAINED = 0.5
+"""Share of its gain, or of its AUROC above chance, that a defense must keep under adaptive patches."""
+
+CHANCE = 0.5
+"""AUROC of a score that does not depend on the patch."""
+
 FAILED_P = 0.05
 """Probability above which the effect of a patch may be chance, so that the attack counts as failed."""
 
@@ -93,3 +99,53 @@ def is_failed(task: TaskResult, one: Result, pool: Pool) -> bool:
         return False
     is_harmful = change.value > 0 if task.metric.lower_is_better else change.value < 0
     return not is_harmful or (test is not None and test[1].pairs > 0 and test[1].p > FAILED_P)
+
+
+def survives_only_static(task: TaskResult, one: Result) -> bool:
+    """Whether a defense withstands patches that were made without knowledge of it, but not adaptive patches.
+
+    This holds if its gain is lost, or if its detection is lost:
+
+    - The gain under static patches is above 0, less than half of it remains under adaptive patches, and the metric
+      behind the defense is worse under adaptive than under static patches.
+    - The AUROC of the score (against random patches) is above 0.5 for static patches, and less than half of what it is
+      above 0.5 remains for adaptive patches.
+
+    Where there are 95 % intervals, those of the static gain, of the difference between static and adaptive patches and
+    of the static AUROC must exclude 0 (for the AUROC: 0.5), and that of the adaptive AUROC the static AUROC. Without
+    intervals, the values decide.
+
+    Args:
+        task: results of the task, with its main metric.
+        one: results of the network with its defense.
+    """
+    pools = {pool.name: pool for pool in one.evaluation.pools}
+    if one.defense is None or PATCH not in pools or ADAPTIVE not in pools:
+        return False
+    static, adaptive = pools[PATCH], pools[ADAPTIVE]
+    return _loses_gain(task, one, static, adaptive) or _loses_detection(one, static, adaptive)
+
+
+def _loses_gain(task: TaskResult, one: Result, static: Pool, adaptive: Pool) -> bool:
+    gained, kept = gain(task, one, static), gain(task, one, adaptive)
+    lost = minus(task, static, adaptive)
+    if task.metric is None or gained is None or kept is None or lost is None:
+        return False
+    sign = -1.0 if task.metric.lower_is_better else 1.0
+    is_gone = sign * kept.value < LEAST_RETAINED * sign * gained.value
+    return is_gone and _is_above(gained, 0.0, sign) and _is_above(lost, 0.0, sign)
+
+
+def _loses_detection(one: Result, static: Pool, adaptive: Pool) -> bool:
+    against = [one.against(pool) for pool in (static, adaptive)]
+    before, after = (None if each is None else each.auroc for each in against)
+    if before is None or after is None or not _is_above(before, CHANCE, 1.0):
+        return False
+    is_gone = after.value - CHANCE < LEAST_RETAINED * (before.value - CHANCE)
+    return is_gone and _is_above(after, before.value, -1.0)
+
+
+def _is_above(one: Estimate, bound: float, sign: float) -> bool:
+    """Whether a value and its whole interval, if it has one, lie above a bound; below it for a negative sign."""
+    near = one.value if one.interval is None else one.interval[0 if sign > 0 else 1]
+    return sign * (near - bound) > 0 and sign * (one.value - bound) > 0

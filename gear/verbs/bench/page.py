@@ -28,7 +28,7 @@ from gear.verbs.bench.pictures.predictions import predictions
 from gear.verbs.bench.plan import Plan, Weather
 from gear.verbs.bench.report import BenchReport, TaskResult
 from gear.verbs.bench.scenes import Scene
-from gear.verbs.bench.table import columns, legend, title
+from gear.verbs.bench.table import columns, defense_title, legend, title
 from gear.verbs.bench.validation import TaskPlugins
 from gear.verbs.evaluate.page import PAGE
 
@@ -105,7 +105,7 @@ def _scenes(task: TaskResult, out: Path) -> str:
             here = {at.patch: at.value.value for at in one.scenes if (at.scene, at.weather) == (scene, weather)}
             values = [f"{here[kind]:.3f}" if here.get(kind, np.nan) == here.get(kind, np.nan) else "" for kind in kinds]
             link = Link(one.model, quote((one.evaluation.out / PAGE).relative_to(out).as_posix()))
-            name: list[Cell] = [link, one.defense or "-"] if number == 0 else ["", ""]
+            name: list[Cell] = [link, defense_title(task, one)] if number == 0 else ["", ""]
             rows.append((number == 0, [*name, scene, weather, *values]))
     return (
         f"<h3>Scene by scene</h3>{html_table(['network', 'defense', 'scene', 'weather', *kinds], rows)}" if rows else ""

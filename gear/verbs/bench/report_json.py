@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gear.values.serial import Json
 from gear.verbs.bench.detection import detection_rates
-from gear.verbs.bench.gains import against_clean, gain, is_failed
+from gear.verbs.bench.gains import against_clean, gain, is_failed, survives_only_static
 from gear.verbs.bench.report import Result, TaskResult
 from gear.verbs.evaluate.report import Estimate, Pool
 
@@ -33,6 +33,7 @@ def _result_json(task: TaskResult, one: Result, out: Path) -> Json:
     return {
         "model": one.model,
         "defense": one.defense,
+        "survives_only_static_attacks": survives_only_static(task, one),
         "evaluation": one.evaluation.out.relative_to(out).as_posix(),
         "patches": {pool.name: _pool_json(task, one, pool) for pool in one.evaluation.pools},
     }

@@ -8,7 +8,7 @@ from gear.measuring.detection_rates import FALSE_ALARMS
 from gear.measuring.text_table import number_table
 from gear.verbs.bench.detection import detection_rates, rate_title
 from gear.verbs.bench.drives.results import LEGEND as DRIVE_LEGEND
-from gear.verbs.bench.gains import against_clean, gain, is_failed
+from gear.verbs.bench.gains import against_clean, gain, is_failed, survives_only_static
 from gear.verbs.bench.report import BenchReport, Result, TaskResult
 from gear.verbs.evaluate.report import Difference, Pool
 from gear.verbs.evaluate.table import number, shown
@@ -26,6 +26,9 @@ REST = ("AUROC", *map(rate_title, FALSE_ALARMS), "mask IoU", "s/picture")
 
 FAILED = " (failed)"
 """Mark of an optimised patch that is no worse than a random one."""
+
+STATIC_ONLY = " (static only)"
+"""Mark of a defense whose gain or detection is lost under adaptive patches."""
 
 ALONE = "-"
 """Text of the cell `defense` for a network without a defense."""
@@ -63,8 +66,19 @@ def legend() -> str:
         "paired permutation test; hidden, misclassified, moved: shares of the objects found in the twin; invented: "
         "detections per picture that neither an object nor the twin explains; TPR: share of the pictures that raise an "
         "alarm, at a threshold that 1 % or 5 % of the other scenes' clean pictures exceed; (failed): the patches are "
-        "no worse than random ones, or only by chance (p above 0.05)"
+        "no worse than random ones, or only by chance (p above 0.05); (static only): the defense survives only static "
+        "attacks, since adaptive patches leave less than half of its gain, or of its AUROC above 0.5"
     )
+
+
+def defense_title(task: TaskResult, one: Result) -> str:
+    """Returns the name of a defense with the mark of those that survive only static attacks; `-` without a defense.
+
+    Args:
+        task: results of the task.
+        one: results of the network, alone or with the defense.
+    """
+    return f"{one.defense or ALONE}{STATIC_ONLY * survives_only_static(task, one)}"
 
 
 def columns(task: TaskResult) -> list[list[str]]:
@@ -101,7 +115,7 @@ def line(task: TaskResult, one: Result, pool: Pool) -> list[str]:
     rates = detection_rates(one, pool)
     return [
         one.model,
-        one.defense or ALONE,
+        defense_title(task, one),
         pool.name + FAILED * is_failed(task, one, pool),
         shown(task.value(pool)),
         shown(against_clean(task, one, pool), is_signed=True),
