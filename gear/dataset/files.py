@@ -14,11 +14,11 @@ from gear.dataset.disk_errors import SYSTEM_LIMITS, explained
 from gear.dataset.guarded_paths import inside, opened_parent
 from gear.dataset.scratch import NEW, SCRATCH, clear_scratch, half_written
 from gear.values.errors import DatasetError
-from gear.values.regular_file import read_regular
+from gear.values.regular_file import NotAFileError, check_regular, read_regular
 
 __all__ = [
-    "clear_scratch", "explained", "inside", "named_alone", "read_bytes", "refuse_folder", "sha256", "streamed_alone",
-    "sync_folder", "write_alone", "write_whole",
+    "check_output_file", "clear_scratch", "explained", "inside", "named_alone", "read_bytes", "sha256",
+    "streamed_alone", "sync_folder", "write_alone", "write_whole",
 ]  # fmt: skip
 
 TRIES = 100
@@ -67,7 +67,7 @@ def write_alone(path: Path, data: bytes) -> None:
     """Writes a file outside of datasets atomically.
 
     Raises:
-        DatasetError: a file cannot be written, or the path is a folder.
+        DatasetError: a file cannot be written, or the path is a folder, a device, a FIFO, a socket or a link.
     """
     with streamed_alone(path) as stream:
         stream.write(data)
@@ -81,7 +81,7 @@ def streamed_alone(path: Path) -> Iterator[BinaryIO]:
     same folder.
 
     Raises:
-        DatasetError: a file cannot be written, or the path is a folder.
+        DatasetError: a file cannot be written, or the path is a folder, a device, a FIFO, a socket or a link.
     """
     with named_alone(path) as temporary, os.fdopen(os.open(temporary, NEW, 0o666), "wb") as stream:
         yield stream
@@ -96,9 +96,9 @@ def named_alone(path: Path) -> Iterator[Path]:
         path: path of the file.
 
     Raises:
-        DatasetError: a file cannot be written, or the path is a folder.
+        DatasetError: a file cannot be written, or the path is a folder, a device, a FIFO, a socket or a link.
     """
-    refuse_folder(path)
+    check_output_file(path)
     with explained(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(8)}")
@@ -112,15 +112,28 @@ def named_alone(path: Path) -> Iterator[Path]:
             raise
 
 
-def refuse_folder(path: Path) -> None:
-    """Checks that the path of a file to be written is not a folder.
+def check_output_file(path: Path) -> None:
+    """Checks that a file can be written at a path: the path is free, or is a regular file that may be replaced.
+
+    A device, FIFO or socket would be replaced as well, because a finished file is renamed to its path. As root, this
+    includes `/dev/null`, and links such as `/dev/stdout`.
 
     Raises:
-        DatasetError: the path is a folder.
+        DatasetError: the path is a folder, a device, a FIFO, a socket or a link, or contains a null character.
     """
+    if "\0" in str(path):
+        raise DatasetError(path, "a path cannot contain a null character")
     with explained(path):
         if not path.name or path.is_dir():
             raise DatasetError(path, "is a folder, a file was asked for; name one in it")
+        if path.is_symlink():
+            raise DatasetError(path, "is a link; gear writes nothing through links; name another file")
+        try:
+            check_regular(path)
+        except FileNotFoundError:
+            return
+        except NotAFileError as error:
+            raise DatasetError(path, f"{error.strerror}; name another one") from error
 
 
 def sync_folder(path: Path) -> None:

@@ -1,9 +1,14 @@
-"""Makes texts that come from plugins safe to print: one line, no control characters, limited length."""
+"""Makes texts of plugins, and of files from other people, safe to print: one line, no control characters, limited
+length.
+"""
 
 from __future__ import annotations
 
 LONGEST = 200
 """Largest number of characters of a plugin's text in a message."""
+
+LONGEST_LINE = 2000
+"""Largest number of characters of a whole line that contains text of a file, such as a path in a dataset."""
 
 
 def printable(text: str, longest: int = LONGEST) -> str:
@@ -12,7 +17,7 @@ def printable(text: str, longest: int = LONGEST) -> str:
     Characters that the terminal's encoding lacks are not replaced here, since they depend on where the text is printed.
 
     Args:
-        text: the text, which may come from a plugin.
+        text: the text, which may come from a plugin or a file.
         longest: largest number of characters that are taken of it; a longer text ends with `…`.
     """
     safe = "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in text[:longest])

@@ -9,7 +9,7 @@ import cv2
 
 from gear.contracts.legends import ColourNames, WithLegends
 from gear.contracts.tasks import Sample
-from gear.dataset.files import refuse_folder, write_alone
+from gear.dataset.files import check_output_file, write_alone
 from gear.dataset.output_checks import check_previews
 from gear.plugins.build import blamed, find, name_of_task
 from gear.plugins.datasets import open_dataset
@@ -110,7 +110,7 @@ def sheet(
         PluginError: the task of another package failed, or returned no pictures.
     """
     target = Path(out)
-    refuse_folder(target)
+    check_output_file(target)
     with displayed(Callbacks.of(on_progress=on_progress), "sheet", progress=progress) as shown:
         picture = contact_sheet(path, split=split, samples=samples, on_progress=shown.on_progress)
     write_alone(target, cv2.imencode(".png", picture[..., ::-1])[1].tobytes())

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gear.dataset.files import explained, refuse_folder, streamed_alone
+from gear.dataset.files import check_output_file, explained, streamed_alone
 from gear.dataset.reading import Dataset
 from gear.plugins.prediction_pictures import legends_json, picture_legends
 from gear.plugins.text import printable
@@ -237,7 +237,7 @@ def _check_target(target: Path) -> None:
     Raises:
         DatasetError: the page would be a folder, or its folder cannot be made.
     """
-    refuse_folder(target)
+    check_output_file(target)
     with explained(target):
         target.parent.mkdir(parents=True, exist_ok=True)
 

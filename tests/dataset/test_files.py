@@ -2,13 +2,14 @@ from __future__ import annotations
 
 import errno
 import os
+import socket
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from gear.dataset.files import clear_scratch, inside, named_alone, write_alone, write_whole
+from gear.dataset.files import check_output_file, clear_scratch, inside, named_alone, write_alone, write_whole
 from gear.values.errors import DatasetError
 
 
@@ -31,6 +32,31 @@ def test_a_file_of_another_package_has_its_name_only_when_it_is_complete(tmp_pat
     assert path.read_bytes() == b"1" and [one.name for one in path.parent.iterdir()] == ["a"]
     with pytest.raises(DatasetError, match="is a folder"), named_alone(tmp_path):
         pass
+
+
+def test_no_device_fifo_socket_or_link_is_replaced_by_a_file(tmp_path: Path) -> None:
+    fifo, link, dangling = tmp_path / "fifo", tmp_path / "link", tmp_path / "dangling"
+    os.mkfifo(fifo)
+    (tmp_path / "file").write_bytes(b"old")
+    link.symlink_to(tmp_path / "file")
+    dangling.symlink_to(tmp_path / "nothing")
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(tmp_path / "socket"))
+        before = {path: os.lstat(path).st_ino for path in tmp_path.iterdir()}
+        # Only the check itself gets a device: as root, a write that is not refused would replace the device.
+        for path, kind in (
+            (Path("/dev/null"), "character device"), (Path("/dev/stdout"), "link"), (fifo, "FIFO"),
+            (tmp_path / "socket", "socket"), (link, "link"), (dangling, "link"),
+        ):  # fmt: skip
+            with pytest.raises(DatasetError, match=f"{path}: is a {kind}; "):
+                check_output_file(path)
+            if path.parent == tmp_path:
+                with pytest.raises(DatasetError, match=f"is a {kind}; "):
+                    write_alone(path, b"new")
+        assert {path: os.lstat(path).st_ino for path in tmp_path.iterdir()} == before
+    assert (tmp_path / "file").read_bytes() == b"old"
+    with pytest.raises(DatasetError, match="null character"):
+        check_output_file(Path("a\0b"))
 
 
 @pytest.mark.parametrize("relative", ["/etc/passwd", "../x", "a/../../x", "", "a\\b", "a\0b"])

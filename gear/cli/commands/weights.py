@@ -116,6 +116,7 @@ def show(args: argparse.Namespace) -> int:
     Args:
         args: arguments of the command line: `file` and `json`.
     """
+    from gear.plugins.text import LONGEST_LINE, printable
     from gear.verbs.weights.show import show_weights
 
     facts = show_weights(args.file).to_json()
@@ -125,5 +126,6 @@ def show(args: argparse.Namespace) -> int:
     print(f"{facts['path']}: {facts['tensors']} tensors, {facts['numbers']} numbers, {facts['size_mb']:.1f} MB")
     print(f"  sha256: {facts['sha256']}")
     for key, value in sorted(facts["metadata"].items()):
-        print(f"  {key}: {value if isinstance(value, str) else json.dumps(value)}")
+        text = value if isinstance(value, str) else json.dumps(value)
+        print(printable(f"  {key}: {text}", LONGEST_LINE))
     return 0

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from gear.dataset.verification import Finding
+from gear.plugins.text import LONGEST_LINE, printable
 from gear.values.serial import Json
 
 
@@ -37,7 +38,12 @@ class VerifyReport:
     def lines(self) -> list[str]:
         """Returns one line per repaired or faulty file, one per split that could not be repaired, the notes,
         and a summary line.
+
+        Names of files may come from another person, so control characters, such as terminal escapes, are escaped.
         """
+        return [printable(line, LONGEST_LINE) for line in self._raw_lines()]
+
+    def _raw_lines(self) -> list[str]:
         lines = [f"repaired   {one.path}" for one in self.repaired]
         lines += [one.line() for one in self.findings]
         lines += [*self.unrepaired, *self.notes]

@@ -45,3 +45,13 @@ def test_json_is_the_report(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
     monkeypatch.setattr(COMMAND, lambda dataset, **values: report(DAMAGED))
     assert main(["verify", "d", "--json"]) == 1
     assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(report(DAMAGED).as_json()))
+
+
+def test_a_name_with_terminal_escapes_is_escaped(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    odd = Finding(path="a\x1b[2J\n.png", problem="unexpected", detail="not written by gear")
+    monkeypatch.setattr(COMMAND, lambda dataset, **values: report(odd))
+    assert main(["verify", "d"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 2 and r"a\x1b[2J\n.png" in lines[0]
