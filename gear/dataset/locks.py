@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from gear.dataset.disk_errors import SYSTEM_LIMITS
 from gear.dataset.files import explained
 from gear.values.errors import DatasetError
 from gear.values.progress import Warn
@@ -117,6 +118,8 @@ def _lock_problem(folder: Path) -> str | None:
     except BlockingIOError:  # another run, or this one, holds the lock
         pass
     except OSError as error:
+        if error.errno in SYSTEM_LIMITS:
+            raise
         return f"the file system has no locks ({error.strerror})"
     option = _local_option(folder)
     return None if option is None else f"locks do not reach other machines (mount option {option})"
@@ -152,6 +155,7 @@ def _locked(folder: Path, *, exclusive: bool, wait: bool) -> Iterator[int | None
 
     Raises:
         BlockingIOError: another run holds the lock, and `wait` is False.
+        OSError: a limit of the machine, such as that of open files, is reached.
     """
     descriptor = _lock(folder, exclusive=exclusive, wait=wait)
     try:
@@ -166,13 +170,16 @@ def _lock(folder: Path, *, exclusive: bool, wait: bool) -> int | None:
         return None
     try:
         descriptor = os.open(folder, os.O_RDONLY)
-    except OSError:  # missing, or unreadable
-        return None
+    except OSError as error:
+        if error.errno in SYSTEM_LIMITS:  # without the lock, two runs could write into one folder
+            raise
+        return None  # missing, or unreadable
     try:
         fcntl.flock(descriptor, (fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH) | (0 if wait else fcntl.LOCK_NB))
     except BaseException as error:
         os.close(descriptor)
-        if isinstance(error, OSError) and not isinstance(error, BlockingIOError):
+        is_limit = isinstance(error, OSError) and error.errno in SYSTEM_LIMITS
+        if isinstance(error, OSError) and not isinstance(error, BlockingIOError) and not is_limit:
             return None  # a network file system
         raise
     return descriptor

@@ -11,6 +11,7 @@ import pytest
 from gear.dataset import locks
 from gear.dataset.locks import ALONE, SHARED, dataset_lock, exclusive_lock, is_locked, lock_note, shared_split_lock
 from gear.values.errors import DatasetError
+from tests.shared import few_files
 
 
 def test_a_folder_of_results_is_locked_for_one_run(tmp_path: Path) -> None:
@@ -75,3 +76,10 @@ def test_locks_that_stay_on_this_machine_are_known_by_the_mount(
     note = lock_note(folder, SHARED)
     assert note == (None if said is None else f"{folder}: locks do not reach other machines ({said}): {SHARED}")
     assert lock_note(tmp_path, SHARED) is None
+
+
+def test_without_file_descriptors_no_lock_is_passed_over(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="Too many open files"), few_files(0), exclusive_lock(tmp_path):
+        pytest.fail("the folder is not locked")
+    with pytest.raises(OSError, match="Too many open files"), few_files(0):
+        lock_note(tmp_path, "meaning")

@@ -13,6 +13,7 @@ import pytest
 
 from gear.contracts.executors import Executor, Outcome, Report
 from gear.dataset.executors import threads
+from gear.dataset.executors.jobs import JobNotes, carry_out_jobs, run_jobs
 from gear.dataset.executors.ray import OnRay
 from gear.testing.executor_contract import ExecutorContract
 from gear.values.errors import GearError
@@ -27,6 +28,17 @@ def make_slowly(folder: str, indices: Iterator[int], report: Report) -> None:
         time.sleep(0.3)
         (Path(folder) / str(index)).write_text("made")
         report(Outcome(index=index))
+
+
+def jobs_of(folder: str, indices: Iterator[int], report: Report) -> None:
+    def call(index: int) -> int:
+        with (Path(folder) / str(index)).open("a") as file:
+            file.write("tried")
+        if index == 2:
+            raise ValueError("broken")
+        return 10 * index
+
+    carry_out_jobs(call, indices, report)
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +84,22 @@ def test_parts_share_the_cores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(threads, "cores", lambda: 8)
     OnRay(workers=2).run(partial(tell_threads, str(tmp_path)), [0], lambda outcome: None)
     assert (tmp_path / "0").read_text() == "4,4,4,4"
+
+
+@pytest.mark.usefixtures("cluster")
+def test_jobs_bring_their_results_and_an_unexpected_error_costs_no_other(tmp_path: Path) -> None:
+    found: dict[int, object] = {}
+    failed = run_jobs(
+        OnRay(workers=2),
+        partial(jobs_of, str(tmp_path)),
+        range(4),
+        lambda outcome: found.update({outcome.index: outcome.value}),
+        notes=JobNotes(root=tmp_path, names=["a", "b", "c", "d"]),
+    )
+    assert found == {0: 0, 1: 10, 2: None, 3: 30}
+    assert list(failed) == [2] and failed[2].error == "ValueError: broken"
+    assert (tmp_path / "2").read_text() == "tried" * 3
+    assert (tmp_path / "failures/2.json").is_file()
 
 
 def test_an_address_without_a_cluster_is_one_line() -> None:

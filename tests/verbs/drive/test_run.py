@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import gear
+from gear.cli.machine_limits import OPEN_FILES
 from gear.cli.main import main
 from gear.collecting.patch_sources import digest_of
 from gear.contracts.executors import Outcome
@@ -23,6 +24,7 @@ from gear.values.errors import GearError
 from gear.verbs.drive.report import DriveReport
 from gear.verbs.drive.request import DriveRequest
 from gear.verbs.drive.run import _problem
+from tests.shared import few_files
 
 TEXT = f"""
 drivers:
@@ -198,3 +200,12 @@ def test_the_drives_after_many_failures_are_not_begun(
 def test_an_absurd_number_of_workers_is_refused() -> None:
     with pytest.raises(GearError, match="at least 1"):
         DriveRequest(config="quick", out="x", workers=0)
+
+
+@pytest.mark.parametrize("further", [0, 3])
+def test_few_file_descriptors_are_one_line(
+    further: int, config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with few_files(further):
+        code = main(["drive", str(config), "--out", str(tmp_path / "out")])
+    assert (code, capsys.readouterr().err) == (2, f"gear: {OPEN_FILES}\n")

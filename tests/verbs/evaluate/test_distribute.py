@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gear.cli.machine_limits import OPEN_FILES
+from gear.cli.main import main
 from gear.contracts.defenses import DefenseResult
 from gear.contracts.executors import Outcome
 from gear.contracts.specs import DefenseSpec
@@ -18,6 +20,7 @@ from gear.values.errors import GearError
 from gear.verbs.evaluate import distribute
 from gear.verbs.evaluate.request import EvaluateRequest
 from gear.verbs.evaluate.run import evaluate
+from tests.shared import few_files
 from tests.verbs.conftest import Nothing, Small, put_package
 from tests.verbs.evaluate.test_evaluate import timeless
 
@@ -139,3 +142,20 @@ def test_several_workers_or_an_engine_distribute_the_datasets() -> None:
     assert EvaluateRequest(**given, engine="slurm").is_distributed
     with pytest.raises(GearError, match="engine_workers must be at least 1"):
         EvaluateRequest(**given, engine_workers=0)
+
+
+@pytest.mark.parametrize("further", [0, 3])
+@pytest.mark.parametrize("engine", [(), ("--engine", "ray")])
+def test_few_file_descriptors_are_one_line(
+    further: int,
+    engine: tuple[str, ...],
+    tmp_path: Path,
+    data: list[Path],
+    engines: list[Any],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    command = ["evaluate", "--model", "tiny_segmenter", "--data", str(data[0]), "--out", str(tmp_path / "out"), *engine]
+    with few_files(further):
+        code = main(command)
+    assert (code, capsys.readouterr().err) == (2, f"gear: {OPEN_FILES}\n")
+    assert main(command) == 0, "the same command goes on"
