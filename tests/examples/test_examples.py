@@ -1,10 +1,15 @@
-"""The example packages, from wheels, in one fresh environment, run from an empty folder as a user would."""
+"""The example packages, from wheels, in one fresh environment, run from an empty folder as a user would.
+
+The environment also sees the packages of the tests' own environment, so that pip installs only what is missing there
+and torch's bytecode is not made again. That gear and the examples declare what they import, deptry checks.
+"""
 
 from __future__ import annotations
 
 import json
 import subprocess
 import sys
+import sysconfig
 import venv
 from pathlib import Path
 
@@ -46,11 +51,13 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def install(env: Path, wheels: Path) -> None:
     call(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", wheels, ROOT, *EXAMPLES, cwd=wheels.parent)
     venv.create(env, with_pip=True)
-    # Bytecode of the few modules that are imported is made then; pip would make it of all of torch.
-    pip = (env / "bin/python", "-m", "pip", "install", "-q", "--no-compile", "-c", ROOT / "constraints.txt")
-    call(*pip, *sorted(wheels.glob("*.whl")), "pytest", "cityscapesScripts", cwd=wheels)
-    if sys.version_info >= (3, 13):
-        call(*pip, "--no-deps", "dm-control", cwd=wheels)  # pyproject.toml says why
+    (site,) = (env / "lib").glob("python*/site-packages")
+    (site / "parent.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
+    pip = (env / "bin/python", "-m", "pip", "install", "-q", "-c", ROOT / "constraints.txt")
+    packages = sorted(wheels.glob("*.whl"))
+    # gear of the tests' environment is not to stand in for the wheel.
+    call(*pip, "--no-deps", "--ignore-installed", *packages, cwd=wheels)
+    call(*pip, *packages, "pytest", "cityscapesScripts", cwd=wheels)
 
 
 @pytest.fixture(scope="module")
@@ -211,6 +218,18 @@ TESTED = [path for path in EXAMPLES if path.name != "gear-broken"]
 def test_each_passes_its_own_tests(home: Path, example: Path) -> None:
     config = ("-p", "no:cacheprovider", "-c", str(example / "pyproject.toml"), str(example / "tests"))
     call(home / "env/bin/python", "-m", "pytest", "-q", *config, cwd=home / "empty")
+
+
+MODULES = "mujoco-gear=gear,adversarial-robustness-toolbox=art,pillow=PIL"
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
+def test_each_declares_what_it_imports(example: Path) -> None:
+    """Beside what gear itself needs, which is installed wherever gear is."""
+    own = [path.name for path in (example / "src").iterdir() if path.is_dir()]
+    call(sys.executable, "-m", "deptry", "src", *(word for name in own for word in ("--known-first-party", name)),
+         "--package-module-name-map", MODULES, "--ignore", "DEP002", "--per-rule-ignores", "DEP003=numpy|torch|cv2",
+         cwd=example)  # fmt: skip
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
