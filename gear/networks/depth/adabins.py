@@ -13,10 +13,10 @@ from collections.abc import Mapping
 from torch import Tensor, nn
 from torch.nn import functional
 
-from gear.networks.depth.adabins_graph import AdaBinsGraph, fitting
+from gear.networks.depth.adabins_graph import BinsGraph, fitting
 from gear.networks.depth.losses import adabins_silog, bins_chamfer
 from gear.networks.depth.network import DEPTH, DepthNetwork, resized
-from gear.networks.depth.options import AdaBinsOptions
+from gear.networks.depth.options import BinsOptions
 from gear.networks.network import Normalise
 
 BINS = "bin_centres_m"
@@ -36,9 +36,9 @@ class AdaBins(DepthNetwork):
         input_scale: default factor by which pictures are resized, used if the options state none.
     """
 
-    options: AdaBinsOptions
+    options: BinsOptions
 
-    def __init__(self, graph: AdaBinsGraph, options: AdaBinsOptions, *, input_scale: float = 1.0) -> None:
+    def __init__(self, graph: BinsGraph, options: BinsOptions, *, input_scale: float = 1.0) -> None:
         super().__init__(graph, options, input_scale=input_scale)
         self._normalise = Normalise().to(self.device).eval()
 

@@ -11,16 +11,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from gear.networks.depth.options import AdaBinsOptions
+from gear.networks.depth.options import AdaBinsOptions, BinsOptions
 from gear.networks.depth.packages import need_timm
 
 TAPPED = (0, 1, 2, 4)
 """Indices of the encoder's blocks from whose outputs the decoder reads, at 1/2, 1/4, 1/8 and 1/16 of the picture's
 sides.
 """
-
-WIDTH = 128
-"""Number of channels of the decoder's output and of the transformer's tokens."""
 
 PATCH_PX = 16
 """Side, in cells of the feature map, of the square patch that becomes one transformer token. The feature map has
@@ -35,19 +32,23 @@ LEAST_WIDTH = 0.1
 """Value added to the width of every depth bin before normalisation; it keeps bins from being empty."""
 
 
-class AdaBinsGraph(nn.Module):
-    """AdaBins: an encoder, a decoder, and a small transformer that chooses the depth bins anew for each picture.
+class BinsGraph(nn.Module):
+    """An encoder with the head of AdaBins: a decoder, and a small transformer that chooses the depth bins anew for
+    each picture.
 
     Args:
-        options: sizes of the network, and the range of depths.
+        encoder: module that returns five feature maps of normalised pictures, at 1/2, 1/4, 1/8, 1/16 and 1/32 of their
+            sides.
+        widths: number of channels of each feature map, from the finest to the coarsest.
+        options: sizes of the head, and the range of depths.
     """
 
-    def __init__(self, options: AdaBinsOptions) -> None:
+    def __init__(self, encoder: nn.Module, widths: Sequence[int], options: BinsOptions) -> None:
         super().__init__()
         self.range_m = (options.min_depth_m, options.max_depth_m)
-        self.encoder = Encoder(options.encoder)
-        self.decoder = Decoder(self.encoder.widths(), options.features)
-        self.adaptive_bins_layer = AdaptiveBins(options.queries, options.bins)
+        self.encoder = encoder
+        self.decoder = Decoder(widths, options.features, options.width)
+        self.adaptive_bins_layer = AdaptiveBins(options.width, options.queries, options.bins)
         self.conv_out = nn.Sequential(nn.Conv2d(options.queries, options.bins, 1), nn.Softmax(dim=1))
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
@@ -66,6 +67,18 @@ class AdaBinsGraph(nn.Module):
         right_m = least_m + (most_m - least_m) * widths.float().cumsum(1)
         centres_m = right_m - (most_m - least_m) * widths.float() / 2
         return (shares.float() * centres_m[:, :, None, None]).sum(1, keepdim=True), centres_m
+
+
+class AdaBinsGraph(BinsGraph):
+    """AdaBins with an EfficientNet of timm as encoder, as published.
+
+    Args:
+        options: sizes of the network, and the range of depths.
+    """
+
+    def __init__(self, options: AdaBinsOptions) -> None:
+        encoder = Encoder(options.encoder)
+        super().__init__(encoder, encoder.widths(), options)
 
 
 class Encoder(nn.Module):
@@ -115,9 +128,10 @@ class Decoder(nn.Module):
     Args:
         widths: numbers of channels of the encoder's five maps, from the finest to the coarsest.
         features: number of channels of the widest layer; each step halves it.
+        width: number of channels of the result.
     """
 
-    def __init__(self, widths: Sequence[int], features: int) -> None:
+    def __init__(self, widths: Sequence[int], features: int, width: int) -> None:
         super().__init__()
         half, quarter, eighth, sixteenth, deepest = widths
         # The padding of this 1x1 convolution enlarges its map by two pixels. The published weights were trained so.
@@ -126,10 +140,10 @@ class Decoder(nn.Module):
         self.up2 = Up(features // 2 + eighth, features // 4)
         self.up3 = Up(features // 4 + quarter, features // 8)
         self.up4 = Up(features // 8 + half, features // 16)
-        self.conv3 = nn.Conv2d(features // 16, WIDTH, 3, padding=1)
+        self.conv3 = nn.Conv2d(features // 16, width, 3, padding=1)
 
     def forward(self, maps: Sequence[Tensor]) -> Tensor:
-        """Returns the (B, 128, H / 2, W / 2) features of (B, 3, H, W) pictures.
+        """Returns the (B, width, H / 2, W / 2) features of (B, 3, H, W) pictures.
 
         Args:
             maps: the encoder's five feature maps, from the finest to the coarsest.
@@ -175,17 +189,18 @@ class AdaptiveBins(nn.Module):
     bins, and attention maps.
 
     Args:
+        width: number of channels of the features and of the tokens.
         queries: number of tokens that are compared with the features; one attention map each.
         bins: number of depth bins.
     """
 
-    def __init__(self, queries: int, bins: int) -> None:
+    def __init__(self, width: int, queries: int, bins: int) -> None:
         super().__init__()
         self.queries = queries
-        self.patch_transformer = PatchTransformer()
-        self.conv3x3 = nn.Conv2d(WIDTH, WIDTH, 3, padding=1)
+        self.patch_transformer = PatchTransformer(width)
+        self.conv3x3 = nn.Conv2d(width, width, 3, padding=1)
         self.regressor = nn.Sequential(
-            nn.Linear(WIDTH, HIDDEN), nn.LeakyReLU(), nn.Linear(HIDDEN, HIDDEN), nn.LeakyReLU(), nn.Linear(HIDDEN, bins)
+            nn.Linear(width, HIDDEN), nn.LeakyReLU(), nn.Linear(HIDDEN, HIDDEN), nn.LeakyReLU(), nn.Linear(HIDDEN, bins)
         )
 
     def forward(self, features: Tensor) -> tuple[Tensor, Tensor]:
@@ -193,7 +208,7 @@ class AdaptiveBins(nn.Module):
         attention maps.
 
         Args:
-            features: (B, 128, h, w) output of the decoder.
+            features: (B, width, h, w) output of the decoder.
         """
         tokens = self.patch_transformer(features)
         widths = functional.relu(self.regressor(tokens[0])) + LEAST_WIDTH
@@ -203,20 +218,24 @@ class AdaptiveBins(nn.Module):
 
 
 class PatchTransformer(nn.Module):
-    """A transformer encoder with four layers of self-attention over the patches of a feature map."""
+    """A transformer encoder with four layers of self-attention over the patches of a feature map.
 
-    def __init__(self) -> None:
+    Args:
+        width: number of channels of the feature map and of the tokens.
+    """
+
+    def __init__(self, width: int) -> None:
         super().__init__()
-        layer = nn.TransformerEncoderLayer(WIDTH, nhead=4, dim_feedforward=1024)
+        layer = nn.TransformerEncoderLayer(width, nhead=4, dim_feedforward=1024)
         self.transformer_encoder = nn.TransformerEncoder(layer, num_layers=4, enable_nested_tensor=False)
-        self.embedding_convPxP = nn.Conv2d(WIDTH, WIDTH, PATCH_PX, stride=PATCH_PX)
-        self.positional_encodings = nn.Parameter(torch.rand(MOST_PATCHES, WIDTH))
+        self.embedding_convPxP = nn.Conv2d(width, width, PATCH_PX, stride=PATCH_PX)
+        self.positional_encodings = nn.Parameter(torch.rand(MOST_PATCHES, width))
 
     def forward(self, features: Tensor) -> Tensor:
-        """Returns the (patches, B, 128) tokens of the feature map's patches; patches are ordered row by row.
+        """Returns the (patches, B, width) tokens of the feature map's patches; patches are ordered row by row.
 
         Args:
-            features: (B, 128, h, w) output of the decoder, with at most 500 patches of 16 x 16 cells.
+            features: (B, width, h, w) output of the decoder, with at most 500 patches of 16 x 16 cells.
         """
         patches = self.embedding_convPxP(features).flatten(2).permute(2, 0, 1)
         tokens: Tensor = self.transformer_encoder(patches + self.positional_encodings[: len(patches), None])

@@ -72,34 +72,61 @@ class GlpnB0Options(GlpnOptions):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AdaBinsOptions(DepthOptions):
-    """Options of AdaBins; the defaults are those of the published weights. They include the options of
-    `DepthOptions`.
+class BinsOptions(DepthOptions):
+    """Options of the networks with the head of AdaBins; the defaults are those of the published weights. They include
+    the options of `DepthOptions`.
 
     Attributes:
-        encoder: an EfficientNet of timm, `tf_efficientnet_b0` to `tf_efficientnet_b8`.
         features: number of channels of the decoder's widest layer, divisible by 16; each further layer has half as
             many.
+        width: number of channels of the decoder's output and of the transformer's tokens, divisible by 4 (the number
+            of attention heads).
         bins: number of depth bins.
         queries: number of transformer tokens that are compared with the feature map.
         min_depth_m: lower end of the depth range, metres.
     """
 
-    encoder: str = "tf_efficientnet_b5"
     features: int = 2048
+    width: int = 128
     bins: int = 256
     queries: int = 128
     min_depth_m: float = 1e-3
 
     def __post_init__(self) -> None:
         DepthOptions.__post_init__(self)
-        if not re.fullmatch("tf_efficientnet_b[0-8]", self.encoder):
-            raise FieldError("encoder", f"must be tf_efficientnet_b0 to tf_efficientnet_b8, got {self.encoder!r}")
         if self.features < 16 or self.features % 16:
             raise FieldError("features", f"must be divisible by 16 and above 0, got {self.features}")
+        if self.width < 4 or self.width % 4:
+            raise FieldError("width", f"must be divisible by 4 and above 0, got {self.width}")
         if self.bins < 2:
             raise FieldError("bins", f"must be at least 2, got {self.bins}")
         if not 1 <= self.queries <= 400:
             raise FieldError("queries", f"must be 1 to 400, got {self.queries}")
         if not 0 < self.min_depth_m < self.max_depth_m:
             raise FieldError("min_depth_m", f"must be above 0 and below max_depth_m, got {self.min_depth_m:g}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdaBinsOptions(BinsOptions):
+    """Options of AdaBins. They include the options of `BinsOptions`.
+
+    Attributes:
+        encoder: an EfficientNet of timm, `tf_efficientnet_b0` to `tf_efficientnet_b8`.
+    """
+
+    encoder: str = "tf_efficientnet_b5"
+
+    def __post_init__(self) -> None:
+        BinsOptions.__post_init__(self)
+        if not re.fullmatch("tf_efficientnet_b[0-8]", self.encoder):
+            raise FieldError("encoder", f"must be tf_efficientnet_b0 to tf_efficientnet_b8, got {self.encoder!r}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdaBinsLite0Options(BinsOptions):
+    """Options of AdaBins' head on EfficientNet-Lite0; they are those of `BinsOptions` with smaller defaults."""
+
+    features: int = 256
+    width: int = 64
+    bins: int = 128
+    queries: int = 64

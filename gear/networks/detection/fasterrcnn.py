@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
@@ -28,7 +28,9 @@ OBJECTNESS, RPN_DELTAS, ANCHORS_PX = "objectness", "rpn_bbox_regression", "ancho
 PROPOSALS, LOGITS, DELTAS = "proposals_px", "class_logits", "box_regression"
 
 MAPS = ("0", "1", "2", "3", "pool")
-"""Names that torchvision gives to the feature maps at 1/4 to 1/64 of the sides of the graph's input."""
+"""Names that torchvision gives to the feature maps of ResNet-50's pyramid, at 1/4 to 1/64 of the sides of the graph's
+input.
+"""
 
 SURE_BACKGROUND = 20.0
 """Background logit of the empty proposals with which a picture's list of proposals is padded to a fixed length."""
@@ -42,9 +44,13 @@ class FasterRcnnDetector(Detector):
     (B, R, 364) and `proposals_px` (B, R, 4). R is fixed; the proposals of a picture with fewer are padded with empty
     boxes of class background. Boxes are left, top, right, bottom in edge pixels of the picture. Losses are
     `loss_classifier`, `loss_box_reg`, `loss_objectness` and `loss_rpn_box_reg`.
+
+    Attributes:
+        maps: names of the pyramid's feature maps, finest first.
     """
 
     generator = "rpn.anchor_generator"
+    maps: ClassVar[tuple[str, ...]] = MAPS
 
     def run(self, pictures: Mapping[str, Tensor]) -> Mapping[str, Tensor]:
         """Returns the outputs of the region proposal network and of the second stage, by name (see the class).
@@ -141,7 +147,8 @@ class FasterRcnnDetector(Detector):
         boxes = rpn.box_coder.decode(outputs[RPN_DELTAS].detach(), list(anchors)).view(anchors.shape)
         each = rpn.anchor_generator.num_anchors_per_location()
         counts = [
-            outputs[name].shape[-2] * outputs[name].shape[-1] * count for name, count in zip(MAPS, each, strict=True)
+            outputs[name].shape[-2] * outputs[name].shape[-1] * count
+            for name, count in zip(self.maps, each, strict=True)
         ]
         sizes = [self.sizing.inner_px(picture_size(outputs))] * len(anchors)
         proposals: list[Tensor] = rpn.filter_proposals(boxes, outputs[OBJECTNESS], sizes, counts)[0]
@@ -151,7 +158,7 @@ class FasterRcnnDetector(Detector):
         """Class logits and box deltas of the proposals of all pictures, concatenated, float32."""
         heads: Any = self.graph.get_submodule("roi_heads")
         sizes = [self.sizing.inner_px(picture_size(outputs))] * len(proposals)
-        maps = {name: outputs[name] for name in MAPS}
+        maps = {name: outputs[name] for name in self.maps}
         with autocast(self.device, self.options.precision):
             pooled = heads.box_roi_pool(maps, list(proposals), sizes)
             logits, deltas = heads.box_predictor(heads.box_head(pooled))

@@ -38,6 +38,11 @@ LITE0_LEVELS = (2, 3, 4)
 `gear.networks.efficientnet_lite0.LEVELS`).
 """
 
+LITE0_TAPS = (1, 2, 4, 6)
+"""Indices of the stages of EfficientNet-Lite0 at whose ends the feature maps have 1/4, 1/8, 1/16 and 1/32 of the sides
+of the graph's input.
+"""
+
 LITE0_HEAD_DEPTH = 2
 """Number of convolutions in each head on EfficientNet-Lite0. RetinaNet's four would take half of the time of a
 training step on a CPU.
@@ -176,6 +181,17 @@ class LitePyramid(OnLite0):
         stages = self.body(pictures.contiguous(memory_format=torch.channels_last))
         maps: Mapping[str, Tensor] = self.fpn(OrderedDict((str(i), each) for i, each in enumerate(stages)))
         return maps
+
+
+def lite_taps(graph: nn.Module) -> Mapping[str, nn.Module]:
+    """Returns the ends of the trunk's stages by name, `layer1` (1/4 of the sides of the graph's input) to `layer4`
+    (1/32).
+
+    Args:
+        graph: detector whose backbone is a `LitePyramid`.
+    """
+    blocks = graph.get_submodule("backbone.body.blocks")
+    return {f"layer{i}": blocks.get_submodule(str(stage)) for i, stage in enumerate(LITE0_TAPS, start=1)}
 
 
 def _official_backbone(**levels: Any) -> nn.Module:

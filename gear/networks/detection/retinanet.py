@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from gear.formats.coco import Detection
+from gear.networks.detection.graphs import lite_taps
 from gear.networks.detection.network import (
     ANCHORS,
     MOSTLY,
@@ -22,8 +23,6 @@ from gear.networks.detection.network import (
 )
 
 LOGITS, DELTAS, ANCHORS_PX = "cls_logits", "bbox_regression", "anchors_px"
-
-LITE_TAPS = (1, 2, 4, 6)
 
 FIRST_STRIDE_PX = 8
 LEVELS = 5
@@ -131,5 +130,4 @@ class LiteRetinaNetDetector(RetinaNetDetector):
         """The modules whose outputs are feature maps: the ends of the backbone's stages, `layer1` (1/4 of the
         graph's input) to `layer4` (1/32).
         """
-        blocks = self.graph.get_submodule("backbone.body.blocks")
-        return {f"layer{i}": blocks.get_submodule(str(stage)) for i, stage in enumerate(LITE_TAPS, start=1)}
+        return lite_taps(self.graph)
