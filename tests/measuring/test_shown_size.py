@@ -60,12 +60,21 @@ def test_attack_and_gap_tell_of_it(
 
 @pytest.mark.parametrize(
     "name",
-    ["ddrnet23_slim", "bisenet_x39", "ddrnet23_slim_depth", "glpn_b0", "stereo_centre", "retinanet_lite0_fpn"],
+    [
+        "ddrnet23_slim",
+        "bisenet_x39",
+        "ddrnet23_slim_depth",
+        "glpn_b0",
+        "adabins_lite0",
+        "stereo_centre",
+        "retinanet_lite0_fpn",
+        "fasterrcnn_lite0_fpn",
+    ],
 )
 def test_networks_run_at_the_share_that_their_spec_names(name: str) -> None:
     found = find("model", name)
     network = build(found, with_overrides(NO_OPTIONS, ["weights=none", "device=cpu"]))
-    scale = network.sizing.inner_px((1000, 1000))[0] / 1000 if name.startswith("retinanet") else network.input_scale
+    scale = network.sizing.inner_px((1000, 1000))[0] / 1000 if name.endswith("_fpn") else network.input_scale
     assert isinstance(found.spec, ModelSpec) and found.spec.input_scale == scale
 
 

@@ -10,6 +10,7 @@ import torch
 from torch import nn
 
 from gear.networks import efficientnet_lite0
+from gear.networks.depth.adabins_lite0 import LiteEncoder
 from gear.networks.detection.graphs import LitePyramid
 from gear.networks.efficientnet_lite0_official import from_official
 from gear.networks.stereo.centre import StereoCentreShape
@@ -18,7 +19,7 @@ from gear.networks.weights import mismatches
 from gear.values.errors import GearError
 
 
-@pytest.mark.parametrize("make", [LitePyramid, lambda: StereoCentreLite0(StereoCentreShape(width=8))])
+@pytest.mark.parametrize("make", [LitePyramid, LiteEncoder, lambda: StereoCentreLite0(StereoCentreShape(width=8))])
 def test_imagenet_comes_from_an_installed_package(make: Callable[[], efficientnet_lite0.OnLite0]) -> None:
     network = make()
     trunk = network.lite0()

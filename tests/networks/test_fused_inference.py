@@ -151,9 +151,11 @@ def test_a_network_may_want_none() -> None:
 
 OURS = (
     pytest.param("adabins", marks=pytest.mark.slow),
+    "adabins_lite0",
     "bisenet_x39",
     "ddrnet23_slim",
     "ddrnet23_slim_depth",
+    "fasterrcnn_lite0_fpn",
     pytest.param("fasterrcnn_r50_fpn", marks=pytest.mark.slow),
     "glpdepth",
     "glpn_b0",

@@ -1,4 +1,7 @@
-"""The head of AdaBins (`gear.networks.depth.adabins_graph`) on EfficientNet-Lite0, initialised with ImageNet weights."""
+"""The head of AdaBins (`gear.networks.depth.adabins_graph`) on EfficientNet-Lite0.
+
+The encoder can be initialised with ImageNet weights.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Faster R-CNN with EfficientNet-Lite0: the family of the paper's two-stage detector, small enough for two CPU cores."""
+"""Faster R-CNN with EfficientNet-Lite0: the paper's two-stage detector with a trunk that two CPU cores can train."""
 
 from __future__ import annotations
 

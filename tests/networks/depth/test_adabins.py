@@ -124,7 +124,7 @@ def test_the_graph_computes_what_the_paper_says() -> None:
 
 
 def test_the_padded_convolution_keeps_its_two_pixels() -> None:
-    decoder = Decoder([16, 24, 40, 112, 1280], 64)
+    decoder = Decoder([16, 24, 40, 112, 1280], 64, 128)
     assert decoder.conv2(torch.zeros(1, 1280, 3, 5)).shape == (1, 64, 5, 7)
 
 
@@ -163,6 +163,8 @@ def test_any_size_comes_back_as_it_went_in() -> None:
     [
         ({"encoder": "resnet18"}, "encoder"),
         ({"features": 100}, "features"),
+        ({"width": 66}, "width"),
+        ({"width": 0}, "width"),
         ({"bins": 1}, "bins"),
         ({"queries": 500}, "queries"),
         ({"min_depth_m": 90.0}, "min_depth_m"),
