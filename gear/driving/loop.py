@@ -153,8 +153,8 @@ def drive(
         watch: called in every frame and at the end of the drive (`Watch`); None for nothing.
 
     Returns:
-        The log: a head with the scenario, the car, the assets of the road users, and the dynamics if they are not
-        kinematic; one entry per frame
+        The log: a head with the scenario, the car, the assets of the road users, the dynamics if they are not
+        kinematic, and with cameras the hash of the patch's pictures ("" without a patch); one entry per frame
         (`frame_entry`); and an end with `ending` and `crash`.
 
     Raises:
@@ -176,6 +176,7 @@ def drive(
             "scripted_id": scripted,
             "actors": {str(ids[body]): name for body, name in simulation.assets.items()},
             **({"dynamics": simulation.dynamics} if has_body else {}),
+            **({} if sight is None else {"patch_sha256": sight.session.job.patch.digest}),
         }
     ]
     while not situation.is_over:

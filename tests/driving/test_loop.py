@@ -103,10 +103,12 @@ def test_predictions_are_evaluated_at_the_very_same_frames(simulation: DriveSimu
         to_frame=lambda _: frame,
         task=task,
         plugin=found,
+        job=SimpleNamespace(patch=SimpleNamespace(digest="ab12")),
     )
     model: Any = SimpleNamespace(predict=lambda views, numbers: [SimpleNamespace(prediction=truth)])
     sight = Sight(session=session, rig=task.rig(), model=model, evaluator=task.evaluator())
     controller = Foreign(Action(acceleration_mps2=0.0, steering_rad=0.0))
-    drive(simulation, SHORT, wheel(controller), sight)
+    log = drive(simulation, SHORT, wheel(controller), sight)
+    assert log[0]["patch_sha256"] == "ab12"
     assert all(one.prediction is truth and one.cameras == task.rig().cameras for one in controller.seen)
     assert sight.evaluator is not None and sight.evaluator.result()["rmse_m"] == pytest.approx(0.0, abs=1e-6)

@@ -29,7 +29,7 @@ from gear.verbs.leaderboard.compare import (
     compare_withheld,
     is_same_machine,
 )
-from gear.verbs.leaderboard.drive_check import check_drives
+from gear.verbs.leaderboard.drive_check import check_drives, chosen_drives
 from gear.verbs.leaderboard.figures import compare_figures, compare_reference
 from gear.verbs.leaderboard.request import CheckRequest
 from gear.verbs.leaderboard.rerun import Again, Rerun, check_data
@@ -132,6 +132,7 @@ def run_check(request: CheckRequest, callbacks: Callbacks) -> Verdict:
     check_data(record, places=len(rerun.plan.places()), samples=rerun.plan.config.samples.measure)
     chosen = _chosen(record, request)
     _refuse_many(rerun, chosen, request)
+    drives = chosen_drives(rerun, request)
     count = _Counter(callbacks.on_progress, (len(chosen) + request.fresh) * len(_kinds(rerun)))
     found = [*_static(record), *compare_plugins(rerun)]
     again = _again(rerun, chosen, count)
@@ -144,7 +145,7 @@ def run_check(request: CheckRequest, callbacks: Callbacks) -> Verdict:
     is_every = len(again) == sum(one.samples for one in record.data if one.patch in _kinds(rerun))
     alone = _again(rerun, chosen, count, with_defense=False) if is_every and record.entry.defense is not None else []
     found += compare_reference(record, alone, rerun.ranked)
-    found += check_drives(rerun, request, callbacks, is_same=is_same)
+    found += check_drives(rerun, drives, callbacks, is_same=is_same)
     if request.fresh:
         found += _fresh(rerun, request, secret, count)
     verdict = Verdict(

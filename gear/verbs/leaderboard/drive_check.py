@@ -67,12 +67,58 @@ class Repeated:
         return self.drives.scenario(self.run).is_free
 
 
-def check_drives(rerun: Rerun, request: CheckRequest, callbacks: Callbacks, *, is_same: bool) -> list[Finding]:
-    """Makes some of the drives of a record again.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class DrivesToRepeat:
+    """The drives of a record that a check makes again.
+
+    Attributes:
+        chosen: the drives.
+        total: number of the drives that the record's config makes.
+        problems: why no drive is made again; empty if drives are made again, or if there are none.
+    """
+
+    chosen: tuple[Repeated, ...] = ()
+    total: int = 0
+    problems: tuple[Finding, ...] = ()
+
+
+def chosen_drives(rerun: Rerun, request: CheckRequest) -> DrivesToRepeat:
+    """Chooses the drives that a check makes again. Nothing is rendered, so that too many drives are refused at once.
 
     Args:
         rerun: the record on this machine.
         request: arguments of the check: the number of drives, and the seed by which they are chosen.
+
+    Raises:
+        GearError: a patch is missing, something does not fit, or the check would render too many pictures.
+    """
+    every = list(_every(rerun))
+    claimed = {one.key for one in rerun.record.drives}
+    if not every and not claimed:
+        return DrivesToRepeat()
+    unknown = claimed - {one.key for one in every}
+    if unknown:
+        return _unusable(f"drives: {len(unknown)} of the record's drives are not part of its config")
+    if not claimed:
+        return _unusable("drives: the record's config has drives, but the record states none")
+    chosen = _chosen(every, request)
+    frames = sum(_frames(one) for one in chosen)
+    if frames > request.most_pictures:
+        problem = f"{len(chosen)} drives would render up to {frames} pictures, at most {request.most_pictures} are"
+        raise GearError(f"{request.record}: {problem} allowed; raise --most-pictures, or lower --drives")
+    return DrivesToRepeat(chosen=tuple(chosen), total=len(every))
+
+
+def _unusable(problem: str) -> DrivesToRepeat:
+    return DrivesToRepeat(problems=(finding("differs", problem),))
+
+
+def check_drives(rerun: Rerun, drives: DrivesToRepeat, callbacks: Callbacks, *, is_same: bool) -> list[Finding]:
+    """Makes some of the drives of a record again.
+
+    Args:
+        rerun: the record on this machine.
+        drives: the drives that are made again (`chosen_drives`).
         callbacks: callbacks that receive the progress of calibrations.
         is_same: whether this machine should give equal bytes.
 
@@ -80,25 +126,13 @@ def check_drives(rerun: Rerun, request: CheckRequest, callbacks: Callbacks, *, i
         The findings; none for a record without drives whose config has none.
 
     Raises:
-        GearError: a patch is missing, something does not fit, or the check would render too many pictures.
+        DatasetError: a file cannot be written.
     """
-    record = rerun.record
-    every = list(_every(rerun))
-    claimed = {one.key: one for one in record.drives}
-    if not every and not claimed:
-        return []
-    unknown = claimed.keys() - {one.key for one in every}
-    if unknown:
-        return [finding("differs", f"drives: {len(unknown)} of the record's drives are not part of its config")]
-    if not claimed:
-        return [finding("differs", "drives: the record's config has drives, but the record states none")]
-    chosen = _chosen(every, request)
-    frames = sum(_frames(one) for one in chosen)
-    if frames > request.most_pictures:
-        problem = f"{len(chosen)} drives would render up to {frames} pictures, at most {request.most_pictures} are"
-        raise GearError(f"{request.record}: {problem} allowed; raise --most-pictures, or lower --drives")
-    made = [(one, _driven(one, callbacks)) for one in chosen]
-    return list(_compared(made, claimed, len(every), is_same=is_same))
+    if drives.problems or not drives.total:
+        return list(drives.problems)
+    claimed = {one.key: one for one in rerun.record.drives}
+    made = [(one, _driven(one, callbacks)) for one in drives.chosen]
+    return list(_compared(made, claimed, drives.total, is_same=is_same))
 
 
 def _every(rerun: Rerun) -> Iterator[Repeated]:

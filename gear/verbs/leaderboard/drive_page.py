@@ -22,8 +22,9 @@ LEGEND = (
     "Share of drives that ended in a crash, over all scenes and scenarios that are not free roads, with the exact 95 % "
     "interval of Clopper and Pearson. Rows are ranked by the worst known collision rate under any optimised patch, by "
     "the author of the row or by others; fewer collisions are better. A defense without drives under adaptive patches "
-    "has no rank. Each record holds the hash of the log of every drive, and a check drives a part of them again. Rows "
-    "of one table drove through the same scenarios in the same scenes."
+    "has no rank, and neither has a row that the rules exclude from the other tables. Each record holds the hash of "
+    "the log of every drive, and a check drives a part of them again. Rows of one table drove through the same "
+    "scenarios in the same scenes."
 )
 
 
@@ -52,10 +53,12 @@ class DriveRow:
     @property
     def is_ranked(self) -> bool:
         """Whether the row has a rank: there are drives with every kind of patch, for a defense with adaptive patches
-        too, and no check contradicts it.
+        too, no check contradicts it, and no rule excludes the row (`gear.leaderboard.rules.faults`), such as the one
+        on the loss on clean pictures.
         """
         needed = {NONE, RANDOM, PATCH} | ({ADAPTIVE} if self.row.first.record.entry.defense is not None else set())
-        return self.worst is not None and needed <= self.rates.keys() and self.state != "broken"
+        is_allowed = not self.row.faults and self.state != "broken"
+        return self.worst is not None and needed <= self.rates.keys() and is_allowed
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

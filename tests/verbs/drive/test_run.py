@@ -112,8 +112,10 @@ def test_a_driver_with_a_camera_drives_the_same_twins(config: Path, tmp_path: Pa
     together = list((out / "videos").glob("eyes/*.mp4"))
     shown = (out / "report.html").read_text()
     assert len(together) == 1 and f'href="videos/eyes/{together[0].name}"' in shown and "data:image/svg+xml" in shown
-    assert len(set(hashes(found))) == 1 and len(found.results) == 2
     digest = digest_of([paint])
+    logs = [path.read_text().splitlines() for path in sorted((out / "drives").glob("*/*/log.jsonl"))]
+    assert len(logs) == len(found.results) == 2 and logs[0][1:] == logs[1][1:]
+    assert [json.loads(log[0])["patch_sha256"] for log in logs] == ["", digest], "none comes first by name"
     assert [one.patch for one in found.results] == ["none", f"paint-{digest[:8]}"]
     assert [one.patch_sha256 for one in found.results] == ["", digest]
     lines = csv.DictReader((out / "drives.csv").read_text().splitlines())

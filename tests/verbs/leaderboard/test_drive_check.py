@@ -93,6 +93,7 @@ def test_drives_repeat_and_forged_ones_are_seen(
     assert honest.controller is not None and honest.controller.name == "semseg_baseline"
     with pytest.raises(GearError, match=r"4 drives would render up to 40 pictures"):
         check(driven / NAME, most_pictures=39)
+    assert not list((tmp_path / "work").rglob("leftImg8bit")), "it is refused before any picture is rendered"
     texts = {one.level: one.text for one in check(driven / NAME).findings if one.text.startswith("drives:")}
     assert texts == {"same": "drives: 4 of 4 driven again, 4 of them with an equal log"}
 

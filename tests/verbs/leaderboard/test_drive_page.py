@@ -12,7 +12,7 @@ from gear.leaderboard.record import Record, digest
 from gear.leaderboard.verdict import Verdict
 from gear.verbs.leaderboard.drive_page import drive_cells, drive_tables, drives_json
 from gear.verbs.leaderboard.pages import drives_page, record_page
-from tests.leaderboard.conftest import attacking, driving, filed, plugin, record
+from tests.leaderboard.conftest import VALUES, attacking, driving, filed, plugin, record
 
 GOOD = driving(record(), {"none": 0, "random": 0, "patch": 1, "adaptive patch": 2})
 BAD = driving(
@@ -70,6 +70,15 @@ def test_rows_without_all_kinds_and_broken_rows_have_no_rank() -> None:
     one = filed(GOOD)
     row = drive_tables(tables([one], verdict(one, "differs")))[0].rows[0]
     assert row.state == "broken" and not row.is_ranked
+
+
+def test_a_row_that_loses_too_much_on_clean_pictures_has_no_rank() -> None:
+    def ranked(clean: float) -> bool:
+        made = driving(record(VALUES | {"none": clean}), {"none": 0, "random": 0, "patch": 1, "adaptive patch": 2})
+        (row,) = drive_tables(tables([filed(made)], {}))[0].rows
+        return row.is_ranked
+
+    assert ranked(0.70) and not ranked(0.60)
 
 
 def test_the_pages(tmp_path: Path) -> None:
