@@ -142,7 +142,8 @@ def mean_difference(
     """The mean of paired differences, with its 95 % interval by the jackknife (`gear.measuring.intervals`).
 
     The interval is over scenarios: all seeds of a scenario at one speed and place are left out together, because they
-    are not independent.
+    are not independent. The bootstrap over scenarios is not used: for 4 to 20 scenarios its percentiles hold the true
+    mean in 77 to 94 % of simulations, the jackknife in 94 % or more (docs/results/intervals.md).
 
     Args:
         values: difference of each situation; None where it is not known.
