@@ -11,6 +11,7 @@ import numpy as np
 from gear.driving.worker import DriveResult
 from gear.measuring.intervals import (
     CONFIDENCE,
+    FEWEST_CLUSTERS,
     LEFT_OUT,
     REAL,
     Interval,
@@ -151,7 +152,7 @@ def mean_difference(
         limits: smallest and largest possible difference, to which the interval is clipped.
 
     Returns:
-        The mean over the known values, None without any; and the interval, None for fewer than two clusters, or if
+        The mean over the known values, None without any; and the interval, None for fewer than three clusters, or if
         the mean does not change when a cluster is left out.
     """
     known = [(value, cluster) for value, cluster in zip(values, clusters, strict=True) if value is not None]
@@ -161,7 +162,7 @@ def mean_difference(
     rows = leave_one_out([cluster for _, cluster in known])
     replicates = np.array([numbers[row[row != LEFT_OUT]].mean() for row in rows])
     mean = float(numbers.mean())
-    if not len(replicates) or is_constant(replicates):
+    if len(replicates) < FEWEST_CLUSTERS or is_constant(replicates):
         return mean, None
     return mean, jackknife_interval(mean, replicates, limits)
 

@@ -82,7 +82,8 @@ def minus(task: TaskResult, pool: Pool, other: Pool) -> Estimate | None:
         return None
     one, two = (each.gathered.get(task.metric.report) for each in (pool, other))
     interval = None if one is None or two is None else difference_interval(one, two, task.metric.name)
-    return Estimate(value=here.value - there.value, interval=interval)
+    is_from_few = here.is_from_few or there.is_from_few
+    return Estimate(value=here.value - there.value, interval=interval, is_from_few=is_from_few)
 
 
 def is_failed(task: TaskResult, one: Result, pool: Pool) -> bool:

@@ -31,6 +31,7 @@ from gear.verbs.bench.scenes import Scene
 from gear.verbs.bench.table import columns, defense_title, legend, title
 from gear.verbs.bench.validation import TaskPlugins
 from gear.verbs.evaluate.page import PAGE
+from gear.verbs.evaluate.table import few_streets_note
 
 PICTURE_PX, PATCH_PX = 560, 220
 """Width of pictures and width of patches in pixels."""
@@ -52,7 +53,13 @@ def page(report: BenchReport, plan: Plan) -> str:
         f"<p>{safe(where)}; {counts.measure} pictures of each scene and weather for every kind of patch. Patches: "
         f"{safe(plan.config.attack.plugin)} on {counts.attack} other pictures of a scene in each weather.</p>",
         f'<p class="dim">{safe(legend())}.</p>',
-        *(f'<p class="dim">Note: {safe(note)}</p>' for note in facts["notes"]),
+        *(
+            f'<p class="dim">Note: {safe(note)}</p>'
+            for note in [
+                *few_streets_note(cell for task in report.tasks for cells in columns(task) for cell in cells),
+                *facts["notes"],
+            ]
+        ),
     ]
     for task, task_plugins in zip(report.tasks, plan.plugins_of_tasks, strict=True):
         parts += [f"<h2>{safe(title(task))}</h2>", _table(task)]

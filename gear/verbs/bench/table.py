@@ -11,7 +11,7 @@ from gear.verbs.bench.drives.results import LEGEND as DRIVE_LEGEND
 from gear.verbs.bench.gains import against_clean, gain, is_failed, survives_only_static
 from gear.verbs.bench.report import BenchReport, Result, TaskResult
 from gear.verbs.evaluate.report import Difference, Pool
-from gear.verbs.evaluate.table import number, shown
+from gear.verbs.evaluate.table import few_streets_note, number, shown
 
 OBJECT_COLUMNS = {
     "hidden": "hidden",
@@ -41,7 +41,7 @@ def text(report: BenchReport) -> str:
         report: results of the benchmark.
     """
     parts = ["\n".join([title(task), *number_table(columns(task))]) for task in report.tasks]
-    legends = [legend(), *report.facts["notes"]]
+    legends = [legend(), *few_streets_note(parts), *report.facts["notes"]]
     if report.drives is not None:
         parts.append("\n".join(["drives", *number_table(report.drives.rows())]))
         legends.append(DRIVE_LEGEND)

@@ -48,7 +48,7 @@ DEFINITIONS = {
     "p": "two-sided p of McNemar's exact test: how often chance alone gives crashes as unequal as these",
     "differences against the other twin": "this twin minus the other one, with the 95 % interval by the jackknife over"
     " scenarios, in which all seeds of a scenario at one speed and place are left out together; without an interval"
-    " where fewer than two scenarios differ",
+    " where fewer than three scenarios differ",
     "predicts": "share of the pairs of a crashed drive and another one in which the crashed one lost more of the"
     " metric (area under the ROC curve): 1 means that the metric predicts crashes, 0.5 that it says nothing",
 }

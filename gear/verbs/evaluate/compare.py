@@ -11,7 +11,7 @@ import numpy as np
 
 from gear.contracts.tasks import CONTROLS, NO_PATCH
 from gear.dataset.reading import Dataset, scenes_of
-from gear.measuring.intervals import Values, leave_one_out
+from gear.measuring.intervals import FEWEST_CLUSTERS, Values, leave_one_out
 from gear.measuring.scoring import SampleResult, Scorer
 from gear.measuring.statistics import (
     Metrics,
@@ -201,7 +201,12 @@ def metrics_of(row: EvaluatedDataset) -> dict[str, dict[str, Estimate]]:
     for report in row.scorer.reports:
         one = row.gathered(report)
         metrics[report] = {
-            name: Estimate(value=value, interval=one.interval(name), ceiling=one.ceilings.get(name, 1.0))
+            name: Estimate(
+                value=value,
+                interval=one.interval(name),
+                ceiling=one.ceilings.get(name, 1.0),
+                is_from_few=_are_few(row.streets),
+            )
             for name, value in one.overall.items()
         }
     return metrics
@@ -249,7 +254,8 @@ def difference(row: EvaluatedDataset, other: EvaluatedDataset, seed: int) -> Dif
         row=row.name,
         against=other.name,
         metrics={
-            report: _paired(row.gathered(report, count), other.gathered(report, count)) for report in row.scorer.reports
+            report: _paired(row.gathered(report, count), other.gathered(report, count), is_from_few=_are_few(streets))
+            for report in row.scorer.reports
         },
         auroc=_auroc(patched, twin, streets),
         paired={report: _tested(patched, twin, streets, report, seed) for report in row.scorer.reports},
@@ -267,12 +273,18 @@ def _objects(
     return object_changes([result.index for result in patched], outcomes, twins, streets, seed) if outcomes else None
 
 
-def _paired(one: Metrics, other: Metrics) -> dict[str, Estimate]:
+def _are_few(streets: Sequence[Street]) -> bool:
+    """Whether there are too few different streets for intervals that hold what they promise."""
+    return len(set(streets)) < FEWEST_CLUSTERS
+
+
+def _paired(one: Metrics, other: Metrics, *, is_from_few: bool) -> dict[str, Estimate]:
     found = {}
     for name in one.overall:
         if name in other.overall:
             change = one.overall[name] - other.overall[name]
-            found[name] = Estimate(value=change, interval=difference_interval(one, other, name))
+            interval = difference_interval(one, other, name)
+            found[name] = Estimate(value=change, interval=interval, is_from_few=is_from_few)
     return found
 
 
@@ -298,7 +310,8 @@ def _auroc(patched: list[SampleResult], twin: list[SampleResult], streets: list[
     low = [result.score for result in twin if result.score is not None]
     if len(high) != len(patched) or len(low) != len(twin):
         return None
-    return Estimate(value=auroc(high, low), interval=auroc_interval(high, low, streets))
+    interval = auroc_interval(high, low, streets)
+    return Estimate(value=auroc(high, low), interval=interval, is_from_few=_are_few(streets))
 
 
 def _finite(values: Values) -> Values:

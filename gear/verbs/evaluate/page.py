@@ -7,7 +7,7 @@ from urllib.parse import quote
 from gear.reporting.html_table import Cell, Link, html_table, safe
 from gear.reporting.report_page import NEARBY, report_page
 from gear.verbs.evaluate.report import EvaluateReport
-from gear.verbs.evaluate.table import row_labels, table_cells, title
+from gear.verbs.evaluate.table import few_streets_note, row_labels, table_cells, title
 
 PAGE = "report.html"
 """Name of the page in the folder of the evaluation."""
@@ -27,7 +27,8 @@ def page(report: EvaluateReport) -> str:
         first: Cell = Link(cells[0], f"#{quote(name)}") if name in sheets else cells[0]
         rows.append((name is not None, [first, *cells[1:]]))
     parts = [html_table(head[1], rows)]
-    parts += [f'<p class="dim">Note: {safe(note)}</p>' for note in report.facts.get("notes", [])]
+    few = few_streets_note(text for _, cells in lines for text in cells)
+    parts += [f'<p class="dim">Note: {safe(note)}</p>' for note in [*few, *report.facts.get("notes", [])]]
     for row in report.rows:
         if row.name in sheets:
             source, caption = quote(sheets[row.name]), f"{labels[row.name]}, patch {row.patch}"

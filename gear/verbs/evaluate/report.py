@@ -24,11 +24,13 @@ class Estimate:
         value: value of the metric; NaN if it is undefined.
         interval: lower and upper end of the interval; None if unknown.
         ceiling: value that perfect predictions reach on the same samples; less than 1 if a dataset has too few objects.
+        is_from_few: whether the interval rests on fewer than `FEWEST_CLUSTERS` streets, so that it is too narrow.
     """
 
     value: float
     interval: tuple[float, float] | None = None
     ceiling: float = 1.0
+    is_from_few: bool = False
 
     def as_json(self) -> Json:
         """Returns `value`, `low` and `high` as JSON; numbers that are not finite become null. A `ceiling` of 1 is left

@@ -5,12 +5,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
+from gear.measuring.intervals import FEWEST_CLUSTERS
 from gear.measuring.reports import TASK
 from gear.measuring.text_table import WIDTH, number_table
 from gear.verbs.evaluate.report import ALARMS, Difference, Estimate, EvaluateReport, RowReport
 
 COLUMNS, FURTHER = 4, 2
 """Number of metric columns for the task's own report, and for each further report; results.json has all metrics."""
+
+FEW_STREETS = (
+    f"*: interval from fewer than {FEWEST_CLUSTERS} streets: too narrow, it contains the true value less often than in "
+    "95 % of datasets; collect samples of more streets"
+)
+"""Note below a table with marked intervals."""
 
 LABEL_LENGTH = 36
 """Largest number of characters of a row's label."""
@@ -33,6 +40,7 @@ def table(report: EvaluateReport, *, width: int = WIDTH) -> str:
         *_limited(report, columns, labels),
         *_absent(report, labels),
         *_times(report),
+        *few_streets_note(text),
         *report.facts.get("notes", []),
     ]
     return "\n".join([title(report), *text, *notes]) + "\n"
@@ -182,6 +190,8 @@ def _objects(report: EvaluateReport, labels: Mapping[str, str], width: int) -> l
 def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
     """Returns a metric with its interval as text, such as `0.712 [0.690, 0.734]`; empty if the metric is missing.
 
+    An interval from too few streets ends with `*`.
+
     Args:
         one: the metric.
         is_signed: whether positive values get a plus sign.
@@ -189,7 +199,18 @@ def shown(one: Estimate | None, *, is_signed: bool = False) -> str:
     if one is None:
         return ""
     text = number(one.value, is_signed=is_signed)
-    return text if one.interval is None else f"{text} [{number(one.interval[0])}, {number(one.interval[1])}]"
+    if one.interval is None:
+        return text
+    return f"{text} [{number(one.interval[0])}, {number(one.interval[1])}]{'*' * one.is_from_few}"
+
+
+def few_streets_note(texts: Iterable[str]) -> list[str]:
+    """Returns the note on intervals from too few streets if one of the texts has such an interval (see `shown`).
+
+    Args:
+        texts: lines or cells of a table.
+    """
+    return [FEW_STREETS] if any("]*" in text for text in texts) else []
 
 
 def number(value: float | None, *, is_signed: bool = False) -> str:

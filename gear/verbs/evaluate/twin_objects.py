@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.measuring.intervals import (
+    FEWEST_CLUSTERS,
     LEFT_OUT,
     Interval,
     Values,
@@ -127,7 +128,7 @@ def _rate(counts: Values, bases: Values, kept: Sequence[npt.NDArray[np.int64]], 
     if interval == (value, value) and value in limits:
         streets = sum(bool(bases[row].sum() < bases.sum()) for row in kept)  # that have a base
         interval = interval_at_limit(value, streets, limits)
-    return Estimate(value=value, interval=interval)
+    return Estimate(value=value, interval=interval, is_from_few=len(kept) < FEWEST_CLUSTERS)
 
 
 def _ratio(counts: Values, bases: Values) -> float:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from gear.verbs.evaluate.report import Estimate, EvaluateReport, RowReport
-from gear.verbs.evaluate.table import table
+from gear.verbs.evaluate.table import FEW_STREETS, table
 
 NAN = float("nan")
 
@@ -35,3 +35,11 @@ def test_metrics_of_one_beginning_without_any_value_are_named_once() -> None:
 def test_a_ceiling_is_written_where_there_is_one() -> None:
     assert Estimate(value=0.05, ceiling=0.075).as_json() == {"value": 0.05, "low": None, "high": None, "ceiling": 0.075}
     assert "ceiling" not in Estimate(value=0.05).as_json()
+
+
+def test_an_interval_from_too_few_streets_is_marked_and_noted_once() -> None:
+    few = Estimate(value=0.5, interval=(0.4, 0.6), is_from_few=True)
+    text = table(report({"miou": few, "iiou": few, "known": Estimate(value=0.5, is_from_few=True)}))
+    assert text.count("0.500 [0.400, 0.600]*") == 2 and text.count(FEW_STREETS) == 1
+    enough = table(report({"miou": Estimate(value=0.5, interval=(0.4, 0.6))}))
+    assert "0.500 [0.400, 0.600]" in enough and "*" not in enough
