@@ -181,7 +181,7 @@ def test_what_a_patch_does_to_a_detector_is_shown(tmp_path: Path, small: Small, 
     lines = [line.split() for line in table[begin + 3 :]]
     assert lines[0][-2:] == ["minus", "none"] and lines[1] == ["of", "3", "found", "count", "reverse", "rate", "p"]
     assert lines[2] == ["hidden", "1", "0", "0.333", "[0.000,", "1.000]*", "1"], "two streets are few"
-    assert lines[5] == ["invented", "on", "patch", "1", "0", "0.500", "[0.000,", "6.853]", "1"]
+    assert lines[5] == ["invented", "on", "patch", "1", "0", "0.500", "[0.000,", "6.853]*", "1"]
     assert max(len(line) for line in table[begin : begin + 10]) <= 100
     again = evaluate(roots, model="odd", out=tmp_path / "out", reports=["outside_patch"])
     assert again.as_json() == report.as_json() and sum(row.made for row in again.rows) == 0
