@@ -12,9 +12,10 @@ from typing import Any
 
 import pytest
 
+from gear.cli.commands.plugins import OPTION_FLAGS
 from gear.cli.main import main
 from gear.contracts.hookspecs import hookimpl
-from gear.contracts.specs import DefenseSpec
+from gear.contracts.specs import KINDS, DefenseSpec
 from gear.plugins import manager
 
 
@@ -183,6 +184,30 @@ def test_show_explains_every_option(installed: Callable[..., None], capsys: pyte
     assert main(["plugins", "show", "thirdparty"]) == 0
     out = capsys.readouterr().out
     assert "  radius_px: int = 2 [pixels]\n      how far the window reaches.\n" in out
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "flag", "command"),
+    [
+        ("task", "semseg", "--set options.KEY=VALUE", "collect"),
+        ("model", "ddrnet23_slim", "--model-set KEY=VALUE", "evaluate"),
+        ("attack", "eot", "--set KEY=VALUE", "attack"),
+        ("defense", "jpeg", "--defense-set KEY=VALUE", "evaluate"),
+        ("logger", "tensorboard", "--log-set KEY=VALUE", "train"),
+    ],
+)
+def test_show_names_the_flag_that_the_commands_have(
+    kind: str, name: str, flag: str, command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plugins", "show", name, "--kind", kind]) == 0
+    assert f"options ({flag}" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    assert f"{flag.split()[0]} " in capsys.readouterr().out
+
+
+def test_every_kind_of_plugin_states_how_its_options_are_set() -> None:
+    assert tuple(OPTION_FLAGS) == KINDS
 
 
 def test_show_knows_the_built_in_tasks_options(capsys: pytest.CaptureFixture[str]) -> None:

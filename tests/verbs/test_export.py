@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from gear.collecting.run import CollectReport
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.export import export
 from tests.dataset.splits import fill, plan, tree
+
+DRIVE = Path(__file__).parents[1] / "formats/driving/drive.yml"
 
 
 def test_exports_go_into_new_folders_and_fit_their_task(tmp_path: Path) -> None:
@@ -103,3 +108,29 @@ def test_an_export_writes_through_no_link(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match=r"\.b\.gear-export: is a link"):
         export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
     assert tree(victim) == {"mine.txt": b"mine"} and not (tmp_path / "b").exists()
+
+
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory: pytest.TempPathFactory, collect_small: Callable[..., CollectReport]) -> dict[str, Path]:
+    """A driving sequence of four frames of each task with a layout of its own."""
+    roots = {}
+    for task, extra in (("stereo3d", ["flow=true", "scans=true"]), ("detect2d", [])):
+        roots[task] = tmp_path_factory.mktemp("drives") / task
+        settings = [f"simulation={DRIVE}", *extra]
+        collect_small(task, roots[task], settings=settings, split="video", samples=None, scene="no_billboard")
+    return roots
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("layout", ["kitti-tracking", "kitti-flow", "kitti-odometry", "kitti-raw", "mot"])
+def test_a_drive_exported_twice_has_the_same_bytes(tmp_path: Path, drives: dict[str, Path], layout: str) -> None:
+    root = drives["detect2d" if layout == "mot" else "stereo3d"]
+    moved = tmp_path / "elsewhere/moved"
+    shutil.copytree(root, moved)
+    code = "import sys; from gear.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    for number, data in enumerate((root, moved)):
+        words = ["export", str(data), "--layout", layout, "--out", str(tmp_path / f"out{number}")]
+        environment = {**os.environ, "PYTHONHASHSEED": str(number), "TZ": ("UTC", "Asia/Tokyo")[number]}
+        subprocess.run([sys.executable, "-c", code, *words], check=True, env=environment, capture_output=True)
+    first, second = tree(tmp_path / "out0"), tree(tmp_path / "out1")
+    assert len(first) > 4 and first == second

@@ -20,6 +20,17 @@ EXAMPLE = """examples:
   GEAR_DISABLE_PLUGINS='*' gear plugins        # gear's own alone; or names of plugins, joined by commas
 """
 
+OPTION_FLAGS: dict[Kind, str] = {
+    "task": "--set options.KEY=VALUE, or in a config under `options:`",
+    "model": "--model-set KEY=VALUE; with gear train --set options.KEY=VALUE",
+    "attack": "--set KEY=VALUE; with gear train --set adversarial.options.KEY=VALUE",
+    "defense": "--defense-set KEY=VALUE; with gear defend --set KEY=VALUE",
+    "controller": "in a drive config under `set:` of the driver",
+    "metric": "--report NAME:KEY=VALUE,...",
+    "logger": "--log-set KEY=VALUE",
+}
+"""How users set the options of a plugin, by its kind."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of `gear plugins` to its argument parser."""
@@ -104,8 +115,7 @@ def show(catalogue: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace
     for key, value in trained.items():
         parts = [f"{name}={part}" for name, part in value.items()] if isinstance(value, dict) else value
         print(f"  {key}: {_text(parts)}")
-    where = "--set options.KEY=VALUE, or in a config under `options:`" if plugin.kind == "task" else "--set KEY=VALUE"
-    print(f"options ({where}):" if facts["options"] else "no options")
+    print(f"options ({OPTION_FLAGS[plugin.kind]}):" if facts["options"] else "no options")
     for option in facts["options"]:
         unit = f" [{option['unit']}]" if option["unit"] else ""
         print(f"  {option['name']}: {option['type']} = {_text(option['default'])}{unit}")

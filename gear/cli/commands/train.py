@@ -21,7 +21,8 @@ EXAMPLE = """examples:
       --out runs/ss
 
 DIR is a dataset's root, a folder of roots, or DIR:SPLIT. The folder of --out gets model.safetensors (use it with
---set weights=FILE), train.json, card.md and curves.png; run the same command again to continue after an interruption.
+--set weights=FILE), train.json, card.md, curves.png and samples.jpg (predictions beside ground truth); run the same
+command again to continue after an interruption.
 """
 SECONDS = {"s": 1, "m": 60, "h": 3600, "": 60}
 

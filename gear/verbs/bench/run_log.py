@@ -10,10 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
-import numpy as np
-
-from gear.dataset.files import inside
+from gear.dataset.files import inside, read_bytes
+from gear.formats.png import decode_rgb
 from gear.measuring.run_log import RunLog
 from gear.reporting.directions import with_direction
 from gear.values.frames import UInt8Image
@@ -81,7 +79,4 @@ def _network(result: Result) -> str:
 
 def _read(root: Path, relative: str) -> UInt8Image:
     """Reads a sheet of an evaluation as (H, W, 3) uint8 RGB."""
-    picture = cv2.imread(str(inside(root, relative)))
-    if picture is None:
-        raise ValueError(f"{relative} is no picture")
-    return np.ascontiguousarray(picture[..., ::-1], np.uint8)
+    return decode_rgb(read_bytes(inside(root, relative)))

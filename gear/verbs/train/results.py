@@ -31,6 +31,7 @@ from gear.verbs.train.checkpoint import FILE as CHECKPOINT
 from gear.verbs.train.checkpoint import TrainingState
 from gear.verbs.train.config import TrainConfig
 from gear.verbs.train.curves import FILE as CURVES
+from gear.verbs.train.run_log import SAMPLES_FILE
 from gear.verbs.train.starting import SCALE
 
 WEIGHTS = "model.safetensors"
@@ -146,7 +147,7 @@ def write_weights(root: Path, weights: bytes) -> None:
         root: folder of the training.
         weights: content of the weights file (safetensors).
     """
-    remove_files(root, [CARD, HISTORY, CURVES])
+    remove_files(root, [CARD, HISTORY, CURVES, SAMPLES_FILE])
     write_whole(root, WEIGHTS, weights)
 
 
@@ -252,6 +253,7 @@ def card(root: Path, origin: Origin, progress: TrainingState) -> str:
         *(f"| {name} | {value:.4f} |" for name, value in known(metrics_of(best)).items()),
         "",
         "![curves](curves.png)",
+        *(["", f"![validation samples]({SAMPLES_FILE})"] if (root / SAMPLES_FILE).is_file() else []),
         "",
         "## Limits",
         "",

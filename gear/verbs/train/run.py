@@ -13,6 +13,7 @@ from gear.config.dump import to_plain
 from gear.contracts.loggers import LoggedRun
 from gear.contracts.specs import ModelSpec, TaskSpec
 from gear.dataset.files import clear_scratch
+from gear.dataset.guarded_paths import remove_files
 from gear.dataset.locks import exclusive_lock
 from gear.dataset.reading import scenes_of
 from gear.dataset.store import check_output
@@ -22,6 +23,7 @@ from gear.measuring.run_log import FOLDER, RunLog, choose_logger
 from gear.networks.runtime import device_of, prepare
 from gear.plugins.build import blamed, find
 from gear.plugins.catalogue import PluginEntry
+from gear.plugins.text import one_line
 from gear.readers import Kept, Samples, all_of, open_all
 from gear.reporting.display import displayed
 from gear.values.errors import GearError
@@ -36,7 +38,7 @@ from gear.verbs.train.feed import Feed
 from gear.verbs.train.loop import OnStep, Parts, Training
 from gear.verbs.train.request import TrainRequest
 from gear.verbs.train.results import WEIGHTS, Origin, command_of, known, metrics_of, packed, write_history
-from gear.verbs.train.run_log import TrainLog
+from gear.verbs.train.run_log import SAMPLES_FILE, TrainLog, write_samples
 from gear.verbs.train.sizes import picture_scale, without_empty_margins
 from gear.verbs.train.starting import (
     build_network,
@@ -124,7 +126,8 @@ def train(
         task: name of a task plugin.
         model: name of a model plugin that can do the task and be trained.
         data: roots of datasets, folders of roots, or `DIR:SPLIT`.
-        out: folder of the results: `model.safetensors`, `train.json`, `card.md`, `curves.png`.
+        out: folder of the results: `model.safetensors`, `train.json`, `card.md`, `curves.png`,
+            `samples.jpg`.
         val: validation data; by default some sequences of `data` are held out.
         epochs, time_budget_s, batch, lr, seed, init, precision, device, workers: values of the config keys with these
             names (`lr` is `learning_rate`); None takes the network's default. `TrainConfig` describes the keys.
@@ -195,6 +198,7 @@ def run_train(request: TrainRequest, callbacks: Callbacks, on_step: OnStep | Non
         )
         state = training.run()
         write_curves(root, spec, state, title)
+        _write_samples(parts, callbacks.on_warning)
         write_history(root, origin, state)
         clear_scratch(root)
     best = next(entry for entry in state.validations if entry["step"] == state.best_step)
@@ -207,6 +211,18 @@ def run_train(request: TrainRequest, callbacks: Callbacks, on_step: OnStep | Non
         metrics=known(metrics_of(best)),
         metric=spec.metric,
     )
+
+
+def _write_samples(parts: Parts, on_warning: Warn) -> None:
+    """Writes the figure of validation samples with predictions by the final weights; a warning states that it cannot
+    be drawn, and then there is no figure.
+    """
+    remove_files(parts.root, [SAMPLES_FILE])
+    try:
+        load_initial_weights(parts.found, parts.twin, str(parts.root / WEIGHTS))
+        write_samples(parts.root, parts.task, parts.twin, parts.views, parts.validation)
+    except Exception as error:  # a task or a network of another package
+        on_warning(f"{parts.root}: no {SAMPLES_FILE} ({one_line(error)})")
 
 
 def with_progress(on_step: OnStep | None, callbacks: Callbacks) -> OnStep:

@@ -1,15 +1,20 @@
-"""Logs a training (`--log-to`): losses, learning rate, metrics, and predictions on validation samples."""
+"""Logs a training (`--log-to`): losses, learning rate, metrics, and predictions on validation samples. The figure of
+the finished training is also written without a log.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import torch
 
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
+from gear.dataset.files import write_whole
 from gear.measuring.run_log import RunLog
 from gear.measuring.sample_figures import ShownPictures, ShownSample, sample_figure
 from gear.networks.runtime import as_bytes, seeded
@@ -25,6 +30,9 @@ SAMPLES = 3
 
 FIGURE = "validation samples (close to the ground truth is better)"
 """Name of the figure of samples."""
+
+SAMPLES_FILE, QUALITY = "samples.jpg", 92
+"""Name of the figure of the finished training in its folder, and its JPEG quality."""
 
 
 def metric_title(name: str, spec: TaskSpec[Any]) -> str:
@@ -110,6 +118,21 @@ class TrainLog:
     def flush(self) -> None:
         """Makes the logger store all entries; called before a checkpoint is written."""
         self._log.flush()
+
+
+def write_samples(root: Path, task: Task[Any, Any], network: Any, views: Sequence[str], samples: Sequence[Any]) -> None:
+    """Writes `samples.jpg`: validation samples with predictions and ground truth. It depends only on its arguments.
+
+    Args:
+        root: folder of the training.
+        task, network, views, samples: those of `figure_of`.
+
+    Raises:
+        Exception: whatever the task or the network raises; they may belong to another package.
+    """
+    figure = figure_of(task, network, views, samples)
+    data = cv2.imencode(".jpg", figure[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1]
+    write_whole(root, SAMPLES_FILE, data.tobytes())
 
 
 def figure_of(task: Task[Any, Any], network: Any, views: Sequence[str], samples: Sequence[Any]) -> UInt8Image:

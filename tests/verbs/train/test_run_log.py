@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 
 from gear.cli.main import main
+from gear.formats.png import decode_rgb
+from gear.measuring.sample_figures import CELL_WIDTH_PX
 from gear.plugins.manager import catalogue
 from gear.testing.tiny_networks import tiny_segmenter
 from gear.verbs.train import loop
@@ -40,6 +42,12 @@ def test_a_training_is_logged_and_its_weights_are_the_same(
     report = quick(street, tmp_path / "out")
     assert report.weights.read_bytes() == plain.weights.read_bytes()
     assert report.metrics == plain.metrics
+    figure = (tmp_path / "plain/samples.jpg").read_bytes()
+    assert figure == (tmp_path / "out/samples.jpg").read_bytes()
+    assert "![validation samples](samples.jpg)" in (tmp_path / "plain/card.md").read_text()
+    cells = 3  # picture, prediction and ground truth of the held-out sample
+    height, width = decode_rgb(figure).shape[:2]
+    assert width == cells * CELL_WIDTH_PX and height > CELL_WIDTH_PX // 2
     found = read_log(tmp_path / "out/log")
     assert [step for step, _ in found.scalars[LOSS]] == [2, 4, 6, 8, 10, 12] == [s for s, _ in found.scalars[MIOU]]
     assert [step for step, _ in found.scalars[TRAINING_LOSS]] == [2, 4, 6, 8, 10, 12]
@@ -78,6 +86,8 @@ def test_a_task_that_cannot_draw_loses_no_weights(
     warnings: list[str] = []
     report = quick(street, tmp_path, epochs=2, on_warning=warnings.append)
     assert report.weights.is_file()
+    assert any("no samples.jpg (RuntimeError: no colours)" in line for line in warnings)
+    assert not (tmp_path / "samples.jpg").exists() and "samples.jpg" not in (tmp_path / "card.md").read_text()
     (warning,) = [line for line in warnings if "no figures" in line]
     assert "RuntimeError: no colours" in warning
     found = read_log(tmp_path / "log")

@@ -130,7 +130,7 @@ def test_a_killed_process_is_taken_up_again(street: Street, tmp_path: Path, inst
 def test_what_is_half_written_lies_where_the_next_run_tidies_up(
     street: Street, tmp_path: Path, install: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    results = ["card.md", "checkpoint.safetensors", "curves.png", "model.safetensors", "train.json"]
+    results = ["card.md", "checkpoint.safetensors", "curves.png", "model.safetensors", "samples.jpg", "train.json"]
     street("semseg")
     beside: set[str] = set()
     sync = os.fsync
