@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from scipy import ndimage
 
@@ -19,6 +18,7 @@ from gear.contracts.evaluation import WithObjects
 from gear.contracts.tasks import Sample, Task
 from gear.formats import cityscapes, coco, rle
 from gear.formats.kitti_object import label_corners, to_edge_pixels
+from gear.formats.png import decode_plain
 from gear.groundtruth.silhouettes import NEAR_M
 from gear.metrics.object_changes import ObjectChange
 from gear.plugins.tasks.depth import PREVIEW_DEPTHS_M, DepthSample
@@ -26,6 +26,7 @@ from gear.plugins.tasks.detect2d import Detect2dSample, Object2d
 from gear.plugins.tasks.semseg import SemsegSample
 from gear.plugins.tasks.stereo3d import Object3d, Stereo3dSample
 from gear.values.ground_truth import BoxPx
+from gear.values.regular_file import read_regular
 
 Labels = dict[str, Any]
 """FiftyOne's labels of one picture by name of the field."""
@@ -251,11 +252,14 @@ def _depth_map(fiftyone: Any, depth_m: Any, files: Iterable[Path]) -> Any:
 
 
 def _stored_map(path: Path) -> Any:
-    """Reads a PNG with one channel; None for other files."""
+    """Reads a PNG with one channel; None for other files and for damaged ones."""
     if path.suffix.lower() != ".png":
         return None
-    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    return stored if stored is not None and stored.ndim == 2 else None
+    try:
+        stored = decode_plain(read_regular(path))
+    except (OSError, ValueError):
+        return None
+    return stored if stored.ndim == 2 else None
 
 
 def _patches(fiftyone: Any, sample: Sample, camera: str) -> Any:

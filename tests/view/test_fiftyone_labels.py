@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -97,6 +98,15 @@ def test_a_label_map_is_the_file_of_the_dataset(opened: Opened) -> None:
         assert cityscapes.LABELS[one.cityscapes_id // 1000].name == one.label
     instances = np.where(sample.instance_ids >= 1000, sample.instance_ids, 0)
     assert instances.any() and np.array_equal(painted, instances)
+
+
+def test_files_that_are_no_pictures_are_not_shown(opened: Opened, tmp_path: Path) -> None:
+    dataset = opened("semseg", 1)
+    os.mkfifo(tmp_path / "fifo.png")
+    (tmp_path / "cut.png").write_bytes(_files(dataset, 0)[0].read_bytes()[:60])
+    files = [tmp_path / name for name in ("fifo.png", "cut.png", "gone.png")]
+    label = truth_labels(STAND_IN, dataset.task, dataset[0], files)["left"]["labels"]
+    assert np.array_equal(label.mask, dataset[0].label_ids)
 
 
 def test_a_depth_map_is_the_16_bit_file_with_the_range_of_the_preview(opened: Opened) -> None:
