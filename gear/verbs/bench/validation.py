@@ -11,9 +11,10 @@ from gear.config.load import load_collection
 from gear.config.nodes import Node
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
+from gear.contracts.defenses import DifferentiableDetector
 from gear.contracts.specs import AttackSpec, DefenseSpec, Kind, ModelSpec, TaskSpec
 from gear.measuring.plugin_selection import Chosen, check_defense, chosen_defense, chosen_model
-from gear.plugins.build import NO_OPTIONS, find
+from gear.plugins.build import NO_OPTIONS, build, find
 from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError
 from gear.verbs.attack.models import check_attack
@@ -69,18 +70,23 @@ class Candidate:
         return isinstance(spec, DefenseSpec) and "images" in spec.outputs
 
     def supports_adaptive_attack(self, attack: AttackSpec[object]) -> bool:
-        """Whether this is a defense that changes pictures and supports the attack, so patches can be optimised against
-        it. False for a network.
+        """Whether this is a defense that the attack can take into account, so patches can be optimised against it.
+        False for a network.
 
-        A defense supports attacks with gradients only if it passes gradients.
+        An attack with gradients needs a defense that passes gradients. A defense that leaves the pictures unchanged can
+        be taken into account only by its differentiable score or mask.
 
         Args:
             attack: spec of the attack.
         """
         spec = self.chosen.found.spec
-        if not isinstance(spec, DefenseSpec) or "images" not in spec.outputs:
+        if not isinstance(spec, DefenseSpec):
             return False
-        return not attack.needs_gradients or spec.gradient != "none"
+        if self.changes_pictures:
+            return not attack.needs_gradients or spec.gradient != "none"
+        if spec.gradient == "none" or not attack.needs_gradients:
+            return False
+        return isinstance(build(self.chosen.found, self.chosen.options), DifferentiableDetector)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -48,7 +48,7 @@ class Looks:
 def test_the_whole_way_and_again(tmp_path: Path, written: Callable[..., Path]) -> None:
     config, out, looks = written(), tmp_path / "out", Looks()
     report = gear.bench(config, out=out, log_to="tensorboard", **callbacks(looks))
-    assert looks.steps[0] == "1/37 collect" and looks.steps[-1] == "37/37 evaluate"
+    assert looks.steps[0] == "1/45 collect" and looks.steps[-1] == "45/45 evaluate"
     assert looks.lessons and looks.done
     (task,) = report.tasks
     assert [(one.model, one.defense) for one in task.results] == [
@@ -57,7 +57,7 @@ def test_the_whole_way_and_again(tmp_path: Path, written: Callable[..., Path]) -
     small, blurred, unusual = task.results[:3]
     assert [pool.name for pool in small.evaluation.pools] == [*KINDS, "patch of second"]
     assert [pool.name for pool in blurred.evaluation.pools] == [*KINDS, "adaptive patch"]
-    assert [pool.name for pool in unusual.evaluation.pools] == KINDS
+    assert [pool.name for pool in unusual.evaluation.pools] == [*KINDS, "adaptive patch"]
     assert all(pool.samples == 4 for one in task.results for pool in one.evaluation.pools)
     _check_metrics(report)
     _check_files(out, report)
@@ -115,8 +115,8 @@ def _check_files(out: Path, report: BenchReport) -> None:
     against = "against the network without a defense and without a patch"
     assert all(against in shown for shown in (page, (out / "table.txt").read_text()))
     assert "other pictures of a scene in each weather" in page, "a patch is made on those of all weathers together"
-    patched = 2 * 2  # against two networks, alone and behind a defense that is looked through
-    predicted = 2 * 2 * (5 + 2 + 2 + 1)  # of two networks in two pictures: alone, behind blur (twice), behind fpda
+    patched = 2 * 3  # against two networks, alone and behind each of two defenses
+    predicted = 2 * 2 * (5 + 2 + 2 + 1 + 1)  # two networks, two pictures: alone, behind blur and fpda (twice)
     scenes = (1 + patched * (1 + 1)) + (1 + patched * (1 + 2))  # of one and two surfaces
     assert page.count("<figure>") == scenes + predicted + 1, "and one legend"
     assert "http" not in page.replace("http-equiv", "")

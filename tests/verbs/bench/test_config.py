@@ -133,10 +133,13 @@ def test_no_two_purposes_show_the_same_pictures(written: Written, tmp_path: Path
 
 def test_patches_look_through_defenses_only_if_they_are_to(written: Written, tmp_path: Path) -> None:
     through = [given.get("defense") for given in arguments(prepared(written(), out=tmp_path), "attack")]
-    assert through.count("gaussian") == 4 and "fpda" not in through, "fpda leaves pictures as they are"
+    assert through.count("gaussian") == 4 and through.count("fpda") == 4
+    by_queries = prepared(written(("attack: {steps: 2}", "attack: {plugin: square, queries: 8}")), out=tmp_path)
+    through = [given.get("defense") for given in arguments(by_queries, "attack")]
+    assert through.count("gaussian") == 4 and "fpda" not in through, "queries see no score of a defense"
     learnt = arguments(prepared(written(LEARNS), out=tmp_path), "attack")
     assert [given.get("defense") for given in learnt].count("zmask") == 4
-    assert all(("calibration_patched" in given) == (given.get("defense") == "zmask") for given in learnt)
+    assert all(("calibration_patched" in given) == (given.get("defense") in ("fpda", "zmask")) for given in learnt)
     plain = prepared(written(("adaptive: true", "adaptive: false")), out=tmp_path)
     assert all("defense" not in given for given in arguments(plain, "attack"))
 

@@ -31,7 +31,7 @@ def test_a_record_holds_what_a_check_needs(
     assert (record.entry.kind, alone.record.entry.kind) == ("defense", "model")
     assert record.entry.defense is not None and record.entry.defense.package == "mujoco-gear"
     assert record.entry.network.weights_sha256 and not record.entry.is_random
-    assert record.kinds() == ("none", "random", "patch") and len(record.data) == 3
+    assert record.kinds() == ("none", "random", "patch", "adaptive patch") and len(record.data) == 4
     assert [one.patch for one in record.calibration] == ["none", "patch"]
     assert {one.scene for one in record.patches} == {"tiny-board", "tiny-truck"}, "the scene of calibration, too"
     for one in record.patches:
