@@ -34,6 +34,7 @@ ALLOWED = {
     "verbs/scaffold/write.py": {"rename", "rmtree", "write_text"},  # of a folder that it has just made
     "verbs/verify/recipe.py": {"write_bytes"},  # into a temporary folder
     "world/compilation/world_cache.py": {"rename", "rmtree", "unlink", "open"},  # gear's own cache
+    "camera/occlusion_cache.py": {"replace", "unlink"},  # likewise
     "world/compilation/mjb.py": {"open"},  # likewise
     "world/compilation/compiled_world.py": {"write_text"},  # into a temporary folder
     "world/compilation/compose.py": {"write_bytes"},  # likewise
