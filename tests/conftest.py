@@ -11,12 +11,13 @@ from pathlib import Path
 
 import pytest
 
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("MUJOCO_GL", "egl")  # tests of assets draw without a display; read when mujoco is first imported
+
 import authoring
 from tests import compiled_worlds
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")
 assert authoring.KERNELS in os.environ
-
 
 COMPILED = compiled_worlds.install(pytest.MonkeyPatch())
 
