@@ -12,6 +12,7 @@ import functools
 import hashlib
 import io
 import os
+import re
 import tempfile
 import zipfile
 from pathlib import Path
@@ -23,9 +24,13 @@ from gear.camera import contact_shadows, fractal, surface_points
 from gear.camera.contact_shadows import SkyOcclusion, grid_of
 from gear.values.frames import Shape
 from gear.values.regular_file import read_regular
+from gear.values.user_cache import user_cache_folder
 
 MOST_MAPS = 2000
-"""Largest number of files in the cache; the town with most assets has 85. The oldest files are removed."""
+"""Largest number of maps in the cache; the town with most assets has 85. The oldest maps are removed."""
+
+_OWN = re.compile(r"[0-9a-f]{32}\.npz|\.making-\w+\.npz")
+"""Names of files that this cache writes; other files in its folder are never removed."""
 
 _MOST_BYTES = 16 << 20
 _CODE = (contact_shadows, fractal, surface_points)
@@ -44,7 +49,7 @@ def cached_occlusion(shape: Shape, folder: Path | None = None) -> SkyOcclusion:
         The same values as `SkyOcclusion.of`.
     """
     try:
-        cache = folder or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gear" / "sky-occlusion"
+        cache = folder or user_cache_folder() / "sky-occlusion"
     except RuntimeError:  # the user has no home folder
         return SkyOcclusion.of(shape)
     path = cache / f"{_key(shape)}.npz"
@@ -100,6 +105,15 @@ def _write(path: Path, occlusion: SkyOcclusion) -> None:
         except BaseException:
             Path(name).unlink(missing_ok=True)
             raise
-        maps = [(entry.stat().st_mtime, entry.path) for entry in os.scandir(path.parent) if entry.is_file()]
-        for _, oldest in sorted(maps)[: max(0, len(maps) - MOST_MAPS)]:
-            Path(oldest).unlink(missing_ok=True)
+        _remove_oldest(path.parent)
+
+
+def _remove_oldest(folder: Path) -> None:
+    """Removes the oldest maps of a full cache, and with them files that killed runs left unfinished."""
+    maps = [
+        (entry.stat(follow_symlinks=False).st_mtime, entry.path)
+        for entry in os.scandir(folder)
+        if _OWN.fullmatch(entry.name) and entry.is_file(follow_symlinks=False)
+    ]
+    for _, oldest in sorted(maps)[: max(0, len(maps) - MOST_MAPS)]:
+        Path(oldest).unlink(missing_ok=True)

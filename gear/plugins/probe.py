@@ -29,6 +29,7 @@ from typing import Any
 
 from gear.plugins.text import printable
 from gear.values.machine import cores
+from gear.values.user_cache import user_cache_folder
 
 LIMIT_S = 30.0
 """Time limit in seconds for the import and the hooks of a plugin; importing torch takes far less."""
@@ -176,7 +177,7 @@ def _signal_name(number: int) -> str:
 def _cache_file() -> Path | None:
     """Path of the cache file; None if the user has no home folder."""
     try:
-        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gear" / "plugins.json"
+        return user_cache_folder() / "plugins.json"
     except RuntimeError:
         return None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -87,6 +88,26 @@ def test_a_folder_that_cannot_be_made_only_costs_time(tmp_path: Path, shape: Sha
 
 def test_a_full_cache_loses_its_oldest_maps(tmp_path: Path, shape: Shape, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(occlusion_cache, "MOST_MAPS", 2)
-    for share in (0.9, 0.8, 0.7):
+    kept: list[set[Path]] = []
+    for number, share in enumerate((0.9, 0.8, 0.7)):
         cached_occlusion(replace(shape, vertices_m=share * shape.vertices_m), tmp_path)
-    assert len(list(tmp_path.iterdir())) == 2
+        kept.append(set(tmp_path.iterdir()))
+        for path in kept[-1] - set().union(*kept[:-1]):
+            os.utime(path, (number, number))
+    assert len(kept[-1]) == 2 and not kept[0] & kept[-1], "the first map is the oldest"
+
+
+def test_a_full_cache_keeps_files_that_are_not_its_own(
+    tmp_path: Path, shape: Shape, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(occlusion_cache, "MOST_MAPS", 0)
+    folder, elsewhere = tmp_path / "cache", tmp_path / "mine.npz"
+    folder.mkdir()
+    elsewhere.write_bytes(b"mine")
+    (folder / "thesis.npz").write_bytes(b"mine")
+    (folder / f"{'a' * 32}.npz").symlink_to(elsewhere)
+    left = folder / ".making-abc_123.npz"
+    left.write_bytes(b"half")
+    cached_occlusion(shape, folder)
+    assert {path.name for path in folder.iterdir()} == {"thesis.npz", f"{'a' * 32}.npz"}
+    assert elsewhere.read_bytes() == b"mine"

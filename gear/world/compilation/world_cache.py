@@ -26,6 +26,7 @@ import mujoco
 from gear.values.errors import GearError
 from gear.values.scene import Weather
 from gear.values.serial import Json, to_json
+from gear.values.user_cache import user_cache_folder
 from gear.world.assets.asset_hash import asset_files, assets_digest
 from gear.world.assets.library import AssetLibrary
 from gear.world.compilation.compiled_world import CompiledWorld, compile_world
@@ -81,7 +82,7 @@ def load_or_compile(
 def _folder(cache_dir: Path | None) -> Iterator[Path]:
     """The cache's folder; a temporary folder if the user's cache folder cannot be written."""
     try:
-        folder = cache_dir or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gear" / "worlds"
+        folder = cache_dir or user_cache_folder() / "worlds"
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         usable = os.access(folder, os.W_OK)
     except (OSError, RuntimeError):
