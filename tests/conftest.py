@@ -1,6 +1,7 @@
 """For every test: torch keeps to one thread, so that tests beside each other do not wait for each other's threads.
 
-NumPy is to multiply matrices as it does when assets are made.
+NumPy is to multiply matrices as it does when assets are made. MuJoCo draws without a display. Worlds of the tiny town
+are compiled once per process.
 """
 
 from __future__ import annotations

@@ -23,7 +23,9 @@ SEEDS = 3
 """Number of seeds with which a random defense must be measured."""
 
 LEAST_RETAINED = 0.5
-"""Share of its gain under static patches that a defense must keep under adaptive patches."""
+"""Share of its gain under static patches, or of its AUROC above chance, that a defense must keep under adaptive
+patches.
+"""
 
 LEAST_KEPT = 0.5
 """Share of the predicted rise of an objective along its gradient below which gradients count as masked."""
@@ -79,11 +81,17 @@ def is_clearly_worse(record: Record, one: Figure, other: Figure) -> bool:
         one: a number with a value.
         other: a number with a value.
     """
+    return _is_clearly(record, one, other, is_worse=True)
+
+
+def _is_clearly(record: Record, one: Figure, other: Figure, *, is_worse: bool) -> bool:
+    """`is_clearly_worse`, or the same with `better` in place of `worse`."""
     assert other.value is not None
-    near = one.low if record.entry.lower_is_better else one.high
+    is_higher = is_worse == record.entry.lower_is_better
+    near = one.low if is_higher else one.high
     if near is None:
-        return harm(record, one, other) > 0
-    return other.value < near if record.entry.lower_is_better else other.value > near
+        return (harm(record, one, other) if is_worse else harm(record, other, one)) > 0
+    return near > other.value if is_higher else near < other.value
 
 
 def clean_loss(record: Record) -> float | None:
@@ -120,16 +128,8 @@ def survives_only_static(record: Record) -> bool:
     if alone.value is None or static.value is None or adaptive.value is None:
         return False
     gained, kept = harm(record, alone, static), harm(record, alone, adaptive)
-    is_clear = gained > 0 and _is_clearly_better(record, static, alone) and is_clearly_worse(record, adaptive, static)
-    return is_clear and kept < LEAST_RETAINED * gained
-
-
-def _is_clearly_better(record: Record, one: Figure, other: Figure) -> bool:
-    far = one.high if record.entry.lower_is_better else one.low
-    assert other.value is not None
-    if far is None:
-        return harm(record, other, one) > 0
-    return other.value > far if record.entry.lower_is_better else other.value < far
+    is_clear = gained > 0 and _is_clearly(record, static, alone, is_worse=False)
+    return is_clear and is_clearly_worse(record, adaptive, static) and kept < LEAST_RETAINED * gained
 
 
 def faults(records: Sequence[Record]) -> list[str]:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
-
-os.environ.setdefault("MUJOCO_GL", "egl")  # read when mujoco and dm_control are imported
 
 import cv2
 import mujoco

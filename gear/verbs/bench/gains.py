@@ -6,13 +6,11 @@ The intervals are those of paired differences: each jackknife replicate leaves t
 from __future__ import annotations
 
 from gear.contracts.tasks import NO_PATCH
+from gear.leaderboard.rules import LEAST_RETAINED
 from gear.measuring.statistics import difference_interval
 from gear.verbs.bench.plan import ADAPTIVE, PATCH
 from gear.verbs.bench.report import Result, TaskResult
 from gear.verbs.evaluate.report import Estimate, Pool
-
-LEAST_RETAINED = 0.5
-"""Share of its gain, or of its AUROC above chance, that a defense must keep under adaptive patches."""
 
 CHANCE = 0.5
 """AUROC of a score that does not depend on the patch."""
