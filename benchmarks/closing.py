@@ -1,15 +1,15 @@
 """Measures closing a large split: `python benchmarks/closing.py [SAMPLES] [TASK]`.
 
-The split is synthetic: each sidecar is that of a drawn scene with an index of its own, and pictures are left out,
-since closing reads none of them. Then the split is extended by 1 % and closed again.
+The split is synthetic: a few scenes are drawn, and each sidecar is a copy of one of them with another index. There are
+no pictures, because closing reads none. Afterwards the split is extended by 1 % and closed again.
 """
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import multiprocessing
 import resource
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -24,10 +24,11 @@ from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
 
 DRAWN = 8
-"""Scenes that are drawn; the others repeat them."""
+"""Number of scenes that are drawn; the sidecars repeat them."""
 
 
 def plan_of(task: str, samples: int) -> Plan:
+    """The plan of a synthetic split."""
     return Plan(
         task={"name": task, "package": "mujoco-gear", "version": "0"},
         options={},
@@ -85,8 +86,13 @@ def in_process(function: Any, *arguments: Any) -> None:
     process.join()
 
 
-def main(samples: int, task: str) -> None:
+def main() -> None:
     """Prints one line for the split, and one for its extension."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("samples", nargs="?", type=int, default=20_000)
+    parser.add_argument("task", nargs="?", default="detect2d")
+    args = parser.parse_args()
+    samples, task = args.samples, args.task
     with tempfile.TemporaryDirectory(prefix="gear-closing-") as folder:
         root = Path(folder)
         fill(root, task, 0, samples)
@@ -97,4 +103,4 @@ def main(samples: int, task: str) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20_000, sys.argv[2] if len(sys.argv) > 2 else "detect2d")
+    main()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections.abc import Callable
 from functools import partial
@@ -15,7 +15,7 @@ TRIES = 5
 
 
 def milliseconds(call: Callable[[], object]) -> float:
-    """Processor time of a call, the least of several."""
+    """Shortest processor time of `TRIES` calls, milliseconds."""
     best = float("inf")
     for _ in range(TRIES):
         start = time.process_time()
@@ -30,9 +30,11 @@ def check_all(root: Path, files: dict[str, str]) -> None:
         check_hash(root, path, digest)
 
 
-def main(roots: list[str]) -> None:
+def main() -> None:
     """Prints one line for each dataset."""
-    for root in roots:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("datasets", nargs="+", metavar="DATASET")
+    for root in parser.parse_args().datasets:
         dataset = gear.open_dataset(root)
         sidecar = dataset.sidecar(0)
         auxiliary = {file.path for file in sidecar.auxiliary.values()}
@@ -40,8 +42,8 @@ def main(roots: list[str]) -> None:
         size = sum((dataset.root / path).stat().st_size for path in files) / 1e6
         sample = milliseconds(partial(dataset.__getitem__, 0))
         hashes = milliseconds(partial(check_all, dataset.root, files))
-        print(f"{root}: {sample:.1f} ms a sample, {hashes:.1f} ms of it for hashes of {size:.1f} MB")
+        print(f"{root}: {sample:.1f} ms per sample, of which {hashes:.1f} ms for hashes of {size:.1f} MB")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -9,9 +9,9 @@ alarms. Car, bus and truck count as one class. AP50 is pycocotools'.
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import io
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -90,10 +90,15 @@ def ap50(truth: dict[str, Any], results: list[dict[str, Any]]) -> tuple[float, f
     return float(values[0][0]), float(values[1][1]), count
 
 
-def main(weights: str, roots: list[str]) -> None:
-    model = build(OfficialDetectorOptions(weights=weights))
+def main() -> None:
+    """Prints one line for each dataset."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("weights", metavar="WEIGHTS")
+    parser.add_argument("datasets", nargs="+", metavar="DATASET")
+    args = parser.parse_args()
+    model = build(OfficialDetectorOptions(weights=args.weights))
     print("dataset | people AP50 (n, recall) | vehicles AP50 (n, recall)")
-    for root in roots:
+    for root in args.datasets:
         dataset = gear.open_dataset(root)
         samples = [dataset[index] for index in range(len(dataset))]
         found = [model.predict(sample.images) for sample in samples]
@@ -105,6 +110,4 @@ def main(weights: str, roots: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 3:
-        sys.exit(__doc__)
-    main(sys.argv[1], sys.argv[2:])
+    main()

@@ -12,11 +12,12 @@ person's are, to a tenth of the crop's height.
 
 from __future__ import annotations
 
-import sys
+import argparse
+import importlib
 from pathlib import Path
+from typing import Any
 
 import cv2
-import mediapipe  # type: ignore[import-not-found]
 import numpy as np
 
 HEAD, FEET = slice(0, 11), slice(27, 33)
@@ -27,12 +28,16 @@ HEAD_AT, FEET_AT = 0.16, 0.87
 
 
 def main() -> None:
-    """Prints a line for people and one for nobody."""
+    """Prints one line for the crops with people, and one for the crops without."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("crops", type=Path, metavar="CROPS", help="folder that recognise.py --people wrote")
+    crops = parser.parse_args().crops
+    mediapipe: Any = importlib.import_module("mediapipe")
     pose = mediapipe.solutions.pose.Pose(static_image_mode=True, model_complexity=1)
     print(f"{'crops of':10}{'crops':>7}{'found':>8}{'in place':>10}")
     for name in ("people", "nobody"):
         found, in_place = [], []
-        for path in sorted((Path(sys.argv[1]) / name).glob("*.png")):
+        for path in sorted((crops / name).glob("*.png")):
             marks = pose.process(np.ascontiguousarray(np.asarray(cv2.imread(str(path)))[..., ::-1])).pose_landmarks
             found.append(marks is not None)
             heights = np.array([mark.y for mark in marks.landmark]) if marks else np.full(33, np.nan)

@@ -8,11 +8,12 @@
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
-import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import closing
 
@@ -52,7 +53,7 @@ def soak(samples: int) -> None:
             settings=[f"scenes={TINY_SCENES}", "options.width_px=256", "options.height_px=128"],
             on_progress=show,
         )
-    print(f"processor: {(time.process_time() - processor) / samples * 1000:.1f} ms a sample")
+    print(f"processor: {(time.process_time() - processor) / samples * 1000:.1f} ms per sample")
 
 
 def store(samples: int) -> None:
@@ -105,12 +106,18 @@ class Timed:
         print(f"{self.what}: {wall:.1f} s, processor {processor:.1f} s, memory {memory_mib():.0f} MiB", flush=True)
 
 
+def main() -> None:
+    """Runs one of the three measurements."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("measurement", nargs="?", default="soak", choices=tuple(DEFAULTS))
+    parser.add_argument("numbers", nargs="*", type=int, metavar="SAMPLES")
+    args = parser.parse_args()
+    function, *defaults = DEFAULTS[args.measurement]
+    function(*args.numbers, *defaults[len(args.numbers) :])
+
+
+DEFAULTS: dict[str, tuple[Any, ...]] = {"soak": (soak, 300), "store": (store, 10_000), "extend": (extend, 2000, 100)}
+"""Function and default numbers of samples of each measurement."""
+
 if __name__ == "__main__":
-    command, *numbers = sys.argv[1:] or ["soak"]
-    given = [int(number) for number in numbers]
-    if command == "soak":
-        soak(*(given or [300]))
-    elif command == "store":
-        store(*(given or [10_000]))
-    else:
-        extend(*(given or [2000, 100]))
+    main()

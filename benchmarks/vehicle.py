@@ -6,8 +6,8 @@ per second, and prints the simulated seconds per second of processor time.
 
 from __future__ import annotations
 
+import argparse
 import math
-import sys
 import time
 
 from gear.collecting.lookup import look_up
@@ -22,12 +22,13 @@ from gear.world.compilation.world_cache import load_or_compile
 STARTS, SECONDS = 5, 8.0
 
 
-def main(town: str, scene: str) -> None:
-    """Prints the speed of the physics.
-
-    Args:
-        town, scene: names of the place.
-    """
+def main() -> None:
+    """Prints the speed of the physics."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("town", nargs="?", default="town10")
+    parser.add_argument("scene", nargs="?", default="billboard01")
+    args = parser.parse_args()
+    town, scene = args.town, args.scene
     config = load_collection(None, {"task": "semseg", "town": town, "scene": scene}, [])
     named = look_up(config)
     world = load_or_compile(town=config.town, scene_name=config.scene, scene=named.scene, weather=named.weather)
@@ -50,4 +51,4 @@ def main(town: str, scene: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*(sys.argv[1:] or ["town10", "billboard01"]))
+    main()
