@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from gear.leaderboard.field_checks import check_name, check_number, check_sha256
 
-Key = tuple[str, str, float, int, str]
-"""Scene, scenario, speed in km/h, seed, and kind of patch of a drive."""
+Key = tuple[str, str, str, float, int, str]
+"""Scene, weather, scenario, speed in km/h, seed, and kind of patch of a drive."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,6 +29,7 @@ class DriveClaim:
         is_crash: whether the car crashed.
         score: CARLA's driving score, 0..1.
         log_sha256: SHA-256 of the drive's log.
+        weather: name of the weather in the benchmark; "" if the benchmark has only one.
     """
 
     scene: str
@@ -40,10 +41,13 @@ class DriveClaim:
     is_crash: bool
     score: float
     log_sha256: str
+    weather: str = ""
 
     def __post_init__(self) -> None:
         for field in ("scene", "scenario", "patch"):
             check_name(field, getattr(self, field))
+        if self.weather:
+            check_name("weather", self.weather)
         check_number("speed_kmh", self.speed_kmh, low=0, high=1000)
         check_number("seed", self.seed, low=0, high=1e18)
         check_number("score", self.score, low=0, high=1)
@@ -52,7 +56,7 @@ class DriveClaim:
     @property
     def key(self) -> Key:
         """What identifies the drive among those of its record."""
-        return self.scene, self.scenario, self.speed_kmh, self.seed, self.patch
+        return self.scene, self.weather, self.scenario, self.speed_kmh, self.seed, self.patch
 
 
 def crashes(drives: Iterable[DriveClaim], patch: str) -> list[bool]:

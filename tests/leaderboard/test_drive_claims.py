@@ -26,6 +26,7 @@ def test_collision_rates_follow_from_the_drives_without_free_roads() -> None:
     [
         {"scene": "../x"}, {"scenario": "<b>"}, {"speed_kmh": float("nan")}, {"speed_kmh": -1.0}, {"seed": -1},
         {"score": 1.5}, {"log_sha256": "x"}, {"patch": ""},
+        {"weather": "../x"},
     ],
 )  # fmt: skip
 def test_impossible_claims_are_refused(change: dict[str, Any]) -> None:

@@ -163,8 +163,8 @@ class Sweep:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveBench:
     """The drives of the benchmark in the closed loop (`gear drive`): every network, alone and behind each defense,
-    drives through scenarios in every scene, without a patch, with a random patch, and with the optimised patches. The
-    weather is the first of `weathers`.
+    drives through scenarios in every scene and weather, without a patch, with a random patch, and with the optimised
+    patches.
 
     Attributes:
         controllers: name of the controller plugin, by task; by default `<task>_baseline`.

@@ -20,6 +20,7 @@ from gear.metrics.critical_classes import CRITICAL
 from gear.metrics.obstacle_depth import NEAREST_OBSTACLE
 from gear.plugins.build import build, find
 from gear.values.rng import derive_rng
+from gear.values.serial import Json
 from gear.verbs.bench.config import BenchConfig, settings_of
 from gear.verbs.bench.scenes import Scene
 from gear.verbs.bench.validation import Candidate, TaskPlugins
@@ -78,10 +79,12 @@ class Weather:
     Attributes:
         label: name of the weather in folders and tables.
         settings: `KEY=VALUE` texts that select the weather in a collection.
+        parameters: the preset and the parameters that differ from it, as JSON.
     """
 
     label: str
     settings: tuple[str, ...]
+    parameters: Json
 
 
 class Plan:
@@ -405,7 +408,8 @@ def weathers(configs: tuple[WeatherConfig, ...]) -> Iterator[Weather]:
             label += "-again"
         seen.add(label)
         settings = [f"weather.{name}={value}" for name, value in given.items()]
-        yield Weather(label=label, settings=tuple(settings if len(given) > 1 else [f"weather={one.preset}"]))
+        selected = settings if len(given) > 1 else [f"weather={one.preset}"]
+        yield Weather(label=label, settings=tuple(selected), parameters=given)
 
 
 def _keywords(guard: Guard | None) -> dict[str, Any]:

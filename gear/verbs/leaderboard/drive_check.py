@@ -52,14 +52,15 @@ class Repeated:
     @property
     def key(self) -> Key:
         """What identifies the drive in a record."""
-        run = self.run
-        return self.planned.scene.label, run.scenario, run.speed_kmh, run.seed, self.planned.kind(run.twin)
+        run, planned = self.run, self.planned
+        return planned.scene.label, planned.weather, run.scenario, run.speed_kmh, run.seed, planned.kind(run.twin)
 
     @property
     def title(self) -> str:
         """The drive in a few words."""
-        scene, scenario, speed_kmh, seed, patch = self.key
-        return f"drive {scenario} at {speed_kmh:g} km/h in {scene}, seed {seed}, {patch}"
+        scene, weather, scenario, speed_kmh, seed, patch = self.key
+        where = f"{scene}, {weather}" if weather else scene
+        return f"drive {scenario} at {speed_kmh:g} km/h in {where}, seed {seed}, {patch}"
 
     @property
     def is_free(self) -> bool:

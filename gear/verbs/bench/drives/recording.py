@@ -16,7 +16,7 @@ def label_of(planned: PlannedDrives, evaluation: PlannedEvaluation) -> str | Non
     """The name of the driver that is a recorded network with its defense; None if it is not among the drives.
 
     Args:
-        planned: drives of one task in one scene.
+        planned: drives of one task in one scene and weather.
         evaluation: the recorded network, with its defense if it has one.
     """
     if planned.task_plugins.name != evaluation.task_plugins.name:
@@ -38,6 +38,7 @@ def drive_claims(section: DriveSection | None, evaluation: PlannedEvaluation) ->
     return tuple(
         DriveClaim(
             scene=planned.scene.label,
+            weather=planned.weather,
             scenario=one.run.scenario,
             speed_kmh=one.run.speed_kmh,
             seed=one.run.seed,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,15 +31,15 @@ Key = tuple[str, BenchDriver, str, str]
 """Task, driver, scenario and kind of patch of the drives in one line."""
 
 Situation = tuple[str, str, str, float, int]
-"""What `DriveRun.situation` returns."""
+"""What `DriveRun.situation` returns; with several weathers, the name of the scene is followed by the weather's."""
 
 TITLES = ("network", "defense", "controller", "patch", "drives", "collision rate", "impact km/h", "score", "p none",
           "p random")  # fmt: skip
 """Titles of the table in the report."""
 
 LEGEND = (
-    "drives in the closed loop, over all scenes and scenarios that are not free roads; collision rate: share of drives"
-    " that ended in a crash, with the exact 95 % interval of Clopper and Pearson; impact: mean speed at first contact;"
+    "drives in the closed loop, over all scenes, weathers and scenarios that are not free roads; collision rate: share"
+    " of drives that ended in a crash, with the exact 95 % interval of Clopper and Pearson; impact: mean speed at first contact;"
     " score: CARLA's driving score; p: McNemar's exact test of the crashes against the same situations without a patch"
     " and with a random patch"
 )
@@ -47,7 +47,7 @@ LEGEND = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveLine:
-    """The drives of one driver with one kind of patch over all scenes, in one scenario or in all.
+    """The drives of one driver with one kind of patch over all scenes and weathers, in one scenario or in all.
 
     Attributes:
         task: name of the task.
@@ -135,7 +135,7 @@ class DriveSection:
 
 
 def drive_section(made: Sequence[tuple[PlannedDrives, DriveReport]], root: Path) -> DriveSection:
-    """Gathers the drives of a benchmark over its scenes.
+    """Gathers the drives of a benchmark over its scenes and weathers.
 
     Args:
         made: the planned drives with their results.
@@ -147,7 +147,7 @@ def drive_section(made: Sequence[tuple[PlannedDrives, DriveReport]], root: Path)
     for planned, report in made:
         studies.append(planned.out.relative_to(root).as_posix())
         failed += report.failed
-        for one in report.results:
+        for one in (_in_weather(result, planned.weather) for result in report.results):
             driver, kind = planned.drivers[one.run.driver], planned.kind(one.run.twin)
             task = planned.task_plugins.name if driver.model else ""
             names = [one.run.scenario] if one.run.scenario in report.free else [one.run.scenario, ALL]
@@ -161,6 +161,13 @@ def drive_section(made: Sequence[tuple[PlannedDrives, DriveReport]], root: Path)
         failed=tuple(failed),
         made=tuple(made),
     )
+
+
+def _in_weather(result: DriveResult, weather: str) -> DriveResult:
+    """The result of a drive whose scene also names the weather, so that drives are paired only within a weather."""
+    if not weather:
+        return result
+    return replace(result, run=replace(result.run, scene=f"{result.run.scene}, {weather}"))
 
 
 def _order(key: Key, groups: Mapping[Key, Any]) -> tuple[int, bool, int]:

@@ -1,4 +1,4 @@
-"""The drives of a benchmark: one call of `gear.drive` for each task and scene.
+"""The drives of a benchmark: one call of `gear.drive` for each task, scene and weather.
 
 Every network drives, alone and behind each defense, with the patches that the benchmark has made.
 """
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gear.config.dump import node_to_json, to_plain
+from gear.config.dump import node_to_json
 from gear.config.nodes import Node
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
@@ -22,7 +22,7 @@ from gear.plugins.build import NO_OPTIONS
 from gear.values.errors import GearError
 from gear.values.serial import Json
 from gear.verbs.bench.config import DriveBench, flow_text
-from gear.verbs.bench.plan import ADAPTIVE, PATCH, RANDOM, Plan, Step, calibration_arguments
+from gear.verbs.bench.plan import ADAPTIVE, PATCH, RANDOM, Plan, Step, Weather, calibration_arguments
 from gear.verbs.bench.scenes import Scene, located
 from gear.verbs.bench.validation import Candidate, TaskPlugins
 
@@ -49,11 +49,12 @@ class BenchDriver:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlannedDrives:
-    """The drives of one task in one scene.
+    """The drives of one task in one scene and one weather.
 
     Attributes:
         task_plugins: networks and defenses of the task.
         scene: the scene.
+        weather: label of the weather; "" if the benchmark has only one.
         is_adaptive: whether the twin `patch` shows the patches that were optimised against a network behind its
             defense; otherwise those against the network alone.
         out: folder of the results.
@@ -64,6 +65,7 @@ class PlannedDrives:
 
     task_plugins: TaskPlugins
     scene: Scene
+    weather: str
     is_adaptive: bool
     out: Path
     drivers: dict[str, BenchDriver]
@@ -82,15 +84,15 @@ def every_step(plan: Plan) -> list[Step]:
 
 
 def planned_drives(plan: Plan) -> Iterator[PlannedDrives]:
-    """Yields the drives of a benchmark, by task and scene; none if the config has no key `drives`."""
+    """Yields the drives of a benchmark, by task, scene and weather; none if the config has no key `drives`."""
     asked = plan.config.drives
     if asked is None:
         return
     for task_plugins in plan.plugins_of_tasks:
-        for scene in plan.scenes:
-            yield _planned(plan, asked, task_plugins, scene, adaptive=False)
+        for scene, weather in plan.places():
+            yield _planned(plan, asked, task_plugins, (scene, weather), adaptive=False)
             if len(plan.adaptive_defenses(task_plugins)) > 1:
-                yield _planned(plan, asked, task_plugins, scene, adaptive=True)
+                yield _planned(plan, asked, task_plugins, (scene, weather), adaptive=True)
 
 
 def check_drives(plan: Plan, node: Node) -> None:
@@ -123,7 +125,8 @@ def settings(config: Json) -> tuple[str, ...]:
 
 
 def _step(planned: PlannedDrives, plan: Plan) -> Step:
-    what = " with adaptive patches" if planned.is_adaptive else ""
+    what = f", {planned.weather}" if planned.weather else ""
+    what += " with adaptive patches" if planned.is_adaptive else ""
     return Step(
         verb="drive",
         title=f"drive by {planned.task_plugins.name} in {planned.scene.label}{what}",
@@ -138,11 +141,12 @@ def _step(planned: PlannedDrives, plan: Plan) -> Step:
 
 
 def _planned(
-    plan: Plan, asked: DriveBench, task_plugins: TaskPlugins, scene: Scene, *, adaptive: bool
+    plan: Plan, asked: DriveBench, task_plugins: TaskPlugins, place: tuple[Scene, Weather], *, adaptive: bool
 ) -> PlannedDrives:
-    """The drives of a task in a scene; all drivers with the patches against networks alone, or with adaptive patches
-    those behind a defense that has them.
+    """The drives of a task in a scene and a weather; all drivers with the patches against networks alone, or with
+    adaptive patches those behind a defense that has them.
     """
+    scene, weather = place
     controller = asked.controllers.get(task_plugins.name, f"{task_plugins.name}_baseline")
     pictures = node_to_json(with_overrides(NO_OPTIONS, plan.picture_settings(task_plugins)))
     options = pictures.pop("options", {})
@@ -172,12 +176,14 @@ def _planned(
             )
     for name in () if adaptive else asked.references:
         configs[name], drivers[name] = {"controller": name}, BenchDriver(model=None, defense=None, controller=name)
-    folder = f"{scene.label}-adaptive" if adaptive else scene.label
+    folder = Path(f"{scene.label}-adaptive" if adaptive else scene.label)
+    label = weather.label if len(plan.weathers) > 1 else ""
     return PlannedDrives(
         task_plugins=task_plugins,
         scene=scene,
+        weather=label,
         is_adaptive=adaptive,
-        out=plan.root / FOLDER / task_plugins.folder / folder,
+        out=plan.root / FOLDER / task_plugins.folder / folder / label,
         drivers=drivers,
         config={
             "drivers": configs,
@@ -187,7 +193,7 @@ def _planned(
             "twins": [PATCH] if adaptive else [NO_PATCH, RANDOM, PATCH],
             "repeats": asked.repeats,
             "seed": plan.config.seed,
-            "weather": {key: value for key, value in to_plain(plan.config.weathers[0]).items() if value is not None},
+            "weather": weather.parameters,
             "crowd": asked.crowd,
             "video": asked.video,
             "open_loop": asked.open_loop,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 from gear.verbs.bench.drives.recording import drive_claims, label_of
+from gear.verbs.bench.drives.results import drive_section
 
-from .test_results import planned, section
+from .test_results import drive, planned, section, study
 
 
 def evaluation(model: str, defense: str | None, task: str = "depth") -> Any:
@@ -32,3 +34,10 @@ def test_each_drive_is_a_claim_with_its_kind_of_patch() -> None:
     assert sum(one.is_crash for one in guarded) == 10
     assert {one.patch for one in guarded if one.is_crash} == {"adaptive patch"}
     assert drive_claims(None, evaluation("net<", None)) == ()
+
+
+def test_claims_of_several_weathers_differ() -> None:
+    made = [(planned("a", weather=one), study([drive("net", "none", 0, "a")])) for one in ("Clear", "Wet")]
+    claims = drive_claims(drive_section(made, Path("out")), evaluation("net<", None))
+    assert [one.weather for one in claims] == ["Clear", "Wet"] and len({one.key for one in claims}) == 2
+    assert {one.scene for one in claims} == {"a"}

@@ -25,12 +25,13 @@ NET, GUARDED = (
 TRUTH = BenchDriver(model=None, defense=None, controller="truth")
 
 
-def planned(scene: str, *, is_adaptive: bool = False) -> PlannedDrives:
+def planned(scene: str, *, weather: str = "", is_adaptive: bool = False) -> PlannedDrives:
     plugins: Any = SimpleNamespace(name="depth")
     place: Any = SimpleNamespace(label=scene)
     return PlannedDrives(
-        task_plugins=plugins, scene=place, is_adaptive=is_adaptive, out=Path("out/drives/depth") / scene,
-        drivers={"net": NET, "net-d": GUARDED, "truth": TRUTH}, config={}, inputs=(),
+        task_plugins=plugins, scene=place, weather=weather, is_adaptive=is_adaptive,
+        out=Path("out/drives/depth") / scene, drivers={"net": NET, "net-d": GUARDED, "truth": TRUTH}, config={},
+        inputs=(),
     )  # fmt: skip
 
 
@@ -70,6 +71,19 @@ def test_drives_of_all_scenes_are_gathered_and_paired() -> None:
     assert found[TRUTH, "all", "none"].crashes.total == 10, "references of several tasks count once"
     assert found[NET, "free_road", "none"].crashes.total == 2 and found[NET, "all", "none"].crashes.total == 10
     assert patch.impact_mps == pytest.approx(5.0) and found[NET, "all", "none"].impact_mps is None
+
+
+def test_drives_are_paired_within_their_weather() -> None:
+    """The same five situations in two weathers: without a patch the network crashes in one of them, with it in both."""
+    made = []
+    for weather in ("Clear", "Wet"):
+        drives = [drive("net", "none", seed, "a", is_crash=weather == "Wet") for seed in range(5)]
+        drives += [drive("net", "patch", seed, "a", is_crash=True) for seed in range(5)]
+        made.append((planned("a", weather=weather), study(drives)))
+    found = {(line.scenario, line.patch): line for line in drive_section(made, Path("out")).lines}
+    assert [found["all", kind].crashes.count for kind in ("none", "patch")] == [5, 10]
+    (paired,) = found["all", "patch"].paired
+    assert (paired.pairs, paired.only_here, paired.only_there) == (10, 5, 0)
 
 
 def test_the_tables_of_the_report() -> None:

@@ -68,6 +68,15 @@ def test_every_network_drives_alone_and_behind_each_defense(written: Callable[..
     assert adaptive.drivers["small-behind-blur"].patch.endswith("semseg/small+blur/tiny-board")
 
 
+def test_every_network_drives_in_every_weather(written: Callable[..., Path], tmp_path: Path) -> None:
+    two = ("samples: {", "weathers: [ClearNoon, {preset: ClearNoon, wetness: 80}]\nsamples: {")
+    found = list(planned_drives(plan_of(written(*FEW, two, drives(tmp_path)))))
+    assert [one.weather for one in found] == ["ClearNoon", "ClearNoon-changed"]
+    assert [one.out.name for one in found] == ["ClearNoon", "ClearNoon-changed"] and found[0].out != found[1].out
+    configs = [read_node(DriveConfig, with_overrides(NO_OPTIONS, settings(one.config))) for one in found]
+    assert [one.weather.wetness for one in configs] == [None, 80.0]
+
+
 def test_drives_wait_for_their_patches_and_calibration(written: Callable[..., Path], tmp_path: Path) -> None:
     steps = every_step(plan_of(written(drives(tmp_path))))
     needed = dependencies(steps)
