@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from gear.contracts.controllers import Observation
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import ControllerSpec
 from gear.plugins.controllers.baseline import Baseline, BaselineConfig
-from gear.plugins.controllers.corridor import Corridor, ground_points
+from gear.plugins.controllers.box_foot import foot_gap_m
+from gear.plugins.controllers.corridor import Corridor
 from gear.plugins.controllers.tracker import Sighting
 from gear.values.errors import FieldError
 
@@ -19,9 +18,6 @@ ROAD_USERS = frozenset({1, 2, 3, 4, 6, 7, 8})
 
 FARTHEST_M = 80.0
 """Distance beyond which a foot on the ground is too uncertain: one pixel is several metres."""
-
-NEAR_GAP_M = 1.0
-"""Gap that is assumed for an object whose foot is below the picture."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,19 +54,13 @@ class Detect2dDriver(Baseline):
             observation: the frame; its prediction is the detections in the first camera's picture.
             corridor: the strip of road that the car needs, in the ego frame.
         """
-        camera, gaps_m = observation.cameras[0], []
-        for detection in observation.prediction:
-            if detection.score < self._min_score or detection.category_id not in ROAD_USERS:
-                continue
-            left_px, _, right_px, bottom_px = detection.box_px  # edge pixels: index pixels plus one half
-            foot_px = np.array([[column - 0.5, bottom_px - 0.5] for column in np.linspace(left_px, right_px, 5)])
-            foot_m = ground_points(camera, foot_px)
-            if not np.isfinite(foot_m).all():
-                continue
-            gap_m = corridor.gap_m(foot_m, FARTHEST_M)
-            if gap_m is not None:
-                gaps_m.append(min(gap_m, NEAR_GAP_M) if bottom_px >= camera.height_px - 1 else gap_m)
-        return Sighting(gap_m=min(gaps_m)) if gaps_m else None
+        gaps_m = [
+            foot_gap_m(detection.box_px, observation.cameras[0], corridor, FARTHEST_M)
+            for detection in observation.prediction
+            if detection.score >= self._min_score and detection.category_id in ROAD_USERS
+        ]
+        found = [gap_m for gap_m in gaps_m if gap_m is not None]
+        return Sighting(gap_m=min(found)) if found else None
 
 
 spec = ControllerSpec(

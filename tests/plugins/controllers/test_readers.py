@@ -11,7 +11,7 @@ import pytest
 from gear.contracts.controllers import Obstacle
 from gear.contracts.specs import TaskSpec
 from gear.plugins.controllers import blind, depth, detect2d, semseg, stereo3d, truth
-from gear.plugins.controllers.corridor import Corridor
+from gear.plugins.controllers.corridor import SIDE_MARGIN_M, Corridor
 from gear.plugins.controllers.tracker import Sighting
 from gear.plugins.manager import catalogue
 from gear.testing.controller_contract import CAR, obstacles_of, straight_road
@@ -71,6 +71,22 @@ def test_cars_in_the_next_lanes_are_no_obstacles(name: str) -> None:
 def test_the_nearer_of_two_counts(name: str) -> None:
     found = sighting(name, [car(30.0), person(14.0)])
     assert found is not None and found.gap_m < 13.0
+
+
+@pytest.mark.parametrize("name", ["detect2d", "stereo3d", "semseg"])
+def test_a_crossing_person_is_seen_when_the_first_side_is_in_the_corridor(name: str) -> None:
+    """The person is as wide as half a metre. The middle of the body is beside the corridor, one side is in it."""
+    half_m = CAR.half_width_m + SIDE_MARGIN_M
+    found = sighting(name, [person(15.0, -half_m - 0.1)])
+    assert found is not None and found.gap_m == pytest.approx(15.0 - 0.25 - CAR.front_m, abs=1.5)
+    assert sighting(name, [person(15.0, -half_m - 0.6)]) is None
+
+
+def test_small_regions_of_people_are_no_obstacles() -> None:
+    labels = np.full((512, 1024), 7, np.uint8)
+    labels[300:310, 500:510] = 24
+    labels[200:300, 100:150] = 25
+    assert semseg.people_boxes(labels) == [(100.0, 200.0, 150.0, 300.0)]
 
 
 def test_the_semseg_reader_does_not_search_where_a_row_of_pixels_is_long() -> None:

@@ -39,9 +39,9 @@ TITLES = ("network", "defense", "controller", "patch", "drives", "collision rate
 
 LEGEND = (
     "drives in the closed loop, over all scenes, weathers and scenarios that are not free roads; collision rate: share"
-    " of drives that ended in a crash, with the exact 95 % interval of Clopper and Pearson; impact: mean speed at first contact;"
-    " score: CARLA's driving score; p: McNemar's exact test of the crashes against the same situations without a patch"
-    " and with a random patch"
+    " of drives that ended in a crash, with the exact 95 % interval of Clopper and Pearson; impact: mean speed at first"
+    " contact; score: CARLA's driving score; p: McNemar's exact test of the crashes against the same situations without"
+    " a patch and with a random patch"
 )
 
 
