@@ -47,6 +47,13 @@ class Corridor:
         """Length of the known path."""
         return float(np.linalg.norm(np.diff(self.path_m, axis=0), axis=1).sum())
 
+    @property
+    def lateral_bounds_m(self) -> tuple[float, float]:
+        """Right and left end of the strip in the ego frame (y of the car's axes): no point beside them is in it."""
+        longest_m = float(np.linalg.norm(np.diff(self.path_m, axis=0), axis=1).max())
+        margin_m, left_m = self.half_width_m + longest_m, self.path_m[:, 1]
+        return float(left_m.min()) - margin_m, float(left_m.max()) + margin_m
+
     def along(self, points_m: Points) -> tuple[Points, Points]:
         """Positions of points relative to the path.
 

@@ -6,11 +6,12 @@ obstacle.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 
-from gear.contracts.controllers import Observation
+from gear.contracts.controllers import Observation, Points
 from gear.contracts.hookspecs import hookimpl
 from gear.contracts.specs import ControllerSpec
 from gear.plugins.controllers.baseline import Baseline, BaselineConfig
@@ -18,6 +19,7 @@ from gear.plugins.controllers.corridor import Corridor, pixel_rays
 from gear.plugins.controllers.road_profile import calibrated_depth_m
 from gear.plugins.controllers.tracker import Sighting
 from gear.values.errors import FieldError
+from gear.values.rig import CameraMount
 
 HEIGHTS_M = (0.4, 2.0)
 """Heights above the road of the points that count: above the road's own errors and below signs and bridges."""
@@ -70,18 +72,38 @@ class DepthDriver(Baseline):
         camera = observation.cameras[0]
         depth_m = np.asarray(observation.prediction, np.float64)[::STRIDE_PX, ::STRIDE_PX]
         depth_m = calibrated_depth_m(depth_m, camera, STRIDE_PX)
-        rows, columns = np.mgrid[0 : camera.height_px : STRIDE_PX, 0 : camera.width_px : STRIDE_PX]
-        rays = pixel_rays(camera, np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.float64))
-        points_m = camera.ego_from_camera.translation_m + rays * depth_m.reshape(-1, 1)
-        low_m, high_m = HEIGHTS_M
-        is_object = np.isfinite(points_m).all(axis=1) & (points_m[:, 2] > low_m) & (points_m[:, 2] < high_m)
+        x_m, y_m, z_m = _points_m(camera, depth_m.ravel())
+        (low_m, high_m), (from_m, to_m) = HEIGHTS_M, corridor.lateral_bounds_m
         reach_m = min(FARTHEST_M, corridor.length_m)
-        is_object &= (points_m[:, 0] > 0) & (points_m[:, 0] < reach_m)
-        arc_m, left_m = corridor.along(points_m[is_object][:, :2])
+        with np.errstate(invalid="ignore"):  # comparisons with NaN are false
+            is_object = (z_m > low_m) & (z_m < high_m) & (x_m > 0) & (x_m < reach_m) & (y_m > from_m) & (y_m < to_m)
+        arc_m, left_m = corridor.along(np.stack([x_m[is_object], y_m[is_object]], axis=1))
         inside = arc_m[(np.abs(left_m) < corridor.half_width_m) & (arc_m > corridor.front_m) & (arc_m < reach_m)]
         if len(inside) < LEAST_SHARE * depth_m.size:
             return None
         return Sighting(gap_m=max(0.0, float(np.percentile(inside, self._percentile)) - corridor.front_m))
+
+
+def _points_m(camera: CameraMount, depth_m: Points) -> tuple[Points, Points, Points]:
+    """Positions in the ego frame of the points that the pixels of a picture show: x, y and z, each (N,), metres.
+
+    Args:
+        camera: the camera with its pose on the car.
+        depth_m: (N,) depth of each `STRIDE_PX`-th pixel along the optical axis, row by row; infinite where unknown.
+    """
+    rays, origin = _rays(camera), camera.ego_from_camera.translation_m
+    with np.errstate(invalid="ignore"):
+        return origin[0] + rays[0] * depth_m, origin[1] + rays[1] * depth_m, origin[2] + rays[2] * depth_m
+
+
+@functools.lru_cache(maxsize=4)
+def _rays(camera: CameraMount) -> Points:
+    """(3, N) rays of each `STRIDE_PX`-th pixel of a camera, row by row, as `pixel_rays` returns them."""
+    rows, columns = np.mgrid[0 : camera.height_px : STRIDE_PX, 0 : camera.width_px : STRIDE_PX]
+    pixels = np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.float64)
+    rays = np.ascontiguousarray(pixel_rays(camera, pixels).T)
+    rays.setflags(write=False)
+    return rays
 
 
 spec = ControllerSpec(

@@ -54,7 +54,7 @@ def calibrated_depth_m(depth_m: Points, camera: CameraMount, stride_px: int = 1)
     if not is_road.any():
         return np.full(depth_m.shape, np.inf)
     flat = flat[is_road]
-    profile = np.array([_road_of_row(row) for row in disparity[is_road]])
+    profile = _road_of_rows(disparity[is_road])
     profile = np.maximum.accumulate(np.minimum(profile, LARGEST_ERROR * flat))
     found = np.where(disparity > 0, np.interp(disparity, profile, flat), 1 / FARTHEST_ROAD_M)
     nearest = profile[-1]
@@ -64,10 +64,13 @@ def calibrated_depth_m(depth_m: Points, camera: CameraMount, stride_px: int = 1)
     return calibrated
 
 
-def _road_of_row(disparity: Points) -> float:
-    """The road's disparity in one row, (W,) disparities, 0 where unknown; 0 if nothing is known."""
-    known = disparity[disparity > 0]
-    return float(np.percentile(known, ROAD_PERCENTILE)) if len(known) else 0.0
+def _road_of_rows(disparity: Points) -> Points:
+    """The road's disparity in each row, (H,), from (H, W) disparities, 0 where unknown; 0 if nothing is known."""
+    if (disparity > 0).all():
+        profile: Points = np.percentile(disparity, ROAD_PERCENTILE, axis=1)
+        return profile
+    rows = [row[row > 0] for row in disparity]
+    return np.array([np.percentile(known, ROAD_PERCENTILE) if len(known) else 0.0 for known in rows])
 
 
 def _flat_disparity(camera: CameraMount, rows: Points) -> Points:

@@ -96,6 +96,18 @@ def test_the_semseg_reader_does_not_search_where_a_row_of_pixels_is_long() -> No
     assert sighting("semseg", [car(15.0)], width_px=640) is not None
 
 
+def test_no_point_of_the_corridor_is_outside_its_lateral_bounds() -> None:
+    """The path bends to the left and back."""
+    ahead_m = np.arange(0.0, 60.0)
+    path_m = np.stack([ahead_m, 8.0 * np.sin(ahead_m / 12.0)], axis=1)
+    corridor = Corridor(path_m=path_m, half_width_m=1.3, front_m=2.0)
+    points_m = np.stack(np.meshgrid(np.arange(0.0, 60.0, 0.1), np.arange(-20.0, 20.0, 0.1)), axis=-1).reshape(-1, 2)
+    arc_m, left_m = corridor.along(points_m)
+    inside = (np.abs(left_m) < corridor.half_width_m) & (arc_m > 0) & (arc_m < corridor.length_m)
+    from_m, to_m = corridor.lateral_bounds_m
+    assert inside.sum() > 1000 and points_m[inside, 1].min() > from_m and points_m[inside, 1].max() < to_m
+
+
 def test_the_blind_one_sees_nothing() -> None:
     observation = straight_road(obstacles=obstacles_of([car(10.0)]))
     assert blind.Blind(blind.BaselineConfig()).nearest(observation, Corridor.of(observation)) is None
