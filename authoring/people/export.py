@@ -7,6 +7,7 @@ from pathlib import Path
 
 from authoring.mesh import write_obj
 from authoring.people.figure import GROUPS, Person, model_person
+from authoring.people.key_points import KeyPoints, key_point_lines
 from authoring.people.skeleton import Pose
 from authoring.people.texture import write_atlas, write_skin
 
@@ -17,7 +18,7 @@ _XML = """<mujoco model="{name}_{pose}">
     <text name="actor.kind" data="person"/>
     <text name="actor.person" data="{name}"/>
     <text name="actor.pose" data="{kind}"/>
-    <numeric name="paint.palette" data="{palette}"/>
+    <numeric name="paint.palette" data="{palette}"/>{key_points}
   </custom>
   <default>
     <default class="seen">
@@ -51,8 +52,8 @@ _CLASSES = {"extra": "cloth"}
 _CAPSULE_RADIUS_M = 0.27
 
 
-def person_xml(person: Person, pose: Pose, groups: Iterable[str]) -> str:
-    """The MJCF text of a person in a pose that has the given groups of meshes."""
+def person_xml(person: Person, pose: Pose, groups: Iterable[str], key_points: KeyPoints) -> str:
+    """The MJCF text of a person in a pose that has the given groups of meshes and key points."""
     groups = list(groups)
     classes = sorted({f"person.{_CLASSES.get(group, group)}" for group in groups})
     first = " ".join(f"{value:g}" for value in person.palette[0][:3])
@@ -69,6 +70,7 @@ def person_xml(person: Person, pose: Pose, groups: Iterable[str]) -> str:
         pose=pose.name,
         kind=pose.kind,
         palette="  ".join(" ".join(f"{value:g}" for value in row) for row in person.palette),
+        key_points=key_point_lines(key_points),
         classes="\n".join(f'      <default class="{name}"/>' for name in classes),
         meshes="\n".join(f'    <mesh class="seen" file="{pose.name}_{group}.obj"/>' for group in groups),
         geoms="\n".join(geoms),
@@ -89,8 +91,9 @@ def write_person(out: Path, person: Person, pose: Pose) -> None:
     """Write one pose of a person: meshes and MJCF."""
     folder = out / person.name
     folder.mkdir(parents=True, exist_ok=True)
-    meshes = model_person(person, pose)
-    groups = [group for group in GROUPS if group in meshes]
+    figure = model_person(person, pose)
+    groups = [group for group in GROUPS if group in figure.meshes]
     for group in groups:
-        write_obj(folder / f"{pose.name}_{group}.obj", meshes[group])
-    (out / f"{person.name}_{pose.name}.xml").write_text(person_xml(person, pose, groups), encoding="utf-8")
+        write_obj(folder / f"{pose.name}_{group}.obj", figure.meshes[group])
+    text = person_xml(person, pose, groups, figure.key_points)
+    (out / f"{person.name}_{pose.name}.xml").write_text(text, encoding="utf-8")

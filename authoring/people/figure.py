@@ -12,6 +12,7 @@ from authoring.people.body import bare_arms, bare_legs
 from authoring.people.extras import phone
 from authoring.people.garments import Garment
 from authoring.people.head import head_piece
+from authoring.people.key_points import KeyPoints, coco_key_points
 from authoring.people.piece import Piece, Skin, combine, mesh_pieces
 from authoring.people.skeleton import ANKLE_M, SIDES, Build, Pose, Skeleton, pose_skeleton
 from authoring.people.texture import Colour, Face, atlas_uv, skin_uv
@@ -65,7 +66,7 @@ def _lowest(skeleton: Skeleton, side: str) -> float:
 
 
 def stand_on_both_feet(build: Build, pose: Pose) -> Pose:
-    """LensWarp the knee of the longer-reaching leg until both soles touch one ground."""
+    """Bend the knee of the longer-reaching leg until both soles touch one ground."""
     if not pose.grounded:
         return pose
     heights = {side: _lowest(pose_skeleton(build, pose), side) for side in SIDES}
@@ -96,19 +97,40 @@ def pieces_of(person: Person, skeleton: Skeleton) -> list[Piece]:
     return pieces
 
 
-def model_person(person: Person, pose: Pose) -> dict[str, Mesh]:
-    """The meshes of a person in a pose by group, standing on z = 0 with the pelvis over the origin."""
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Figure:
+    """A modelled person.
+
+    Attributes:
+        meshes: triangles by group, metres.
+        key_points: COCO's key points in the frame of the meshes, metres.
+    """
+
+    meshes: dict[str, Mesh]
+    key_points: KeyPoints
+
+    def translated(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Figure:
+        """The person at another place; metres."""
+        return Figure(
+            meshes={group: mesh.translated(x, y, z) for group, mesh in self.meshes.items()},
+            key_points={name: point + np.array([x, y, z]) for name, point in self.key_points.items()},
+        )
+
+
+def model_person(person: Person, pose: Pose) -> Figure:
+    """A person in a pose, standing on z = 0 with the pelvis over the origin."""
     skeleton = pose_skeleton(person.build, stand_on_both_feet(person.build, pose))
     pieces = pieces_of(person, skeleton)
     if pose.telephone:
         pieces += phone(skeleton)
-    return meshes_of(pieces, person, skeleton, on_ground=True)
-
-
-def meshes_of(pieces: Sequence[Piece], person: Person, skeleton: Skeleton, *, on_ground: bool) -> dict[str, Mesh]:
-    """Triangles of posed pieces by group."""
     skins = mesh_pieces(pieces)
-    drop = min(float(skin.vertices[np.unique(skin.faces), 2].min()) for skin in skins) if on_ground else 0.0
+    drop_m = min(float(skin.vertices[np.unique(skin.faces), 2].min()) for skin in skins)
+    figure = Figure(meshes=meshes_of(skins, person, skeleton), key_points=coco_key_points(skeleton))
+    return figure.translated(z=-drop_m)
+
+
+def meshes_of(skins: Sequence[Skin], person: Person, skeleton: Skeleton) -> dict[str, Mesh]:
+    """The meshes of the triangles of all pieces of a person, by group, in the figure's frame."""
     head = skeleton["head"]
 
     def uv_of(skin: Skin) -> np.ndarray:
@@ -120,5 +142,5 @@ def meshes_of(pieces: Sequence[Piece], person: Person, skeleton: Skeleton, *, on
     for group in GROUPS:
         members = [skin for skin in skins if skin.piece.group == group and len(skin.faces)]
         if members:
-            meshes[group] = combine(members, uv_of).translated(z=-drop)
+            meshes[group] = combine(members, uv_of)
     return meshes

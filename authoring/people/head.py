@@ -8,6 +8,21 @@ from authoring.people.field import Array, Field, Frame, attach, blend, capsule, 
 from authoring.people.piece import Piece
 from authoring.people.skeleton import Skeleton
 
+EYE = (0.0775, 0.032, 0.0)
+"""The middle of the left eyeball in the head's frame, metres, for a head of factor 1."""
+
+EAR = (-0.006, 0.078, -0.006)
+"""The middle of the left ear, in the same frame."""
+
+
+def nose_tip(*, soft: bool) -> tuple[float, float, float]:
+    """The middle of the ball at the tip of the nose, in the same frame.
+
+    Args:
+        soft: whether the face is a softer one, such as a woman's.
+    """
+    return (0.106 if soft else 0.109, 0.0, -0.036)
+
 
 def face_field(skeleton: Skeleton) -> Field:
     """Skull, face and neck."""
@@ -46,11 +61,10 @@ def face_field(skeleton: Skeleton) -> Field:
         solid = cut(
             solid, ellipsoid(unit, (0.099 * k, side * 0.033 * k, 0.001 * k), (0.013 * k, 0.017 * k, 0.0125 * k)), 0.014
         )
-    eyes = [ellipsoid(unit, (0.0775 * k, side * 0.032 * k, 0.0), (0.0125 * k,) * 3) for side in (1.0, -1.0)]
-    tip = 0.106 if soft else 0.109
+    eyes = [ellipsoid(unit, (EYE[0] * k, side * EYE[1] * k, EYE[2]), (0.0125 * k,) * 3) for side in (1.0, -1.0)]
     nose = blend(
         [
-            capsule(frame, (0.090, 0.0, 0.006), (tip, 0.0, -0.036), 0.0065 * k, 0.0105 * k),
+            capsule(frame, (0.090, 0.0, 0.006), nose_tip(soft=soft), 0.0065 * k, 0.0105 * k),
             capsule(frame, (0.096, 0.011, -0.041), (0.096, -0.011, -0.041), 0.0085 * k),
         ],
         0.012,
@@ -74,7 +88,7 @@ def face_field(skeleton: Skeleton) -> Field:
 def _ear(unit: Frame, side: float, k: float) -> Frame:
     c, s = np.cos(0.35), np.sin(0.35) * side
     return unit.child(
-        (-0.006 * k, side * 0.078 * k, -0.006 * k), np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        (EAR[0] * k, side * EAR[1] * k, EAR[2] * k), np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     )
 
 

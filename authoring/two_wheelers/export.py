@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from authoring.mesh import write_obj
+from authoring.people.key_points import key_point_lines
 from authoring.people.texture import write_atlas, write_skin
-from authoring.two_wheelers.machine import COLOURS, TwoWheeler, all_meshes
+from authoring.two_wheelers.machine import COLOURS, TwoWheeler, model_machine
 from authoring.two_wheelers.plate import add_picture
 
 _XML = """<mujoco model="{name}">
@@ -14,7 +15,7 @@ _XML = """<mujoco model="{name}">
   <compiler angle="degree" meshdir="{name}" texturedir="{name}"/>
   <custom>
     <text name="actor.kind" data="{kind}"/>
-    <numeric name="paint.palette" data="{palette}"/>
+    <numeric name="paint.palette" data="{palette}"/>{key_points}
   </custom>
   <default>
     <default class="seen">
@@ -64,7 +65,8 @@ def write_two_wheeler(out: Path, machine: TwoWheeler) -> None:
     """Write the machine's folder of meshes and textures and its MJCF into `out`."""
     folder = out / machine.name
     folder.mkdir(parents=True, exist_ok=True)
-    meshes = all_meshes(machine)
+    figure = model_machine(machine)
+    meshes = figure.meshes
     for group, mesh in meshes.items():
         write_obj(folder / f"{group}.obj", mesh)
     write_atlas(folder / "machine.png", COLOURS)
@@ -91,6 +93,7 @@ def write_two_wheeler(out: Path, machine: TwoWheeler) -> None:
         name=machine.name,
         kind=machine.kind,
         palette="  ".join(" ".join(f"{value:g}" for value in row) for row in machine.palette),
+        key_points=key_point_lines(figure.key_points),
         classes="\n".join(f'      <default class="{_geom_class(machine, group)}"/>' for group in meshes),
         meshes="\n".join(f'    <mesh class="seen" file="{group}.obj"/>' for group in meshes),
         geoms="\n".join(geoms),

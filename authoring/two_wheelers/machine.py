@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from authoring.mesh import Mesh, merge
-from authoring.people.figure import Person
+from authoring.people.figure import Figure, Person
 from authoring.people.piece import Piece, combine, mesh_pieces
 from authoring.people.texture import Colour, atlas_uv
 from authoring.two_wheelers.parts import Hard
@@ -78,19 +78,21 @@ def machine_meshes(machine: TwoWheeler) -> dict[str, Mesh]:
     return meshes
 
 
-def rider_meshes(machine: TwoWheeler) -> dict[str, Mesh]:
-    """The rider's meshes: jacket, other cloth with shoes and helmet, skin, hair."""
+def rider_figure(machine: TwoWheeler) -> Figure:
+    """The rider, whose meshes are the jacket, other cloth with shoes and helmet, the skin and the hair."""
     made = model_rider(machine.rider, machine.seat)
-    cloth = [made[group] for group in ("cloth", "shoes", "extra") if group in made]
-    rider = {"jacket": made["paint"], "cloth": merge(cloth), "skin": made["skin"]}
-    if "hair" in made:
-        rider["hair"] = made["hair"]
-    return rider
+    cloth = [made.meshes[group] for group in ("cloth", "shoes", "extra") if group in made.meshes]
+    meshes = {"jacket": made.meshes["paint"], "cloth": merge(cloth), "skin": made.meshes["skin"]}
+    if "hair" in made.meshes:
+        meshes["hair"] = made.meshes["hair"]
+    return Figure(meshes=meshes, key_points=made.key_points)
 
 
-def all_meshes(machine: TwoWheeler) -> dict[str, Mesh]:
-    """Every mesh, moved so that the footprint's middle is the origin and the tyres touch the ground."""
-    meshes = machine_meshes(machine) | {f"rider_{name}": mesh for name, mesh in rider_meshes(machine).items()}
+def model_machine(machine: TwoWheeler) -> Figure:
+    """Every mesh and the rider's key points. The footprint's middle is the origin, and the tyres touch the ground."""
+    rider = rider_figure(machine)
+    meshes = machine_meshes(machine) | {f"rider_{name}": mesh for name, mesh in rider.meshes.items()}
     low = np.min([mesh.bounds[0] for mesh in meshes.values()], axis=0)
     high = np.max([mesh.bounds[1] for mesh in meshes.values()], axis=0)
-    return {name: mesh.translated(x=-(low[0] + high[0]) / 2, z=-low[2]) for name, mesh in meshes.items()}
+    figure = Figure(meshes=meshes, key_points=rider.key_points)
+    return figure.translated(x=-(low[0] + high[0]) / 2, z=-low[2])

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from authoring.mesh import Mesh
 from authoring.people.body import torso
 from authoring.people.field import Array, Frame, below, blend, cut, ellipsoid, loft, rounded_box
-from authoring.people.figure import Person, meshes_of, pieces_of
-from authoring.people.piece import Piece
+from authoring.people.figure import Figure, Person, meshes_of, pieces_of
+from authoring.people.key_points import coco_key_points
+from authoring.people.piece import Piece, mesh_pieces
 from authoring.people.skeleton import (
     ANKLE_M,
     BALL_M,
@@ -101,11 +101,11 @@ def _bone(start: Array, end: Array, front: Array) -> Frame:
     return Frame(start, np.stack([x, np.cross(z, x), z], axis=1))
 
 
-def model_rider(person: Person, seat: Seat) -> dict[str, Mesh]:
-    """The rider's meshes by group, in the machine's frame."""
+def model_rider(person: Person, seat: Seat) -> Figure:
+    """The rider in the machine's frame."""
     skeleton = seated_skeleton(person, seat)
-    meshes = meshes_of(pieces_of(person, skeleton), person, skeleton, on_ground=False)
-    return {group: mesh.translated(*seat.hips) for group, mesh in meshes.items()}
+    meshes = meshes_of(mesh_pieces(pieces_of(person, skeleton)), person, skeleton)
+    return Figure(meshes=meshes, key_points=coco_key_points(skeleton)).translated(*seat.hips)
 
 
 def riding_jacket(skeleton: Skeleton) -> list[Piece]:

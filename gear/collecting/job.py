@@ -30,7 +30,7 @@ from gear.values.errors import ConfigError, FieldError
 from gear.values.geometry import RigidTransform
 from gear.values.scene import Weather
 from gear.values.serial import Json, to_json
-from gear.world.assets.asset_hash import assets_digest
+from gear.world.assets.asset_hash import assets_digest, key_points_digest
 from gear.world.scene_spec import SceneSpec
 
 KINDS = ("probes", "scans", "flow")
@@ -127,6 +127,7 @@ def resolve(config: CollectionConfig) -> Job:
         samples=split.samples * split.frames,
         auxiliary=tuple(kind for kind in KINDS if getattr(config, kind)),
         recipe=recipe_of(config),
+        key_points=key_points_digest(library),
     )
     return Job(
         config=config,

@@ -33,6 +33,8 @@ class Plan:
             and labels.
         recipe: the collection's config without paths, from which damaged files can be made again; None in datasets of
             earlier versions.
+        key_points: hash of the key points of all actors (`key_points_digest`), which labels can contain and no picture
+            shows; "" if no actor has any.
     """
 
     task: dict[str, str]
@@ -43,10 +45,13 @@ class Plan:
     samples: int
     auxiliary: tuple[str, ...] = ()
     recipe: Json = None
+    key_points: str = ""
 
     @property
     def twin_key(self) -> str:
-        """A hash that is equal for two splits (twins) that differ only in the patch and in the number of samples."""
+        """A hash that is equal for two splits (twins) that differ only in the patch, in the number of samples and in
+        key points.
+        """
         return _digest({"task": self.task, "options": self.options, "content": self.content})
 
     @property
@@ -55,7 +60,8 @@ class Plan:
         have equal bytes.
         """
         content = {"twin": self.twin_key, "patch": self.patch}
-        return _digest(content | ({"auxiliary": list(self.auxiliary)} if self.auxiliary else {}))
+        content |= {"auxiliary": list(self.auxiliary)} if self.auxiliary else {}
+        return _digest(content | ({"key_points": self.key_points} if self.key_points else {}))
 
     @property
     def frames_per_sequence(self) -> int:
@@ -64,9 +70,9 @@ class Plan:
         return frames if isinstance(frames, int) and frames > 0 else 1
 
     def as_json(self) -> Json:
-        """The content of the plan's file; `auxiliary` and `recipe` are left out if they are empty."""
+        """The content of the plan's file; `auxiliary`, `recipe` and `key_points` are left out if they are empty."""
         content = to_json(self)
-        for name in ("auxiliary", "recipe"):
+        for name in ("auxiliary", "recipe", "key_points"):
             if not getattr(self, name):
                 del content[name]
         return content
@@ -225,7 +231,11 @@ def begin(root: Path, plan: Plan) -> None:
         if _manifest(root, split).get("content_key") == plan.content_key:
             raise _damaged(root, split, "is damaged: the manifest is of another plan, the one that is collected now")
         what = ", ".join(differences(there.as_json(), plan.as_json())[:4])
-        is_same_otherwise = there.twin_key == plan.twin_key and there.auxiliary == plan.auxiliary
+        is_same_otherwise = (there.twin_key, there.auxiliary, there.key_points) == (
+            plan.twin_key,
+            plan.auxiliary,
+            plan.key_points,
+        )
         raise (OutdatedError if is_same_otherwise else ReplaceableError)(
             root, f"split {split!r} was made with another configuration ({what})"
         )

@@ -20,6 +20,7 @@ from authoring.people.polygonise import polygonise
 from authoring.people.wardrobe import PEOPLE
 from authoring.two_wheelers.catalogue import two_wheelers
 from authoring.two_wheelers.export import write_two_wheeler
+from gear.world.assets.library import read_actor_facts
 
 MJCF = Path(__file__).parents[2] / "mjcf"
 PEDESTRIANS = sorted((MJCF / "pedestrians").glob("*.xml"))
@@ -117,6 +118,33 @@ def test_person_keeps_budget_labels_and_palette(path: Path) -> None:
     palette = model.numeric("paint.palette").data.reshape(-1, 4)
     assert np.all((palette[:, :3] > 0.0) & (palette[:, :3] < 0.8))
     assert np.all(palette[:, 3] > 0.0)
+
+
+COCO = (
+    "nose", "left_eye", "right_eye", "left_ear", "right_ear", "left_shoulder", "right_shoulder", "left_elbow",
+    "right_elbow", "left_wrist", "right_wrist", "left_hip", "right_hip", "left_knee", "right_knee", "left_ankle",
+    "right_ankle",
+)  # fmt: skip
+WITHIN_M, IN_A_COAT_M = 0.1, 0.15
+"""Largest distance of a joint from the nearest vertex of clothes or skin; the second is for hips and knees."""
+
+
+@pytest.mark.parametrize("path", [*PEDESTRIANS, *RIDDEN], ids=_ids)
+def test_person_has_the_key_points_of_coco(path: Path) -> None:
+    """In COCO's order, inside the body, left of the right ones, and the head over the hips over the feet."""
+    points = {name: np.array(point) for name, point in read_actor_facts(path).key_points}
+    assert tuple(points) == COCO
+    names = None if path in PEDESTRIANS else ["rider_jacket", "rider_cloth", "rider_skin"]
+    vertices = _vertices(path, names)
+    for name, point in points.items():
+        assert np.linalg.norm(vertices - point, axis=1).min() < (
+            IN_A_COAT_M if name.endswith(("hip", "knee")) else WITHIN_M
+        ), name
+    for name in ("eye", "ear", "shoulder", "hip"):
+        assert points[f"left_{name}"][1] > points[f"right_{name}"][1], name
+    assert points["nose"][0] > points["left_ear"][0], "the face looks along +x"
+    knees, ankles, hips = (min(points[f"{s}_{n}"][2] for s in ("left", "right")) for n in ("knee", "ankle", "hip"))
+    assert points["nose"][2] > points["left_shoulder"][2] > hips > knees > ankles > 0.02
 
 
 @pytest.mark.parametrize("path", RIDDEN, ids=_ids)

@@ -37,6 +37,7 @@ BOARD: dict[str, Json] = {"asset": "billboard", "facing_deg": 205.0, "position_m
         ({"options": {"height_px": 32, "width_px": 64}}, True, True),
         ({"patch": {"label": "random", "sha256": "1"}}, True, False),
         ({"auxiliary": ("probes",)}, True, False),
+        ({"key_points": "1"}, True, False),
         ({"options": {"width_px": 32, "height_px": 64}}, False, False),
         ({"content": {"town": "b", "weather": "ClearNoon"}}, False, False),
         ({"task": {"name": "semseg", "version": "2"}}, False, False),

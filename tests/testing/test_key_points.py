@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,17 +16,22 @@ import pytest
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
+from gear.collecting.job import resolve
+from gear.collecting.session import open_session
 from gear.config.collection import SplitConfig
+from gear.config.load import load_collection
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, Sample, Sidecar, SplitInfo
 from gear.formats.png import encode_rgb
+from gear.groundtruth.optical_flow import object_ids
 from gear.plugins.tasks.common import CameraOptions, images_of, read_rgb, surfaces_of
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.task_contract import TaskContract
 from gear.testing.things import CAR, PERSON, Thing, street
-from gear.testing.tiny_town import SMALL_RIG, TINY_TOWN, tiny_world
+from gear.testing.tiny_town import SMALL_RIG, TINY_SCENES, TINY_TOWN, tiny_world
 from gear.values.errors import TownError
 from gear.values.frames import Frame, UInt8Image, View
+from gear.values.resources import data_dir
 from gear.values.rig import Rig
 from gear.values.scene import SceneRecord
 from gear.world.assets.library import AssetLibrary, read_actor_facts
@@ -211,6 +217,36 @@ def test_key_points_of_assets_stand_where_the_actors_do() -> None:
         pose = actor.world_from_actor.transform("world", "object")
         assert nose == pytest.approx(pose.apply([0.12, 0.0, 1.66]))
         assert left - right == pytest.approx(pose.rotation @ [0, 0.18, 0])
+
+
+def test_key_points_of_gears_own_people_reach_a_task(tmp_path: Path) -> None:
+    """From gear's MJCF through planning, placing and rendering to the labels of a task: COCO's joints of the girl."""
+    shutil.copytree(TINY_TOWN.parents[1], tmp_path / "mjcf")
+    people = tmp_path / "mjcf/pedestrians"
+    shutil.rmtree(people)
+    people.mkdir()
+    for name in ("girl_stand.xml", "girl_walk_a.xml"):
+        shutil.copy(data_dir("mjcf") / "pedestrians" / name, people)
+    shutil.copytree(data_dir("mjcf") / "pedestrians/girl", people / "girl")
+    flags = {
+        "task": "depth", "town": str(tmp_path / "mjcf/towns/tiny.xml"), "scene": "no_billboard", "split": "debug",
+        "renderer": "classic", "quality": "fast", "root": str(tmp_path / "data"),
+    }  # fmt: skip
+    settings = [f"scenes={TINY_SCENES}", "options.width_px=320", "options.height_px=160", "crowd=5"]
+    task = PoseTask(PoseConfig())
+    found = 0
+    with open_session(resolve(load_collection(None, flags, settings))) as session:
+        for index in range(4):
+            record = session.record(index)
+            frame = session.to_frame(session.shoot(record))
+            view = frame.views["left"]
+            for number, points in task.ground_truth(frame, record).people.items():
+                rows, _ = np.nonzero(object_ids(view.geom_id, frame.geoms.object_id) == number)
+                if len(rows) > 20:
+                    (_, nose, _), (_, left, _), (_, right, _) = points
+                    assert rows.min() <= nose < left and nose < right <= rows.max()
+                    found += 1
+    assert found >= 3
 
 
 @pytest.mark.parametrize("data", ["0 1", "0 1 2 3", "1e9 0 0", "a b c"])

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from gear.values.errors import TownError
@@ -15,6 +16,9 @@ from gear.world.assets.library import AssetLibrary, read_xml
 
 ASSET_SUFFIXES = (".xml", ".obj", ".msh", ".stl", ".png")
 """Suffixes of the files in a town's folders that count as assets."""
+
+_KEY_POINT_LINE = re.compile(rb"""\s*<numeric\s+name=["']key_point\.[^<>]*/>""")
+"""An element that names a key point, with the white space before it."""
 
 
 def asset_files(library: AssetLibrary) -> dict[str, Path]:
@@ -96,13 +100,38 @@ def _bases(path: Path, file: Path) -> list[Path]:
 
 
 def assets_digest(library: AssetLibrary) -> str:
-    """The SHA-256 hash (hex) of the names and contents of all assets of a town: MJCF files, meshes and textures.
+    """The SHA-256 hash (hex) of everything that pictures of a town can show.
+
+    It covers the names and contents of all MJCF files, meshes and textures, without the key points of actors, which no
+    picture shows (`key_points_digest`). So trained weights still fit a town whose people get key points.
 
     Args:
         library: the asset library of the town.
     """
-    files = asset_files(library)
+    return _digest_of(asset_files(library), lambda content: _KEY_POINT_LINE.sub(b"", content))
+
+
+def key_points_digest(library: AssetLibrary) -> str:
+    """The SHA-256 hash (hex) of the key points of all actors that a town uses; "" if none has any.
+
+    Args:
+        library: the asset library of the town.
+    """
+    files = {
+        name: path
+        for name, path in asset_files(library).items()
+        if path.suffix.lower() == ".xml" and _KEY_POINT_LINE.search(path.read_bytes())
+    }
+    return _digest_of(files, lambda content: b"".join(_KEY_POINT_LINE.findall(content))) if files else ""
+
+
+def _digest_of(files: dict[str, Path], part: Callable[[bytes], bytes]) -> str:
+    """The SHA-256 hash (hex) of the names of files and of the parts of their contents that count; MJCF files have such
+    parts, and of all others the whole content counts.
+    """
     digest = hashlib.sha256()
     for name in sorted(files):
-        digest.update(f"{name}\0{hashlib.sha256(files[name].read_bytes()).hexdigest()}\n".encode())
+        content = files[name].read_bytes()
+        counted = part(content) if files[name].suffix.lower() == ".xml" else content
+        digest.update(f"{name}\0{hashlib.sha256(counted).hexdigest()}\n".encode())
     return digest.hexdigest()

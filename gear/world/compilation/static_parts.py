@@ -16,7 +16,7 @@ from pathlib import Path
 
 from gear.values.errors import TownError
 from gear.values.regular_file import check_regular
-from gear.world.assets.library import read_numbers
+from gear.world.assets.library import KEY_POINT, read_numbers
 from gear.world.assets.scene_assets import AssetFile
 from gear.world.compilation.board_scaling import scale_board
 
@@ -121,7 +121,7 @@ class SplitAsset:
     """An asset's MJCF in two parts: the part for dm_control, and the default classes.
 
     Attributes:
-        text: the MJCF without its default classes; None if dm_control must read the file itself.
+        text: the MJCF without its default classes and key points; None if dm_control must read the file itself.
         defaults: the default classes as MJCF, with the names that dm_control gives them in a composed world.
         mesh_paths: path of each mesh file, by its name in `text`.
     """
@@ -159,6 +159,7 @@ def split_asset(file: AssetFile) -> SplitAsset:
     ):
         return SplitAsset(text=None if file.face_size_m is None else ET.tostring(root, encoding="unicode"))
     root.remove(sections[0])
+    _remove_key_points(root)
     for default in sections[0].iter("default"):
         default.set("class", f"{file.name}/{default.get('class', '')}")
     mesh_paths = _replace_mesh_names(root, path)
@@ -167,6 +168,13 @@ def split_asset(file: AssetFile) -> SplitAsset:
         defaults=ET.tostring(sections[0], encoding="unicode").strip(),
         mesh_paths=mesh_paths,
     )
+
+
+def _remove_key_points(root: ET.Element) -> None:
+    """Removes key points from a tree. `read_actor_facts` reads them, and the compiled world has no use for them."""
+    for section in root.iter("custom"):
+        for entry in [one for one in section if one.get("name", "").startswith(KEY_POINT)]:
+            section.remove(entry)
 
 
 def _replace_mesh_names(root: ET.Element, path: Path) -> dict[str, MeshPath]:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import pytest
 
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
 from gear.values.errors import TownError, UnknownNameError
-from gear.world.assets.asset_hash import _referred, asset_files, assets_digest
+from gear.world.assets.asset_hash import _referred, asset_files, assets_digest, key_points_digest
 from gear.world.assets.library import AssetLibrary, read_actor_facts
 from gear.world.assets.scene_assets import read_scene_assets
 from gear.world.scene_spec import SceneSpec, TruckSpec
@@ -54,6 +55,28 @@ def test_gears_own_files_refer_to_nothing_from_afar(town: str) -> None:
     known = {path.resolve() for path in files.values()}
     named = [found for path in files.values() if path.suffix == ".xml" for _, found in _referred(path)]
     assert len(named) > 100 and {found.resolve() for found in named} <= known
+
+
+def test_key_points_change_a_digest_of_their_own(tmp_path: Path) -> None:
+    """No picture shows them, so trained weights still fit a town whose people get key points."""
+    mjcf = tmp_path / "mjcf"
+    shutil.copytree(TINY_TOWN.parents[1], mjcf)
+    library = AssetLibrary(mjcf / "towns/tiny.xml")
+    person = mjcf / "pedestrians/adult_stand.xml"
+    text = person.read_text()
+    line = '    <numeric name="key_point.nose" data="0.12 0 1.66"/>\n'
+    assert line in text
+    pictures, points = assets_digest(library), key_points_digest(library)
+    person.write_text(text.replace("0.12 0 1.66", "0.12 0 1.67"))
+    assert assets_digest(library) == pictures and key_points_digest(library) != points
+    person.write_text(text.replace(line, ""))
+    assert assets_digest(library) == pictures and key_points_digest(library) not in (points, "")
+    person.write_text(text.replace("</custom>", '<numeric name="other" data="1"/></custom>'))
+    assert assets_digest(library) != pictures and key_points_digest(library) == points
+    person.write_text(text)
+    for path in (mjcf / "pedestrians").glob("*.xml"):
+        path.write_text(re.sub(r'\s*<numeric name="key_point[^>]*>', "", path.read_text()))
+    assert assets_digest(library) == pictures and key_points_digest(library) == ""
 
 
 def test_the_digest_covers_whatever_a_town_refers_to(tmp_path: Path) -> None:
