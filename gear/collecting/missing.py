@@ -17,7 +17,7 @@ from gear.dataset.executors.processes import Processes
 from gear.dataset.failures import clear_failures, failures_folder, note_failure, noted_failures
 from gear.dataset.files import inside
 from gear.dataset.layout import sidecar_path
-from gear.dataset.shards import Shard
+from gear.dataset.sharding.shards import Shard
 from gear.dataset.store import Store
 from gear.values.counted import counted
 from gear.values.errors import BackendError, DatasetError, SamplesFailedError, WorkerInterruptedError

@@ -12,7 +12,7 @@ from gear.dataset.executors.engines import DEFAULT, open_engine, open_executor
 from gear.dataset.executors.in_process import InThisProcess
 from gear.dataset.locks import SHARED, lock_note
 from gear.dataset.plan import manifest_facts
-from gear.dataset.shards import WHOLE, Shard
+from gear.dataset.sharding.shards import WHOLE, Shard
 from gear.dataset.store import Store
 from gear.plugins.build import blamed, build, find
 from gear.values.counted import counted

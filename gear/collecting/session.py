@@ -16,7 +16,7 @@ from gear.collecting.probes import ProbeShot, compute_probes, shoot_probes
 from gear.collecting.scan_files import scan_files
 from gear.contracts.rendering import RawView, Renderer
 from gear.contracts.tasks import Encoded, Sample, Task
-from gear.dataset.output_checks import check_encoded
+from gear.dataset.checks.output_checks import check_encoded
 from gear.dataset.probe_files import AuxiliaryFiles, probe_files
 from gear.groundtruth.laser_scan import scan_cameras, scan_points
 from gear.groundtruth.optical_flow import FlowView, object_ids, optical_flow

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from gear.contracts.tasks import Auxiliary, Sidecar
+from gear.dataset.checks.sidecar_validation import check_numbers, check_sidecar
 from gear.dataset.sealed_json import load_sealed, sealed_json
-from gear.dataset.sidecar_validation import check_numbers, check_sidecar
 from gear.values.errors import DatasetError, FieldError
 from gear.values.ground_truth import SurfaceTruth
 from gear.values.scene import SceneRecord

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from gear.contracts.tasks import Auxiliary, Encoded, ExtendsIndexes, Sample, Sidecar, Task
-from gear.dataset.cards import write_cards
 from gear.dataset.claims import clear_claims
-from gear.dataset.closing import ClosedPart, SidecarStream, can_extend, closed_part
 from gear.dataset.failures import clear_failures
 from gear.dataset.files import clear_scratch, inside, read_bytes, sha256, sync_folder, write_whole
+from gear.dataset.finishing.cards import write_cards
+from gear.dataset.finishing.closing import ClosedPart, SidecarStream, can_extend, closed_part
 from gear.dataset.guarded_paths import owned, refuse_links, remove_empty_folders, remove_file, remove_files
 from gear.dataset.hashing import file_hash, in_threads
 from gear.dataset.json_text import dump_json, load_json
@@ -32,7 +32,7 @@ from gear.dataset.layout import (
 from gear.dataset.locks import dataset_lock, is_locked, shared_split_lock
 from gear.dataset.plan import Plan, begin, read_plan, refuse_copy, refuse_other_tasks
 from gear.dataset.sealed_json import REPAIR, DamagedError, load_sealed, sealed_json
-from gear.dataset.shards import WHOLE, Shard
+from gear.dataset.sharding.shards import WHOLE, Shard
 from gear.dataset.sidecar import no_sidecar, read_sidecar, sidecar_bytes
 from gear.values.errors import DatasetError, FieldError, ReplaceableError, SamplesFailedError
 from gear.values.serial import Json

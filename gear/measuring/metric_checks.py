@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gear.dataset.output_checks import check_metrics
+from gear.dataset.checks.output_checks import check_metrics
 from gear.dataset.plan import Plan
 from gear.measuring.guarded_model import plugin_error
 from gear.plugins.build import find, name_of_task

@@ -22,7 +22,7 @@ from gear.config.reader import read_node
 from gear.contracts.evaluation import Maskable, Reports, WithObjects
 from gear.contracts.specs import MetricSpec
 from gear.contracts.tasks import Evaluator
-from gear.dataset.output_checks import check_metrics
+from gear.dataset.checks.output_checks import check_metrics
 from gear.dataset.plan import Plan
 from gear.dataset.reading import Dataset
 from gear.measuring.guarded_model import plugin_error

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from gear.contracts.tasks import Sample, Task
-from gear.dataset.output_checks import check_previews
+from gear.dataset.checks.output_checks import check_previews
 from gear.plugins.prediction_pictures import picture_legends, prediction_pictures
 from gear.reporting.legend import draw_legend
 from gear.reporting.picture_grid import captioned, side_by_side, stacked

@@ -17,9 +17,9 @@ import numpy as np
 
 from gear.contracts.evaluation import KeepsPredictions, Maskable
 from gear.contracts.tasks import Sample
+from gear.dataset.checks.output_checks import check_encoded
 from gear.dataset.files import explained, inside, sha256, write_whole
 from gear.dataset.json_text import dump_json
-from gear.dataset.output_checks import check_encoded
 from gear.dataset.reading import Dataset
 from gear.measuring.guarded_model import TimedPrediction, plugin_error
 from gear.measuring.metric_json import known_json

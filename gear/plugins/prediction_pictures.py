@@ -8,7 +8,7 @@ from typing import Any
 from gear.contracts.evaluation import DrawsPredictions, WithObjects
 from gear.contracts.legends import ColourNames, Legend, Rgb, WithLegends
 from gear.contracts.tasks import Sample, Task
-from gear.dataset.output_checks import check_previews
+from gear.dataset.checks.output_checks import check_previews
 from gear.plugins.tasks.common import IGNORED_COLOUR, category_colour, draw_box, draw_surfaces
 from gear.values.frames import UInt8Image
 from gear.values.picture_objects import PictureObjects

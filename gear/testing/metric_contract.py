@@ -22,7 +22,7 @@ import numpy as np
 from gear.contracts.evaluation import Additive, Maskable, Resampled
 from gear.contracts.specs import MetricSpec, TaskSpec
 from gear.contracts.tasks import Evaluator, Task
-from gear.dataset.output_checks import check_metrics
+from gear.dataset.checks.output_checks import check_metrics
 from gear.plugins.manager import catalogue
 from gear.testing.compare import difference, freeze
 from gear.testing.spec_checks import check_spec

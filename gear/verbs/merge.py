@@ -11,11 +11,11 @@ from pathlib import Path
 
 from gear.collecting.patch_sources import digest_of, read_patch
 from gear.contracts.tasks import NO_PATCH
-from gear.dataset.merging import Parts, copy_patches, copy_samples, find_parts, prepare_merge
 from gear.dataset.plan import manifest_facts, refuse_other_tasks
 from gear.dataset.remote.folder import RemoteFolder, is_address, local_path
 from gear.dataset.remote.merge import begin_remote_merge, copy_samples_to, finish_remote_merge
 from gear.dataset.sealed_json import REPAIR, DamagedError
+from gear.dataset.sharding.merging import Parts, copy_patches, copy_samples, find_parts, prepare_merge
 from gear.dataset.store import Store, splits_of
 from gear.dataset.whole_tree import check_target, whole_tree
 from gear.plugins.build import blamed, find, name_of_task

@@ -9,8 +9,8 @@ import cv2
 
 from gear.contracts.legends import ColourNames, WithLegends
 from gear.contracts.tasks import Sample
+from gear.dataset.checks.output_checks import check_previews
 from gear.dataset.files import check_output_file, write_alone
-from gear.dataset.output_checks import check_previews
 from gear.plugins.build import blamed, find, name_of_task
 from gear.plugins.datasets import open_dataset
 from gear.reporting.display import displayed

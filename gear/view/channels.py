@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from gear.contracts.tasks import Sample, Task
-from gear.dataset.output_checks import check_previews
+from gear.dataset.checks.output_checks import check_previews
 from gear.dataset.reading import Dataset
 from gear.plugins.prediction_pictures import prediction_pictures
 from gear.plugins.stored_evaluations import StoredResults

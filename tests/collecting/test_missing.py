@@ -25,7 +25,7 @@ from gear.contracts.executors import MOST_FAILURES, Outcome, Report
 from gear.dataset.claims import Claims
 from gear.dataset.executors.in_process import InThisProcess
 from gear.dataset.executors.processes import Processes
-from gear.dataset.shards import WHOLE
+from gear.dataset.sharding.shards import WHOLE
 from gear.dataset.store import Store
 from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame

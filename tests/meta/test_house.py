@@ -24,6 +24,12 @@ def test_modules_stay_small() -> None:
     assert statistics.median(n for n in lines.values() if n > 5) < 120
 
 
+def test_folders_stay_small() -> None:
+    """At most 25 modules in a folder, so that its contents can be taken in at a glance."""
+    names = [path.parent.relative_to(ROOT) for path in MODULES if path.name != "__init__.py"]
+    assert {str(folder): names.count(folder) for folder in set(names) if names.count(folder) > 25} == {}
+
+
 def test_only_one_module_makes_generators() -> None:
     makers = [p for p in MODULES if re.search(r"default_rng\(|np\.random\.(seed|rand|normal|choice)\(", p.read_text())]
     assert [p.relative_to(ROOT / "gear").as_posix() for p in makers] == ["values/rng.py"]

@@ -13,10 +13,10 @@ from pathlib import Path
 from gear.dataset.files import inside, read_bytes, write_whole
 from gear.dataset.hashing import in_threads
 from gear.dataset.layout import manifest_path, plan_path, sidecar_path, split_folder
-from gear.dataset.merging import SAMPLES_AT_A_TIME, Parts, files_of, sidecar_of
 from gear.dataset.plan import Plan
 from gear.dataset.reading import check_hash
 from gear.dataset.remote.folder import RemoteFolder
+from gear.dataset.sharding.merging import SAMPLES_AT_A_TIME, Parts, files_of, sidecar_of
 from gear.values.errors import DatasetError
 from gear.values.progress import Progress
 

@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from gear.contracts.legends import Rgb
 from gear.contracts.tasks import Sample
+from gear.dataset.checks.sidecar_validation import check_numbers
 from gear.dataset.files import inside
-from gear.dataset.sidecar_validation import check_numbers
 from gear.formats.png import decode_plain, decode_rgb
 from gear.groundtruth.surfaces import observe_surfaces
 from gear.values.errors import DatasetError, FieldError

@@ -9,7 +9,7 @@ from gear.collecting.workers import Workers
 from gear.config.collection import CollectionConfig
 from gear.config.load import load_collection
 from gear.dataset.executors.engines import DEFAULT
-from gear.dataset.shards import Shard
+from gear.dataset.sharding.shards import Shard
 from gear.values.errors import GearError
 
 

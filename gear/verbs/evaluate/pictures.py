@@ -13,8 +13,8 @@ import cv2
 
 from gear.contracts.legends import ColourNames
 from gear.contracts.tasks import NO_PATCH, Sample
+from gear.dataset.checks.output_checks import check_previews
 from gear.dataset.files import inside, write_whole
-from gear.dataset.output_checks import check_previews
 from gear.measuring.reports import TASK
 from gear.measuring.scoring import SampleResult
 from gear.metrics.object_changes import Change, ObjectChange, changes

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from gear.dataset.cards import damaged_cards, own_cards
+from gear.dataset.checks.verification import check_split, splits_in
 from gear.dataset.files import write_whole
+from gear.dataset.finishing.cards import damaged_cards, own_cards
 from gear.dataset.free_space import check_free_space
 from gear.dataset.guarded_paths import remove_empty_folders, remove_files
 from gear.dataset.layout import GEAR
 from gear.dataset.scratch import clear_scratch
-from gear.dataset.verification import check_split, splits_in
 from gear.dataset.whole_tree import check_target, whole_tree
 from gear.plugins.text import printable
 from gear.reporting.display import displayed

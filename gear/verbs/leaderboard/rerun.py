@@ -16,7 +16,7 @@ from gear.contracts.tasks import NO_PATCH
 from gear.dataset.files import sha256, write_whole
 from gear.dataset.plan import read_plan
 from gear.dataset.reading import Dataset
-from gear.dataset.shards import Picked, Shard
+from gear.dataset.sharding.shards import Picked, Shard
 from gear.leaderboard.reading import limited
 from gear.leaderboard.record import Data, PatchFacts, Plugin, Record
 from gear.measuring.guard import UNGUARDED, open_guard

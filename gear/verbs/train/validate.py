@@ -11,7 +11,7 @@ import torch
 from gear.contracts.evaluation import Reports
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Task
-from gear.dataset.output_checks import check_metrics
+from gear.dataset.checks.output_checks import check_metrics
 from gear.plugins.build import blamed
 from gear.plugins.catalogue import PluginEntry
 from gear.readers import TorchDataset, as_pictures

@@ -18,11 +18,11 @@ from gear.config.collection import CollectionConfig
 from gear.config.nodes import Place, in_one_place, parse_text
 from gear.config.reader import read_node
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
+from gear.dataset.checks.verification import SplitCheck
 from gear.dataset.files import inside
 from gear.dataset.guarded_paths import parts_of
 from gear.dataset.layout import patch_path
 from gear.dataset.plan import differences
-from gear.dataset.verification import SplitCheck
 from gear.networks.shipped import shipped_patches
 from gear.values.errors import BackendError, ConfigError, DatasetError, PatchError, UnknownNameError
 from gear.values.serial import Json

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from gear.dataset.verification import Finding
+from gear.dataset.checks.verification import Finding
 from gear.plugins.text import LONGEST_LINE, printable
 from gear.values.serial import Json
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 from gear.collecting.devices import has_mixed_devices
 from gear.collecting.run import executor_of, run_job
-from gear.dataset.cards import damaged_cards, own_cards, write_cards
+from gear.dataset.checks.verification import Finding, SplitCheck, check_split, splits_in, unexpected_files
+from gear.dataset.finishing.cards import damaged_cards, own_cards, write_cards
 from gear.dataset.guarded_paths import refuse_links, remove_files
 from gear.dataset.layout import sidecar_path, split_folder
 from gear.dataset.locks import dataset_lock, is_locked
 from gear.dataset.plan import write_plan
-from gear.dataset.verification import Finding, SplitCheck, check_split, splits_in, unexpected_files
 from gear.reporting.display import displayed
 from gear.values.errors import DatasetError
 from gear.values.progress import Callbacks, Progress

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gear.cli.main import main
-from gear.dataset.verification import Finding
+from gear.dataset.checks.verification import Finding
 from gear.verbs.verify.report import VerifyReport
 
 COMMAND = "gear.verbs.verify.run.verify"

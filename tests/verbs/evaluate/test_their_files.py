@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gear.contracts.tasks import Encoded
-from gear.dataset.output_checks import check_encoded
+from gear.dataset.checks.output_checks import check_encoded
 from gear.metrics.depth import DepthEvaluator
 from gear.plugins import manager
 from gear.plugins.catalogue import Catalogue, Owner

@@ -14,8 +14,8 @@ import pytest
 
 import gear
 from gear.cli.main import main
+from gear.dataset.checks.verification import Finding
 from gear.dataset.layout import CARDS
-from gear.dataset.verification import Finding
 from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError
 from gear.verbs.verify import run as module

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gear.contracts.tasks import NO_PATCH, Sample
-from gear.dataset.output_checks import check_previews
+from gear.dataset.checks.output_checks import check_previews
 from gear.dataset.reading import Dataset
 from gear.plugins.datasets import open_dataset
 from gear.plugins.prediction_pictures import picture_legends, prediction_pictures

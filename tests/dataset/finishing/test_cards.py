@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gear.dataset.cards import cards, damaged_cards, own_cards, write_cards
 from gear.dataset.files import sha256
+from gear.dataset.finishing.cards import cards, damaged_cards, own_cards, write_cards
 from gear.dataset.json_text import load_json
 from gear.dataset.layout import CARDS
 from gear.dataset.sealed_json import load_sealed

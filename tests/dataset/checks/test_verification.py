@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from gear.dataset import verification
+from gear.dataset.checks import verification
+from gear.dataset.checks.verification import Finding, check_split
 from gear.dataset.plan import write_plan
-from gear.dataset.verification import Finding, check_split
 from tests.dataset.splits import fill, plan
 
 

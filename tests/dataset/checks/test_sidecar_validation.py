@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from gear.contracts.tasks import Sidecar
-from gear.dataset.sidecar_validation import LARGEST, check_numbers, check_sidecar
+from gear.dataset.checks.sidecar_validation import LARGEST, check_numbers, check_sidecar
 from gear.plugins.tasks.common import surfaces_of
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.tiny_town import SMALL_RIG

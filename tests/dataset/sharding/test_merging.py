@@ -15,9 +15,9 @@ import pytest
 from gear.dataset.files import sha256
 from gear.dataset.layout import sidecar_path
 from gear.dataset.locks import shared_split_lock
-from gear.dataset.merging import Parts, copy_patches, copy_samples, find_parts, prepare_merge
 from gear.dataset.plan import Plan, write_plan
 from gear.dataset.sealed_json import sealed_json
+from gear.dataset.sharding.merging import Parts, copy_patches, copy_samples, find_parts, prepare_merge
 from gear.dataset.store import Store
 from gear.values.errors import DatasetError
 from tests.dataset.splits import fill, plan, tree

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gear.dataset.shards import WHOLE, Picked, Shard
+from gear.dataset.sharding.shards import WHOLE, Picked, Shard
 from gear.dataset.store import Store
 from gear.values.errors import GearError
 from tests.dataset.splits import plan

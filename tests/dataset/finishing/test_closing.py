@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from gear.contracts.tasks import ExtendsIndexes, Sidecar
-from gear.dataset import closing
-from gear.dataset.closing import SidecarStream, can_extend, closed_part
 from gear.dataset.files import sha256
+from gear.dataset.finishing import closing
+from gear.dataset.finishing.closing import SidecarStream, can_extend, closed_part
 from gear.dataset.layout import manifest_path, sidecar_path
 from gear.values.errors import DatasetError
 from tests.dataset.splits import fill, plan, tree
