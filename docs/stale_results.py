@@ -36,6 +36,9 @@ IGNORED = {".md", ".pyc"}
 UNSEEN = "dynamics/"
 """Folder of `mjcf` that no picture shows: the physics of the ego car."""
 
+KEY_POINT = re.compile(rb"""\s*<numeric\s+name=["']key_point\.[^<>]*/>""")
+"""An element of MJCF that no picture shows, with the white space before it."""
+
 BEGIN, END = "<!-- states: written by docs/stale_results.py -->", "<!-- end of states -->"
 LINE = re.compile(r"^- \*\*Inputs:\*\* (.*)$", re.MULTILINE)
 STATE = re.compile(r"^- \*\*State:\*\* .*\n", re.MULTILINE)
@@ -48,10 +51,14 @@ def digest(folder: Path) -> str:
     for path in folder.rglob("*"):
         is_unseen = path.relative_to(folder).as_posix().startswith(UNSEEN)
         if path.is_file() and path.suffix not in IGNORED and not is_unseen:
-            data = path.read_bytes()
-            blob = hashlib.sha1(b"blob %d\0" % len(data) + data, usedforsecurity=False).hexdigest()
-            entries.append((path.relative_to(folder).as_posix(), blob))
+            entries.append((path.relative_to(folder).as_posix(), _blob(path.suffix, path.read_bytes())))
     return _digest_of(entries)
+
+
+def _blob(suffix: str, content: bytes) -> str:
+    """Git's hash of a file's content; MJCF counts without key points."""
+    data = KEY_POINT.sub(b"", content) if suffix == ".xml" else content
+    return hashlib.sha1(b"blob %d\0" % len(data) + data, usedforsecurity=False).hexdigest()
 
 
 def digest_at(commit: str, folder: str) -> str:
@@ -61,8 +68,21 @@ def digest_at(commit: str, folder: str) -> str:
         cwd=ROOT, capture_output=True, text=True, check=True,
     ).stdout  # fmt: skip
     lines = [line.split("\t") for line in listed.splitlines() if Path(line).suffix not in IGNORED]
-    entries = [(path.removeprefix(f"{folder}/"), facts.split()[2]) for facts, path in lines]
+    entries = [(path.removeprefix(f"{folder}/"), _blob_at(facts.split()[2], path)) for facts, path in lines]
     return _digest_of([entry for entry in entries if not entry[0].startswith(UNSEEN)])
+
+
+def _blob_at(blob: str, path: str) -> str:
+    """The hash of `_blob` of a file in git's history.
+
+    Args:
+        blob: git's hash of its content.
+        path: its path.
+    """
+    if not path.endswith(".xml"):
+        return blob
+    content = subprocess.run(["git", "cat-file", "blob", blob], cwd=ROOT, capture_output=True, check=True).stdout
+    return _blob(".xml", content)
 
 
 @functools.cache

@@ -98,6 +98,7 @@ def test_figures_are_stale_when_a_file_that_they_depend_on_changes(tmp_path: Pat
     (tmp_path / "town" / "a.xml").write_text("one")
     (tmp_path / "dynamics").mkdir()
     (tmp_path / "dynamics" / "car.xml").write_text("no picture shows it")
+    (tmp_path / "town" / "a.xml").write_text('one\n<numeric name="key_point.nose" data="0 0 1.6"/>')
     assert digest(tmp_path) == first
 
 
