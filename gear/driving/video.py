@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from fractions import Fraction
 from typing import Any
 
@@ -44,7 +45,9 @@ def check_video() -> None:
 
 
 class Video:
-    """Collects the frames of one drive and encodes them as a video."""
+    """Draws the frames of one drive and encodes them as a video. Frames are encoded in a thread of their own, while the
+    next frame is rendered; the bytes do not depend on that.
+    """
 
     def __init__(self, title: str) -> None:
         """Begins a video without frames.
@@ -53,7 +56,10 @@ class Video:
             title: the drive in a few words; it stands above each frame.
         """
         self._title = title
-        self._frames: list[UInt8Image] = []
+        self._height = 0
+        self._encoder = _Encoder()
+        self._thread = ThreadPoolExecutor(max_workers=1)
+        self._encoded: list[Future[None]] = []
 
     def watch(self, situation: Situation, views: Mapping[str, UInt8Image], seen: Any, action: Action | None) -> None:
         """Draws one frame; the end of the drive is drawn as several equal frames.
@@ -68,13 +74,51 @@ class Video:
             return
         picture = next(iter(views.values()))
         if action is not None:
-            self._frames.append(drawn(self._title, situation, picture, seen, action))
-        elif self._frames:
-            self._frames += [drawn_end(self._title, situation, picture, self._frames[0].shape[0])] * HELD_FRAMES
+            frame = drawn(self._title, situation, picture, seen, action)
+            self._height = self._height or frame.shape[0]
+            self._encoded.append(self._thread.submit(self._encoder.add, frame))
+        elif self._encoded:
+            end = drawn_end(self._title, situation, picture, self._height)
+            self._encoded += [self._thread.submit(self._encoder.add, end) for _ in range(HELD_FRAMES)]
 
     def mp4(self) -> bytes:
-        """The video as an MP4 file; empty without frames."""
-        return encoded(self._frames)
+        """The video as an MP4 file; empty without frames. No frame can be added afterwards.
+
+        Raises:
+            av.FFmpegError: a frame could not be encoded.
+        """
+        self._thread.shutdown()
+        for frame in self._encoded:
+            frame.result()
+        return self._encoder.finish()
+
+
+class _Encoder:
+    """Encodes frames one after another."""
+
+    def __init__(self) -> None:
+        self._data = io.BytesIO()
+        self._container: Any = None
+        self._stream: Any = None
+
+    def add(self, picture: UInt8Image) -> None:
+        """Encodes one (H, W, 3) uint8 frame; all frames have one size with even sides."""
+        import av
+
+        if self._container is None:
+            self._container = av.open(self._data, "w", format="mp4")
+            self._stream = self._container.add_stream("libx264", rate=Fraction(round(1 / FRAME_S)))
+            self._stream.height, self._stream.width = picture.shape[:2]
+            self._stream.pix_fmt = "yuv420p"
+            self._stream.options = {"crf": QUALITY, "preset": "fast", "threads": "1"}
+        self._container.mux(self._stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+
+    def finish(self) -> bytes:
+        """The MP4 file of all frames; empty without frames."""
+        if self._container is not None:
+            self._container.mux(self._stream.encode())
+            self._container.close()
+        return self._data.getvalue()
 
 
 def encoded(frames: Sequence[UInt8Image]) -> bytes:
@@ -83,20 +127,10 @@ def encoded(frames: Sequence[UInt8Image]) -> bytes:
     Args:
         frames: (H, W, 3) uint8 frames of one size with even sides.
     """
-    if not frames:
-        return b""
-    import av
-
-    data = io.BytesIO()
-    with av.open(data, "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=Fraction(round(1 / FRAME_S)))
-        stream.height, stream.width = frames[0].shape[:2]
-        stream.pix_fmt = "yuv420p"
-        stream.options = {"crf": QUALITY, "preset": "fast", "threads": "1"}
-        for picture in frames:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
-        container.mux(stream.encode())
-    return data.getvalue()
+    encoder = _Encoder()
+    for picture in frames:
+        encoder.add(picture)
+    return encoder.finish()
 
 
 def decoded(data: bytes) -> Iterator[UInt8Image]:

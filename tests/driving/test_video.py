@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gear.contracts.controllers import Action
-from gear.driving.drawing import LINE_PX
+from gear.driving import video as video_module
+from gear.driving.drawing import LINE_PX, drawn, drawn_end
 from gear.driving.scenario import Scenario
 from gear.driving.simulation import DriveSimulation, Situation
 from gear.driving.start import Draw
@@ -36,6 +37,11 @@ def test_a_video_has_all_frames_and_repeats(situation: Situation) -> None:
 
     data = made()
     assert data == made()
+    pictures = [np.full((96, 1000, 3), 40 * number, np.uint8) for number in range(5)]
+    drawings = [drawn("depth at 40 km/h", situation, picture, None, CALM) for picture in pictures]
+    ended = replace(situation, ending="stood")
+    end = drawn_end("depth at 40 km/h", ended, np.full((96, 1000, 3), 10, np.uint8), drawings[0].shape[0])
+    assert data == encoded([*drawings, *[end] * HELD_FRAMES]), "the thread changes no byte"
     with av.open(io.BytesIO(data)) as container:
         stream = container.streams.video[0]
         assert stream.codec_context.name == "h264" and stream.average_rate == 10
@@ -43,6 +49,17 @@ def test_a_video_has_all_frames_and_repeats(situation: Situation) -> None:
     assert len(frames) == 5 + HELD_FRAMES and frames[0].shape == (3 * LINE_PX + 80, 832, 3)
     assert abs(float(frames[4][100:].mean()) - 160) < 6
     assert abs(float(frames[-1][100:140, 50:-50].mean()) - 10) < 6, "the last picture stays"
+
+
+def test_an_error_of_the_encoder_is_raised_at_the_end(situation: Situation, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError("no memory")
+
+    monkeypatch.setattr(video_module._Encoder, "add", fail)
+    video = Video("")
+    video.watch(situation, {"left": np.zeros((96, 128, 3), np.uint8)}, None, CALM)
+    with pytest.raises(OSError, match="no memory"):
+        video.mp4()
 
 
 def test_without_pictures_there_is_no_video(situation: Situation) -> None:
