@@ -105,7 +105,7 @@ def _write(folder: Path, sink: Sink, props: Props, regions: Regions, lanes: dict
     document.solids.extend([*town_solids(regions, [], reach_m=SOLID_M), *props.solids])
     document.lanes.extend(lanes.values())
     document.sidewalks.extend(sidewalks(regions, harbour.BOUNDS))
-    # Nobody walks across slips and the roads that leave: no sidewalk goes along the former, no car on the latter.
+    # No crosswalks there: slips have no sidewalks, and no cars drive on the roads that leave the town.
     dead = tuple(f"_{street.name}" for street in regions.network.streets.values() if street.end is None)
     document.crosswalks.extend(walk for walk in crosswalks(regions) if not walk.name.endswith(dead))
     document.bays.extend([*bay_rows(regions.bay_groups), *yards.bays])

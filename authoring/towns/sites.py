@@ -269,7 +269,7 @@ class SiteBuilder:
                     self.props.spots.extend((x, y, 0.9) for x, y in points)
 
     def _stretch(self, line: Array, parts: list[Part], height_m: float, *, half_m: float = RAIL_HALF_M) -> None:
-        """A wall or a fence between two points (2, 2), seen and felt."""
+        """A wall or a fence between two points (2, 2), visible and with collision geoms."""
         x, y = (float(v) for v in line.mean(0))
         yaw = float(np.arctan2(*(line[1] - line[0])[::-1]))
         self.sink.extend(place(parts, x_m=x, y_m=y, z_m=KERB_M, yaw_rad=yaw))

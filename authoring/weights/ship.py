@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--averaged", type=Path, help="ship these: gear weights average of what the runs began with and their end"
     )
     parser.add_argument("--note", default="", help="what else there is to say of how they were made")
-    parser.add_argument("--samples", type=int, help="of the training data, as their collection was told")
+    parser.add_argument("--samples", type=int, help="value of `--samples` at the collection of the training data")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="likewise; repeatable"
     )
@@ -69,14 +69,14 @@ def ship(
     averaged: Path | None = None,
     note: str = "",
 ) -> Path:
-    """Writes `<model>.safetensors` and `<model>.md`; returns the former.
+    """Writes `<model>.safetensors` and `<model>.md`; returns the path of the first.
 
     Args:
         runs: folders of `gear train`; each but the first began with the one before.
         evaluation: folder of `gear evaluate --report reference` with the weights that are shipped.
         base: commands name files below it by what follows it.
         models: the package's folder.
-        samples: that the collection of the training data was told, if any.
+        samples: value of `--samples` at the collection of the training data, if any.
         settings: likewise; `KEY=VALUE` texts.
         averaged: a file of `gear weights average` that is shipped in place of the last run's weights.
         note: what else there is to say of how they were made.

@@ -45,8 +45,9 @@ _LARGE_M = 2.5
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Casters:
-    """Triangles of a town's static objects without the ground, sorted by squares of the ground plan (24 m), so
-    that those near a lamp are found fast.
+    """The triangles that can cast shadows: those of a town's static objects without the ground.
+
+    They are sorted by squares of the ground plan (24 m), so that triangles near a lamp are found fast.
 
     Attributes:
         corners_m: (N, 3, 3) float32 corners in world coordinates, square by square.

@@ -35,7 +35,7 @@ from gear.world.world import World
 
 
 class Planner(Protocol):
-    """Decides the scenes of samples."""
+    """Decides the contents of each sample: its weather, actors, surfaces and cameras."""
 
     def plan(self, index: int) -> SceneRecord:
         """The scene record of the sample `index`, which depends only on the index."""

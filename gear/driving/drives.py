@@ -86,7 +86,7 @@ class DriveRun:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Cast:
-    """A driver whose plugins were found.
+    """A driver of the config, with the plugins that it names.
 
     Attributes:
         label: name of the driver.

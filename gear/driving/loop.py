@@ -83,7 +83,7 @@ class Sight:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Wheel:
-    """A controller with its plugin.
+    """A built controller, and the plugin that it comes from.
 
     Attributes:
         plugin: plugin of the controller, for error messages.

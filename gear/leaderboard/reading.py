@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Filed:
-    """A record with its file.
+    """A record that was read from a file.
 
     Attributes:
         record: the record.

@@ -33,7 +33,7 @@ RESERVED_BYTES = 200_000_000
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ChosenLogger:
-    """A logger that a run uses.
+    """A built logger, and the plugin that it comes from.
 
     Attributes:
         found: plugin of the logger.

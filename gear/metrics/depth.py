@@ -106,9 +106,9 @@ class DepthEvaluator:
         shared = _summed(truth_m[both], prediction[both])  # most pixels, and worked on once for both kinds of metrics
         found = {}
         if self._wants_devkit:
-            told = other_truth_m <= MAX_PNG_DEPTH_M
-            kept_m = other_found_m[told].clip(MIN_CODED_DEPTH_M, MAX_PNG_DEPTH_M)
-            found = _devkit(shared + _summed(other_truth_m[told], kept_m))
+            coded = other_truth_m <= MAX_PNG_DEPTH_M
+            kept_m = other_found_m[coded].clip(MIN_CODED_DEPTH_M, MAX_PNG_DEPTH_M)
+            found = _devkit(shared + _summed(other_truth_m[coded], kept_m))
         strays = near[others]
         clipped_m = other_found_m[strays].clip(MIN_DEPTH_M, self.max_depth_m)
         found |= _eigen(shared + _summed(other_truth_m[strays], clipped_m))

@@ -42,7 +42,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:
-    """One picture of one sample.
+    """One picture that a page shows of a sample, such as a camera picture or a depth map in colours.
 
     Attributes:
         pixels: (H, W, 3) uint8 RGB.

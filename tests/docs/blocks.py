@@ -9,6 +9,8 @@
 | `yaml NAME` | reads it as the config that NAME says: `collection`, `scenes`, `camera`, `bench` |
 | `xml` | parses it |
 | `text` | nothing: what a command prints, a tree of files, a formula |
+
+The commands that make and test a package of a new plugin run in tests/verbs/scaffold, for every kind of plugin.
 """
 
 from __future__ import annotations

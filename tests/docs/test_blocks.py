@@ -7,6 +7,7 @@ import ast
 import importlib
 import importlib.util
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -20,9 +21,11 @@ from gear.cli.parser import Parser
 from gear.config.load import load_collection
 from gear.config.nodes import parse_file
 from gear.config.reader import read_node
+from gear.contracts.specs import KINDS
 from gear.driving.config import DriveConfig
 from gear.driving.drives import plan_drives
 from gear.driving.scenario import load_scenarios
+from gear.verbs.scaffold.write import new_package
 from gear.world.scene_spec import SceneLibrary
 from tests.docs.blocks import FENCES, ROOT, Block, all_blocks, blocks_of, commands, pages
 
@@ -101,20 +104,52 @@ def test_a_scene_library_is_accepted(block: Block, tmp_path: Path) -> None:
     assert read_node(SceneLibrary, parse_file(tmp_path / "page.yml")).scenes
 
 
+NEW_PACKAGE = """\
+gear new {kind} {name}
+cd gear-{kind}-{dashed}
+python -m pip install -e '.[dev]'
+gear plugins show {name}
+python -m pytest
+"""
+"""What the pages for authors of plugins begin with."""
+
+
+def _makes_a_package(block: Block) -> bool:
+    """Whether a block does only what tests/verbs/scaffold/test_write.py does for packages of every kind."""
+    made = re.match(r"gear new (\w+) (\w+)\n", block.text)
+    if made is None or made[1] not in KINDS:
+        return False
+    return block.text == NEW_PACKAGE.format(kind=made[1], name=made[2], dashed=made[2].replace("_", "-"))
+
+
+def _is_run_here(block: Block) -> bool:
+    return block.fence == "python" or (block.fence == "sh run" and not _makes_a_package(block))
+
+
+def test_the_commands_that_make_a_package_are_run_elsewhere(tmp_path: Path) -> None:
+    made = [block for block in all_blocks("sh run") if _makes_a_package(block)]
+    assert len(made) == len(KINDS) - 1, "all pages for authors but the tutorial for defenses"
+    for block in made:
+        words = block.text.split()
+        readme = (new_package(words[2], words[3], out=tmp_path) / "README.md").read_text()
+        for line in block.text.splitlines()[2:]:
+            assert f"\n{line}\n" in readme, block
+
+
 def _run_alone(page: Path) -> bool:
     """Whether the page's Python needs nothing from a shell block, so that it is quick."""
-    return not any(block.fence == "sh run" for block in blocks_of(page))
+    return not any(_is_run_here(block) and block.fence == "sh run" for block in blocks_of(page))
 
 
-def _pages_with(*fences: str) -> list[Path]:
-    return [page for page in pages() if any(block.fence in fences for block in blocks_of(page))]
+def _pages_that_run() -> list[Path]:
+    return [page for page in pages() if any(map(_is_run_here, blocks_of(page)))]
 
 
 @pytest.mark.parametrize(
     "page",
     [
         pytest.param(page, marks=() if _run_alone(page) else pytest.mark.slow, id=str(page.relative_to(ROOT)))
-        for page in _pages_with("sh run", "python")
+        for page in _pages_that_run()
     ],
 )
 def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
@@ -122,7 +157,7 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
     work, site = tmp_path / "work", tmp_path / "site"
     work.mkdir()
     env = _tools(tmp_path / "bin", site)
-    shell = "\n".join(block.text for block in blocks_of(page) if block.fence == "sh run")
+    shell = "\n".join(block.text for block in blocks_of(page) if block.fence == "sh run" and _is_run_here(block))
     python = "\n".join(block.text for block in blocks_of(page) if block.fence == "python")
     if shell:
         _passes(["sh", "-eu", "-c", shell], work, env)

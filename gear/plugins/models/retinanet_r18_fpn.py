@@ -1,6 +1,6 @@
 """Two RetinaNets that are trained on gear's own data: with ResNet-18, and with EfficientNet-Lite0.
 
-The trunk of the latter starts from ImageNet weights.
+The trunk EfficientNet-Lite0 starts from ImageNet weights.
 """
 
 from __future__ import annotations

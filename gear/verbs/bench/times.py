@@ -41,7 +41,7 @@ WIDTH_IN, HEIGHT_IN, TEXT_PT = 3.5, 2.2, 7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Times:
-    """The collections whose time is measured.
+    """The collections of samples whose time is measured.
 
     Attributes:
         tasks: names of task plugins.
@@ -127,7 +127,7 @@ def measures_times(request: BenchRequest) -> bool:
 
 
 def times_of(request: BenchRequest) -> Times:
-    """Reads a config with the key `times`.
+    """Reads which collections of samples are timed, from the key `times` of a benchmark's config.
 
     Args:
         request: the arguments of `gear.bench`.

@@ -65,7 +65,7 @@ ALL = "all"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class DriveReport:
-    """The results of a study.
+    """The results of all drives of a study.
 
     Attributes:
         out: folder of the results.

@@ -21,7 +21,7 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Compared:
-    """The result of the comparison.
+    """The result of comparing a record's figures with figures that were measured again.
 
     Attributes:
         findings: one line per figure.

@@ -44,14 +44,14 @@ def align_normal_maps(model: mujoco.MjModel) -> None:
     Args:
         model: compiled model, changed in place. In the files of its meshes z is up.
     """
-    wearers = np.flatnonzero((model.geom_type == _MESH) & (model.geom_matid >= 0))
-    wearers = wearers[model.mesh_texcoordnum[model.geom_dataid[wearers]] > 0]
-    worn = model.mat_texid[model.geom_matid[wearers], _NORMAL] if len(wearers) else np.zeros(0, np.int32)
-    if not (worn >= 0).any():
+    textured = np.flatnonzero((model.geom_type == _MESH) & (model.geom_matid >= 0))
+    textured = textured[model.mesh_texcoordnum[model.geom_dataid[textured]] > 0]
+    normal_map = model.mat_texid[model.geom_matid[textured], _NORMAL] if len(textured) else np.zeros(0, np.int32)
+    if not (normal_map >= 0).any():
         return
-    for texture in np.setdiff1d(worn[worn >= 0], np.delete(model.mat_texid, _NORMAL, axis=1)).tolist():
+    for texture in np.setdiff1d(normal_map[normal_map >= 0], np.delete(model.mat_texid, _NORMAL, axis=1)).tolist():
         _exchange_red_and_green(model, texture)
-    meshes = np.unique(model.geom_dataid[wearers[worn >= 0]]).tolist()
+    meshes = np.unique(model.geom_dataid[textured[normal_map >= 0]]).tolist()
     upright_from_mesh = {mesh: _matrix(model.mesh_quat[mesh]) for mesh in meshes}
     yaws = best_yaws([_sheet(model, mesh, rotation) for mesh, rotation in upright_from_mesh.items()])
     for (mesh, rotation), yaw in zip(upright_from_mesh.items(), yaws, strict=True):

@@ -14,7 +14,7 @@ from gear.verbs.bench.report import FOUND_SHARE, Result, TaskResult
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chosen:
-    """A chosen picture.
+    """The sample whose picture a report shows for a patch.
 
     Attributes:
         place: position of the scene (with its weather) in the benchmark.
