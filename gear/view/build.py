@@ -40,7 +40,7 @@ class Entry:
         detail: all other metadata of the sample, as zlib-compressed JSON.
         pictures: encoded pictures by channel, such as a camera, a preview or a prediction.
         cameras: by channel, the camera whose pixels coincide with the channel's; None if no camera's do.
-        originals: by channel, link to the dataset's file at full size, where the page contains a smaller picture.
+        originals: by channel of a camera, link to the dataset's file, which has full size and no losses.
         problem: why pictures or labels are missing; empty if the entry is complete.
     """
 
@@ -105,7 +105,7 @@ class Builder:
             for channel, what in one.shown.items():
                 pictures[channel] = encode(what.pixels, self.scale)
                 cameras[channel] = what.camera
-                if channel.kind == "image" and not pictures[channel].is_whole:
+                if channel.kind == "image":  # at full size, too: the page has it with losses
                     link = _original(one.source, one.source.dataset.sidecar(index), what.pixels)
                     originals |= {} if link is None else {channel: link}
         return Entry(

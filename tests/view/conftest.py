@@ -98,6 +98,7 @@ def twins(tmp_path_factory: pytest.TempPathFactory) -> Twins:
         put_package(patching, [model_spec(lambda _: Oracle(roots, fooled), "detect2d")])
         gear.evaluate(roots, model="odd", out=root / "evaluation")
         put_package(patching, [model_spec(lambda _: Blind(), "detect2d")])
+        patching.setattr("gear.measuring.scoring.DEFENDED_WIDTH_PX", 200)  # half of a picture's width
         gear.evaluate(roots, model="odd", defense="jpeg", defense_settings=["quality=5"], out=root / "defended")
     return Twins(none=roots[0], patched=roots[1], evaluation=root / "evaluation", defended=root / "defended")
 

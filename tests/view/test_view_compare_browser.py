@@ -80,6 +80,19 @@ def test_the_difference_is_black_but_on_the_patch(browser: Browser, page: Path) 
     no_trouble(browser)
 
 
+def test_outlines_fit_defended_pictures_that_are_stored_smaller(browser: Browser, page: Path) -> None:
+    browser.open(page, "#/sample/3")
+    browser.until("document.querySelectorAll('#sample figure').length > 6")
+    box = "f.querySelector('svg')?.getAttribute('viewBox')"
+    shown = f"[...document.querySelectorAll('#sample figure')].map((f) => [f.querySelector('b').textContent, {box}])"
+    boxes = dict(browser.value(shown))
+    defended = {name: box for name, box in boxes.items() if name.startswith("Defended")}
+    assert len(defended) == 2 and set(defended.values()) == {boxes["Camera left · none"]} == {"-0.5 -0.5 400 240"}
+    texts = str(browser.value("[...document.querySelectorAll('#sample figcaption')].map((f) => f.textContent).join()"))
+    assert "200 × 120" in texts
+    no_trouble(browser)
+
+
 def test_samples_are_sorted_by_what_changed_most(browser: Browser, page: Path) -> None:
     browser.open(page)
     assert cells(browser) == ["000000", "000001", "000002", "000003"]

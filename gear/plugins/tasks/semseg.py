@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -263,42 +262,57 @@ class SemsegTask:
         return {}
 
     def preview(self, sample: SemsegSample) -> Mapping[str, UInt8Image]:
-        """Returns the picture to look at, as `labels`: the labels' colours are blended over it, and borders
-        between instances are white.
+        """Returns the pictures to look at: `image` with outlined surfaces, and `labels`, the map of the labels' colours
+        with white borders between instances.
+
+        Colours are not blended with the picture: the colours of a patch would show through, and no colour would be that
+        of the legend.
 
         Args:
             sample: the sample with its label and instance maps.
         """
-        colours = cityscapes.colour_map(sample.label_ids)[..., :3]
-        picture = cv2.addWeighted(sample.images[VIEW], 0.45, np.ascontiguousarray(colours), 0.55, 0.0)
-        instances = sample.instance_ids
-        edge = np.zeros(instances.shape, dtype=np.bool_)
-        edge[:, 1:] |= instances[:, 1:] != instances[:, :-1]
-        edge[1:] |= instances[1:] != instances[:-1]
-        picture[edge & (instances >= cityscapes.INSTANCE_FACTOR)] = 255
+        picture = sample.images[VIEW].copy()
         draw_surfaces(picture, sample, VIEW)
-        return {"labels": picture}
+        return {"image": picture, "labels": _drawn(sample)}
 
     def prediction_preview(self, sample: SemsegSample, prediction: npt.NDArray[np.uint8]) -> Mapping[str, UInt8Image]:
-        """Returns the picture to look at, as `labels`: the colours of the predicted labels over the picture,
-        without instances.
+        """Returns the picture to look at, as `labels`: the map of the predicted labels' colours, without instances.
 
         Args:
-            sample: the sample, for its picture.
+            sample: the sample, for the outlines of its surfaces.
             prediction: (H, W) predicted label ids.
         """
         shown = prediction.astype(np.uint8)
-        return self.preview(replace(sample, label_ids=shown, instance_ids=shown.astype(np.uint16)))
+        return {"labels": _drawn(replace(sample, label_ids=shown, instance_ids=shown.astype(np.uint16)))}
 
     def legends(self) -> Mapping[str, Legend]:
-        """The colours of the classes that Cityscapes evaluates."""
-        return {
-            "labels": ColourNames(entries=tuple((one.name, one.rgb) for one in cityscapes.LABELS if one.is_evaluated))
-        }
+        """The colours of the classes that Cityscapes evaluates, and of the others that gear's towns have."""
+        evaluated = [(one.name, one.rgb) for one in cityscapes.LABELS if one.is_evaluated]
+        others = [(f"{one.name} (not evaluated)", one.rgb) for one in cityscapes.LABELS if one.name in SHOWN_OTHERS]
+        return {"labels": ColourNames(entries=(*evaluated, *others))}
 
+
+SHOWN_OTHERS = ("static", "dynamic", "ground", "parking")
+"""Names of classes in the legend that Cityscapes does not evaluate. A billboard is `static`, which is black."""
 
 UNLABELLED = 0
 """Cityscapes' id of pixels without a label, such as those beyond the picture."""
+
+
+def _drawn(sample: SemsegSample) -> UInt8Image:
+    """Draws the colours of a sample's label map, borders between its instances, and the outlines of its surfaces.
+
+    Returns:
+        (H, W, 3) uint8 RGB.
+    """
+    picture = np.ascontiguousarray(cityscapes.colour_map(sample.label_ids)[..., :3])
+    instances = sample.instance_ids
+    edge = np.zeros(instances.shape, dtype=np.bool_)
+    edge[:, 1:] |= instances[:, 1:] != instances[:, :-1]
+    edge[1:] |= instances[1:] != instances[:-1]
+    picture[edge & (instances >= cityscapes.INSTANCE_FACTOR)] = 255
+    draw_surfaces(picture, sample, VIEW)
+    return picture
 
 
 def flip(sample: SemsegSample) -> SemsegSample:

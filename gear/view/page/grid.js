@@ -1,5 +1,7 @@
 // The contact sheet.
-const look = { place: Math.max(0, CHANNELS.findIndex((channel) => channel.kind === "preview")) };
+// The first preview with a legend, such as labels or depth; else the first preview, such as boxes over the picture.
+const firstPreview = (isWanted) => CHANNELS.findIndex((channel) => channel.kind === "preview" && isWanted(channel));
+const look = { place: [firstPreview((channel) => ABOUT.legends[channel.name]), firstPreview(() => true), 0].find((place) => place >= 0) };
 const cells = [];
 
 function buildGrid() {
@@ -61,7 +63,7 @@ function showOrder() {
   orderShown = order;
   if (SORTS.length) {
     byId("sort").value = filters.sort;
-    byId("order").textContent = filters.sort ? (filters.order ? "Smallest first" : "Largest first") : filters.order ? "Last first" : "First first";
+    byId("order").textContent = filters.sort ? (filters.order ? "Smallest first" : "Largest first") : filters.order ? "Highest first" : "Lowest first";
   }
   byId("cells").append(...sorted(SAMPLES, filters.sort, filters.order === "up").map((sample) => cells[sample.number].parentElement));
   for (const sample of SAMPLES) {

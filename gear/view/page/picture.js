@@ -21,9 +21,11 @@ function outlines(sample, place, withNames) {
   const changes = changeBoxes(sample, place);
   const faces = sample.surfaces.filter((surface) => surface.camera === picture.camera && surface.corners);
   if (!faces.length && !changes.length) return null;
-  const size = picture.width / 48;
+  // Corners and boxes are in pixels of the camera; a defended picture may be stored with fewer.
+  const { width, height } = sample.cameras.find((camera) => camera.name === picture.camera) ?? picture;
+  const size = width / 48;
   // Corners are index pixels: the picture spans half a pixel more on every side.
-  return svg("svg", { viewBox: `-0.5 -0.5 ${picture.width} ${picture.height}`, preserveAspectRatio: "none", "aria-hidden": "true" },
+  return svg("svg", { viewBox: `-0.5 -0.5 ${width} ${height}`, preserveAspectRatio: "none", "aria-hidden": "true" },
     changes,
     faces.map((face) => [
       svg("polygon", { points: face.corners.map((corner) => corner.join(",")).join(" ") }, svg("title", {}, face.name)),

@@ -187,6 +187,121 @@ def test_a_header_that_demands_the_memory(tmp_path: Path) -> None:
         import_archive(tmp_path / "a.tar", out=tmp_path / "new")
 
 
+def zipped(root: Path, out: Path, then: Callable[[zipfile.ZipFile], None] = lambda archive: None) -> bytes:
+    shutil.make_archive(str(out.with_suffix("")), "zip", root)
+    with zipfile.ZipFile(out, "a") as archive:
+        then(archive)
+    return out.read_bytes()
+
+
+def changed(data: bytes, place: int, value: bytes) -> bytes:
+    return data[:place] + value + data[place + len(value) :]
+
+
+def test_archives_that_are_cut_off_or_go_on_are_refused(root: Path, tmp_path: Path) -> None:
+    tar = packed(root, tmp_path / "a.tar").read_bytes()
+    whole = gzip.compress(tar, 1)
+    archive = zipped(root, tmp_path / "a.zip")
+    stripped = tar.rstrip(b"\0")
+    unended = stripped + bytes(-len(stripped) % 512)
+    kinds = {
+        "tar without its end": (unended, "its end is missing"),
+        "data after the tar": (tar + b"more", "other data follow"),
+        "two tars": (tar + tar, "other data follow"),
+        "gzip without its checksum": (whole[:-8], "ended before"),
+        "gzip with a wrong checksum": (changed(whole, len(whole) - 8, b"abcd"), "CRC check failed"),
+        "data after the gzip": (whole + b"more", "Not a gzipped file"),
+        "zip without its end": (archive[:-22], "its end is missing"),
+        "zip cut in its end": (archive[:-2], "its end is missing"),
+        "data after the zip": (archive + b"more", "other data follow"),
+        "data before the zip": (b"#!/bin/sh\n" + archive, "cannot be unpacked"),
+        "zip behind a tar": (tar + archive, "other data follow"),
+        "zip with a wrong checksum": (changed(archive, archive.rindex(b"PK\1\2") + 16, b"abcd"), "Bad CRC-32"),
+    }
+    for name, (data, problem) in kinds.items():
+        (tmp_path / "damaged").write_bytes(data)
+        with pytest.raises(DatasetError, match=problem):
+            import_archive(tmp_path / "damaged", out=tmp_path / "new")
+        assert nothing_left(tmp_path), name
+
+
+def test_zeros_after_a_tar_are_bounded(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tar = packed(root, tmp_path / "a.tar").read_bytes()
+    monkeypatch.setattr(members, "ALWAYS_BYTES", len(tar))
+    monkeypatch.setattr(members, "LARGEST_RATIO", 1)
+    (tmp_path / "bomb").write_bytes(gzip.compress(tar + bytes(3_000_000), 1))
+    with pytest.raises(DatasetError, match=r"more than . MB when decompressed"):
+        import_archive(tmp_path / "bomb", out=tmp_path / "new")
+    assert nothing_left(tmp_path)
+
+
+def test_a_zip_in_a_tar_is_a_file(root: Path, tmp_path: Path) -> None:
+    inner = zipped(root, tmp_path / "a.zip")
+    archive = packed(root, tmp_path / "a.tar", then=member("data/copy.zip", inner))
+    assert import_archive(archive, out=tmp_path / "new").left_out == ("copy.zip",)
+
+
+@pytest.mark.parametrize(
+    ("mode", "problem"), [(stat.S_IFLNK, "a link"), (stat.S_IFIFO, "a device or a pipe"), (stat.S_IFCHR, "a device")]
+)
+@pytest.mark.parametrize("name", ["odd", "odd/"])
+def test_odd_kinds_in_zip_archives(root: Path, tmp_path: Path, mode: int, problem: str, name: str) -> None:
+    info = zipfile.ZipInfo(name)
+    info.external_attr = (mode | 0o644) << 16
+    zipped(root, tmp_path / "a.zip", lambda archive: archive.writestr(info, b""))
+    with pytest.raises(DatasetError, match=f"'odd', which is {problem}"):
+        import_archive(tmp_path / "a.zip", out=tmp_path / "new")
+    assert nothing_left(tmp_path)
+
+
+def test_damaged_headers_are_told_in_words(root: Path, tmp_path: Path) -> None:
+    header = tarfile.TarInfo("x")
+    header.type, header.size = tarfile.XHDTYPE, 10
+    block = header.tobuf(tarfile.USTAR_FORMAT) + b"10 a=bcde\n".ljust(512, b"\0")
+    tar = packed(root, tmp_path / "a.tar").read_bytes()
+    archive = zipped(root, tmp_path / "a.zip")
+    digits = tarfile.TarInfo("x")
+    digits.type, digits.size = tarfile.XHDTYPE, 5008
+    kinds = [
+        block * 3000 + tar,  # headers of headers
+        digits.tobuf(tarfile.USTAR_FORMAT) + (b"9" * 5000 + b" path=x\n").ljust(5120, b"\0") + tar,
+        changed(archive, len(archive) - 6, (1 << 31).to_bytes(4, "little")),  # the directory begins before the file
+    ]
+    for data in kinds:
+        (tmp_path / "damaged").write_bytes(data)
+        with pytest.raises(DatasetError, match="a header is damaged"):
+            import_archive(tmp_path / "damaged", out=tmp_path / "new")
+        assert nothing_left(tmp_path)
+
+
+def test_a_negative_size_is_refused(root: Path, tmp_path: Path) -> None:
+    info = member("odd", b"", pax_headers={"size": "-512"})
+    archive = tmp_path / "a.tar"
+    with tarfile.open(archive, "w", format=tarfile.PAX_FORMAT) as tar:
+        tar.add(root, "data")
+        info(tar)
+    with pytest.raises(DatasetError, match="negative size"):
+        import_archive(archive, out=tmp_path / "new")
+    assert nothing_left(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("data/readme.MD", "one file on some file systems"),
+        ("data/README.md/x", "which is a file, too"),
+        ("data/a\n\x1b[2J", "control characters"),
+        ("d/" * 500 + "x", "folders deep"),
+        ("x" * 300, "more than 255 bytes"),
+    ],
+)
+def test_names_that_could_mislead(root: Path, tmp_path: Path, name: str, problem: str) -> None:
+    archive = packed(root, tmp_path / "a.tar", then=member(name))
+    with pytest.raises(DatasetError, match=problem):
+        import_archive(archive, out=tmp_path / "new")
+    assert nothing_left(tmp_path)
+
+
 def test_damage_is_one_line_and_leaves_nothing(root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole = packed(root, tmp_path / "a.tar")
     picture = next(path for path in root.rglob("rgb_0001.png") if "leftImg8bit" in path.parts)
