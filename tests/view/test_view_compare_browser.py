@@ -73,6 +73,8 @@ def test_the_difference_is_black_but_on_the_patch(browser: Browser, page: Path) 
         seen[inside].mean() > 60
         and seen[~cv2.dilate(inside.astype(np.uint8), np.ones((9, 9))).astype(bool)].mean() < 12
     )
+    assert [Path(one).name for one in browser.requests] == ["rgb_0003.png"] * 2  # the files: the page has losses
+    browser.requests.clear()
     browser.press("c")
     assert browser.value("document.querySelector('[data-mode=slider]').getAttribute('aria-pressed')") == "true"
     browser.press("c")

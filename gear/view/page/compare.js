@@ -45,7 +45,8 @@ function compareCard(sample) {
   function overlaid() {
     const [left, right] = compared.pair;
     const picture = pictureOf(sample, left);
-    box = h("div", { class: `stack pair ${compared.mode}`, onpointerdown: drag, onpointermove: drag }, image(sample, left, "left", true), image(sample, right, "right", true));
+    const isDifference = compared.mode === "difference";
+    box = h("div", { class: `stack pair ${compared.mode}`, onpointerdown: drag, onpointermove: drag }, image(sample, left, "left", true, isDifference), image(sample, right, "right", true, isDifference));
     if (compared.mode === "slider") box.append(h("i", { class: "divider" }), h("span", { class: "tag" }, channelLabel(CHANNELS[left])), h("span", { class: "tag end" }, channelLabel(CHANNELS[right])));
     box.style.aspectRatio = `${picture.width} / ${picture.height}`;
     box.addEventListener("near", () => box.querySelectorAll("img").forEach((img) => img.show(true)));

@@ -55,12 +55,13 @@ function stack(sample, place, { large = false } = {}) {
   return box;
 }
 
-function image(sample, place, css, isNamed) {
+// `isExact` loads the dataset's file also at full size, because the page's picture has losses.
+function image(sample, place, css, isNamed, isExact = false) {
   const picture = pictureOf(sample, place);
   const img = h("img", { class: css, decoding: "async", draggable: "false", alt: isNamed ? `${channelLabel(CHANNELS[place])}, sample ${sampleName(sample)}` : "" });
   img.show = (large) => {
     withPicture(sample, place, (url) => { if (!img.src) img.src = url; });
-    if (!large || !picture.original) return;
+    if (!large || !picture.original || (picture.whole && !isExact)) return;
     const file = new Image();
     file.onload = () => { img.src = file.src; };
     file.src = picture.original;
