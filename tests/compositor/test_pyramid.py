@@ -117,3 +117,22 @@ def test_a_cache_is_bounded_and_forgets_the_oldest() -> None:
         cache.get(name, lambda name=name: make(name))  # type: ignore[misc]
     assert made == ["a", "b", "c", "b"]
     assert (len(cache), cache.nbytes) == (2, 80)
+
+
+def test_a_cache_may_be_filled_to_its_limit() -> None:
+    class Half:
+        nbytes = 50
+
+    cache: Cache[Half] = Cache(100)
+    for name in ("a", "b"):
+        cache.get(name, Half)
+    assert (len(cache), cache.nbytes) == (2, 100)
+
+
+def test_a_sparse_matrix_counts_the_memory_of_both_directions() -> None:
+    from scipy import sparse
+
+    matrix = SparseMatrix.of(sparse.random(5, 7, 0.4, "csr", np.float32), torch.device("cpu"))
+    entries = 14
+    indices = (5 + 1) + (7 + 1) + 2 * entries
+    assert matrix.nbytes == 4 * indices + 4 * 2 * entries
