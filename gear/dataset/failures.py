@@ -1,5 +1,5 @@
-"""Notes on samples that could not be made: JSON files in `gear/<split>/failed` with error, traceback and number of
-attempts.
+"""Notes on samples that could not be made: JSON files in `gear/<split>/failed` with error, traceback, number of
+attempts and a hash of their own content.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from pathlib import Path
 from gear.contracts.executors import Outcome
 from gear.dataset.files import write_whole
 from gear.dataset.guarded_paths import owned, remove_empty_folders, remove_files
-from gear.dataset.json_text import dump_json
 from gear.dataset.layout import failed_path, split_folder
+from gear.dataset.sealed_json import sealed_json
 
 
 def failures_folder(split: str) -> str:
@@ -33,7 +33,7 @@ def note_failure(root: Path, split: str, outcome: Outcome, tries: int) -> None:
     """
     trace = outcome.trace.encode(errors="backslashreplace").decode()
     note = {"index": outcome.index, "tries": tries, "error": outcome.error, "traceback": trace.splitlines()}
-    write_whole(root, failed_path(split, outcome.index), dump_json(note))
+    write_whole(root, failed_path(split, outcome.index), sealed_json(note))
 
 
 def noted_failures(root: Path, split: str) -> set[int]:

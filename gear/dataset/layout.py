@@ -13,6 +13,9 @@ CARDS = (CARD, CROISSANT)
 PROBES, SCANS, FLOWS = "probes", "scans", "flow"
 """Kinds of auxiliary files of a sample."""
 
+TEMPORARY = ("begun", "claims", "failed")
+"""Folders of a split for files that exist only while the split is made."""
+
 
 def split_folder(split: str) -> str:
     """The folder of a split's sidecars (JSON files of the samples), plan and manifest, relative to the dataset's
@@ -58,6 +61,14 @@ def is_reserved(relative: str, split: str) -> bool:
     if parts[:1] != (GEAR,):
         return "/".join(parts) in {card.casefold() for card in CARDS}
     return len(parts) != 4 or parts[1] != split.casefold() or parts[2] not in (PROBES, SCANS, FLOWS)
+
+
+def is_temporary(relative: str) -> bool:
+    """Whether a path relative to the root is a file that exists only while a split is made: a half-written file, a list
+    of files, a claim or a note on a failure.
+    """
+    parts = PurePosixPath(relative).parts
+    return parts[0] == GEAR and (parts[1:2] == ("scratch",) or (len(parts) == 4 and parts[2] in TEMPORARY))
 
 
 def plan_path(split: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -10,6 +9,7 @@ import pytest
 from gear.contracts.executors import Outcome
 from gear.dataset.failures import clear_failures, failures_folder, note_failure, noted_failures
 from gear.dataset.layout import failed_path
+from gear.dataset.sealed_json import load_sealed
 from gear.values.errors import DatasetError
 
 
@@ -20,7 +20,7 @@ def outcome(index: int) -> Outcome:
 def test_notes_hold_error_traceback_and_tries(tmp_path: Path) -> None:
     assert noted_failures(tmp_path, "test") == set()
     note_failure(tmp_path, "test", outcome(3), tries=2)
-    content = json.loads((tmp_path / failed_path("test", 3)).read_text())
+    content = load_sealed(tmp_path / failed_path("test", 3))
     assert content == {
         "index": 3,
         "tries": 2,

@@ -13,10 +13,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Literal
 
+from gear.dataset.checks.salvage import files_below, listed_hashes
 from gear.dataset.failures import failures_folder
 from gear.dataset.files import inside
 from gear.dataset.hashing import file_hash, in_threads
-from gear.dataset.layout import GEAR, manifest_path, patch_path, plan_path, sidecar_path, split_folder
+from gear.dataset.layout import GEAR, is_temporary, manifest_path, patch_path, plan_path, sidecar_path, split_folder
 from gear.dataset.plan import Plan, read_plan
 from gear.dataset.scratch import SCRATCH
 from gear.dataset.sealed_json import load_sealed
@@ -26,7 +27,7 @@ from gear.values.errors import DatasetError
 from gear.values.progress import Progress
 from gear.values.serial import Json
 
-Problem = Literal["damaged", "missing", "unexpected"]
+Problem = Literal["damaged", "missing", "unexpected", "unchecked"]
 
 MOST_MISSING = 100_000
 """Largest number of missing samples that are listed one by one, because a plan of unknown origin may name any number of
@@ -36,12 +37,13 @@ samples.
 
 @dataclass(frozen=True, slots=True, kw_only=True, order=True)
 class Finding:
-    """One file that is damaged, missing or unexpected.
+    """One file that is damaged, missing or unexpected, or cannot be checked.
 
     Attributes:
         path: path relative to the dataset's root.
         problem: `damaged` if the bytes are not those that were written; `missing`; or `unexpected` for a file that does
-            not belong to the dataset, in a folder that readers of the format list.
+            not belong to the dataset, in a folder that readers of the format list; `unchecked` if the hash of the file
+            is unknown, because the files that list it are damaged.
         detail: further explanation as text.
     """
 
@@ -66,6 +68,7 @@ class SplitCheck:
         broken_samples: indices of samples with a missing or damaged file or sidecar.
         known: paths of all files that belong to the split.
         findings: files of the split that are damaged or missing.
+        unreadable: damaged manifest and sidecars, whose lists of files and hashes cannot be relied on.
     """
 
     split: str
@@ -75,6 +78,7 @@ class SplitCheck:
     broken_samples: set[int] = field(default_factory=set)
     known: set[str] = field(default_factory=set)
     findings: list[Finding] = field(default_factory=list)
+    unreadable: set[str] = field(default_factory=set)
 
     def found(self, path: str, problem: Problem, detail: str = "") -> None:
         """Adds a file that is damaged, missing or unexpected to the result.
@@ -122,6 +126,9 @@ def check_split(root: Path, split: str, on_progress: Progress | None = None) -> 
     if isinstance(check.manifest, dict):
         _check_listed(root, check, check.manifest.get("indexes"))
         _check_listed(root, check, check.manifest.get("patches"))
+    if check.unreadable:
+        _check_salvaged(root, check)
+    _check_failure_notes(root, check)
     label = check.plan.patch["label"] if check.plan is not None else ""
     check.known |= {
         _relative(root, path) for path in inside(root, patch_path(label or "none", "x")).parent.glob("*.png")
@@ -151,6 +158,8 @@ def unexpected_files(root: Path, checks: Iterable[SplitCheck]) -> list[Finding]:
             relative = _relative(root, path)
             if relative not in known and not path.name.startswith(".") and not path.is_dir():
                 found.append(Finding(path=relative, problem="unexpected"))
+    if any(check.unreadable for check in checks):
+        found += _unchecked(root, known)
     leftovers = [
         path
         for check in checks
@@ -197,8 +206,10 @@ def _check_manifest(root: Path, check: SplitCheck) -> None:
         dict(manifest["indexes"])
     except DatasetError as error:
         check.found(relative, "damaged", error.problem.partition(";")[0])
+        check.unreadable.add(relative)
     except (KeyError, TypeError, ValueError):
         check.found(relative, "damaged", "it lists no files")
+        check.unreadable.add(relative)
     else:
         if check.plan is not None and manifest.get("content_key") != check.plan.content_key:
             check.found(plan_path(check.split), "damaged", "it is not the plan that the manifest was written for")
@@ -257,9 +268,53 @@ def _sample_findings(
                     yield Finding(path=manifest_path(check.split), problem="damaged", detail=detail)
         except DatasetError as error:
             yield Finding(path=relative, problem="damaged", detail=error.problem.partition(";")[0])
+            if not listed:
+                check.unreadable.add(relative)
     check.known |= files.keys()
     for name, digest in files.items():
         yield from _file_findings(root, name, digest)
+
+
+def _check_failure_notes(root: Path, check: SplitCheck) -> None:
+    """Checks the notes on samples that could not be made; a note is damaged together with its missing sample."""
+    for path in sorted(inside(root, failures_folder(check.split)).glob("*.json")):
+        if not path.stem.isdecimal() or inside(root, sidecar_path(check.split, int(path.stem))).exists():
+            continue  # `unexpected_files` reports it
+        check.known.add(_relative(root, path))
+        try:
+            load_sealed(path)
+        except DatasetError as error:
+            check.found(_relative(root, path), "damaged", error.problem.partition(";")[0])
+
+
+def _check_salvaged(root: Path, check: SplitCheck) -> None:
+    """Checks the files that only damaged manifests and sidecars list, with the hashes that are still readable there."""
+    hashes = listed_hashes(root, check.unreadable)
+    for relative in sorted(hashes.keys() - check.known):
+        check.known.add(relative)
+        path = inside(root, relative)
+        if not path.exists():
+            check.found(relative, "missing")
+        elif not path.is_file() or file_hash(path) not in hashes[relative]:
+            check.found(relative, "damaged")
+
+
+def _unchecked(root: Path, known: set[str]) -> list[Finding]:
+    """The files of a dataset that cannot be checked: damaged files are the only ones that could list them.
+
+    Args:
+        root: root of the dataset.
+        known: paths of the files whose hashes are known. If one of them lies outside of `gear/`, only folders of known
+            files are searched, because other folders may belong to the user.
+    """
+    tops = {Path(path).parts[0] for path in known if "/" in path}
+    detail = "the files that list it are damaged"
+    return [
+        Finding(path=path, problem="unchecked", detail=detail)
+        for path in files_below(root)
+        if path not in known and "/" in path and not is_temporary(path)
+        if tops == {GEAR} or Path(path).parts[0] in tops
+    ]
 
 
 def _check_listed(root: Path, check: SplitCheck, hashes: Json) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import get_args
 
-from gear.dataset.checks.verification import Finding
+from gear.dataset.checks.verification import Finding, Problem
 from gear.plugins.text import LONGEST_LINE, printable
 from gear.values.serial import Json
 
@@ -16,8 +17,9 @@ class VerifyReport:
 
     Attributes:
         root: root of the dataset.
-        files: number of checked files.
-        findings: files that are damaged, missing or unexpected; after a repair, only those that could not be repaired.
+        files: number of files of the dataset, with those that cannot be checked.
+        findings: files that are damaged, missing or unexpected, or cannot be checked; after a repair, only those that
+            could not be repaired.
         repaired: files that were made again, or deleted as leftovers of an interrupted run.
         unrepaired: one line with the reason for each split that could not be repaired.
         notes: one line for each repaired split whose new files may differ from the original ones.
@@ -51,7 +53,7 @@ class VerifyReport:
             return [*lines, f"{self.root}: {self.files} files, all as they were written"]
         counts = [
             f"{count} {problem}"
-            for problem in ("damaged", "missing", "unexpected")
+            for problem in get_args(Problem)
             if (count := sum(one.problem == problem for one in self.findings))
         ]
         return [*lines, f"{self.root}: {', '.join(counts)} of {self.files} files"]

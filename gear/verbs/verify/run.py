@@ -7,12 +7,14 @@ from pathlib import Path
 
 from gear.collecting.devices import has_mixed_devices
 from gear.collecting.run import executor_of, run_job
+from gear.dataset.checks.salvage import restored
 from gear.dataset.checks.verification import Finding, SplitCheck, check_split, splits_in, unexpected_files
+from gear.dataset.files import inside, read_bytes, write_whole
 from gear.dataset.finishing.cards import damaged_cards, own_cards, write_cards
 from gear.dataset.guarded_paths import refuse_links, remove_files
-from gear.dataset.layout import sidecar_path, split_folder
+from gear.dataset.layout import plan_path, sidecar_path, split_folder
 from gear.dataset.locks import dataset_lock, is_locked
-from gear.dataset.plan import write_plan
+from gear.dataset.plan import read_plan, write_plan
 from gear.reporting.display import displayed
 from gear.values.errors import DatasetError
 from gear.values.progress import Callbacks, Progress
@@ -74,7 +76,7 @@ def _verified(
         if not findings:
             write_cards(root)  # which may be missing
     if sources is None or not findings:
-        return VerifyReport(root=root, files=_count(root, checks, chosen), findings=tuple(findings))
+        return VerifyReport(root=root, files=_count(root, checks, chosen, findings), findings=tuple(findings))
     unrepaired: list[str] = []
     notes: list[str] = []
     leftovers = any(one.detail for one in findings if one.problem == "unexpected")
@@ -90,9 +92,9 @@ def _verified(
     paths = {one.path for one in left}
     return VerifyReport(
         root=root,
-        files=_count(root, checks, chosen),
+        files=_count(root, checks, chosen, left),
         findings=tuple(left),
-        repaired=tuple(one for one in findings if one.path not in paths),
+        repaired=tuple(one for one in findings if one.path not in paths and one.problem != "unchecked"),
         unrepaired=tuple(unrepaired),
         notes=tuple(notes),
     )
@@ -112,8 +114,9 @@ def _findings(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) 
     return list(dict.fromkeys([*found, *unexpected]))
 
 
-def _count(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) -> int:
-    return len({path for name in chosen for path in checks[name].known} | own_cards(root))
+def _count(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str], findings: Sequence[Finding]) -> int:
+    unchecked = {one.path for one in findings if one.problem == "unchecked"}
+    return len({path for name in chosen for path in checks[name].known} | own_cards(root) | unchecked)
 
 
 def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callbacks: Callbacks) -> list[str]:
@@ -126,6 +129,7 @@ def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callb
         DatasetError: it is not recorded how the split was made, other bytes would be made on this machine, or another
             run is writing the split.
     """
+    _restore_plan(root, check)
     job = job_of(root, check, sources)
     with dataset_lock(root):
         if is_locked(root / split_folder(check.split)):
@@ -140,3 +144,19 @@ def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callb
         f"split {check.split!r} has samples of different graphics devices; the repaired samples may differ from the "
         "original ones in last bits"
     ]
+
+
+def _restore_plan(root: Path, check: SplitCheck) -> None:
+    """Restores a plan in which one byte was changed, if the manifest is damaged as well.
+
+    Without either of them it is unknown how the split was made. The hash in the plan proves that the restored content
+    is the original.
+    """
+    path = inside(root, plan_path(check.split))
+    if check.plan is not None or check.manifest is not None or not path.is_file():
+        return
+    content = restored(read_bytes(path))
+    if content is not None:
+        with dataset_lock(root):
+            write_whole(root, plan_path(check.split), content)
+        check.plan = read_plan(root, check.split)
