@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import shutil
 import sys
+import textwrap
 
 from gear.measuring.text_table import WIDTH
 
@@ -24,3 +25,15 @@ def line_width() -> int:
     if the output is not a terminal.
     """
     return max(shutil.get_terminal_size((WIDTH, 24)).columns, 60)
+
+
+def wrapped(line: str) -> str:
+    """Wraps a line at the line width (see `line_width`); further lines are indented by 4 more characters.
+
+    Words that are longer than a line, such as addresses and paths, stay whole.
+
+    Args:
+        line: text without line breaks; its leading blanks are kept.
+    """
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
+    return textwrap.fill(line, line_width(), subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)

@@ -267,6 +267,7 @@ class Figure:
         value, low, high: the value and its 95 % interval; None where undefined.
         n: number of samples.
         ceiling: value that perfect predictions reach.
+        from_few_streets: whether the interval rests on fewer than three streets, so that it may be too narrow.
     """
 
     patch: str
@@ -276,6 +277,7 @@ class Figure:
     high: float | None
     n: int
     ceiling: float = 1.0
+    from_few_streets: bool = False
 
     def __post_init__(self) -> None:
         check_name("patch", self.patch)

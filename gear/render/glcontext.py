@@ -19,7 +19,8 @@ _OSMESA_LIBRARIES = ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")
 _PLATFORM_DEVICE = 0x313F
 _MAX_DEVICES = 32
 _DEVICE = "MUJOCO_EGL_DEVICE_ID"
-_SETTINGS = ("MUJOCO_GL", "PYOPENGL_PLATFORM")
+_PLATFORM = "PYOPENGL_PLATFORM"
+_SETTINGS = ("MUJOCO_GL", _PLATFORM)
 
 
 def backend_setting() -> str | None:
@@ -64,6 +65,7 @@ def open_context(backend: str, renderer: str) -> Any:
     Raises:
         BackendError: the driver is missing, or `MUJOCO_EGL_DEVICE_ID` is not the number of a device.
     """
+    _silence_mesa()
     try:
         if backend == "egl":
             from mujoco.egl import GLContext
@@ -81,6 +83,9 @@ def open_context(backend: str, renderer: str) -> Any:
 def _cause(backend: str, error: Exception) -> tuple[str, str]:
     """Why a context could not be opened, and what to do."""
     text = str(error).splitlines()[0] if str(error) else type(error).__name__
+    platform = os.environ.get(_PLATFORM, "")
+    if platform not in ("", "egl", "osmesa"):
+        return f"{_PLATFORM} is {platform[:40]!r}, and gear renders through EGL or OSMesa", f"unset {_PLATFORM}"
     if backend != "egl":
         return f"OSMesa does not start ({text})", _OSMESA
     found = egl_problem()
@@ -98,6 +103,7 @@ def _cause(backend: str, error: Exception) -> tuple[str, str]:
 
 def egl_problem() -> tuple[str, str] | None:
     """The reason why EGL cannot be used without a display, and what to install; None if EGL can start a device."""
+    _silence_mesa()
     if not _loads("libEGL.so.1"):
         return "the EGL library libEGL.so.1 is not installed", _NO_LIBRARY
     devices = _egl_devices()
@@ -106,6 +112,11 @@ def egl_problem() -> tuple[str, str] | None:
     if not any(map(_initialises, devices)):
         return "EGL finds a device, but no driver for it starts", _remedy(_NO_DRIVER, "LIBGL_DRIVERS_PATH")
     return None
+
+
+def _silence_mesa() -> None:
+    """Switches off warnings that Mesa's EGL writes to stderr, because gear reports the cause in its own line."""
+    os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
 
 
 def _remedy(install: str, *settings: str) -> str:

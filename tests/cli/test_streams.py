@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from gear.cli.streams import line_width, prepare_streams
+from gear.cli.streams import line_width, prepare_streams, wrapped
 
 
 def test_characters_that_the_encoding_lacks_are_escaped(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -24,3 +24,11 @@ def test_lines_are_as_wide_as_the_terminal(columns: str, expected: int, monkeypa
     monkeypatch.setenv("COLUMNS", columns)
     monkeypatch.setattr(sys, "__stdout__", io.StringIO())
     assert line_width() == expected
+
+
+def test_long_lines_are_wrapped_with_an_indent_and_addresses_stay_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "70")
+    address = "https://example.org/" + "a" * 80
+    lines = wrapped("  source: " + "word " * 20 + address).splitlines()
+    assert lines[-1] == "      " + address and len(lines) == 3
+    assert all(len(line) <= 70 for line in lines[:-1]) and lines[1].startswith("      word")

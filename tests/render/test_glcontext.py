@@ -82,3 +82,8 @@ def test_a_device_that_is_not_there_is_one_line(number: str) -> None:
     last = probe_in_a_process("raster", MUJOCO_EGL_DEVICE_ID=number)
     assert f"MUJOCO_EGL_DEVICE_ID is '{number}', and EGL has the devices 0 to " in last
     assert "unset it" in last and "apt-get" not in last
+
+
+def test_a_platform_that_pyopengl_does_not_know_is_named() -> None:
+    last = probe_in_a_process("raster", PYOPENGL_PLATFORM="nonsense")
+    assert "PYOPENGL_PLATFORM is 'nonsense', and gear renders through EGL or OSMesa; unset PYOPENGL_PLATFORM" in last

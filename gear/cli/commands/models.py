@@ -7,7 +7,7 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from gear.cli.streams import line_width
+from gear.cli.streams import line_width, wrapped
 from gear.measuring.text_table import text_table
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def details(model: ModelFacts) -> list[str]:
     for weights in spec.published:
         facts.append(("published", f"{weights.data}; {weights.size_mb:g} MB; {weights.licence}; {weights.source}"))
     facts.append(("shipped", shipped_line(model.shipped)))
-    return [f"{spec.name}: {spec.summary}", *text_table(("", ""), facts, width=line_width(), wrap=True)[1:]]
+    return [wrapped(f"{spec.name}: {spec.summary}"), *text_table(("", ""), facts, width=line_width(), wrap=True)[1:]]
 
 
 def shipped_line(weights: ShippedWeights | None) -> str:

@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
-from gear.cli.streams import line_width
+from gear.cli.streams import line_width, wrapped
 from gear.contracts.specs import KINDS, Kind
 from gear.measuring.text_table import text_table
 
@@ -108,19 +108,19 @@ def show(catalogue: Catalogue, kinds: tuple[Kind, ...], args: argparse.Namespace
     if args.json:
         print(json.dumps(facts, indent=1))
         return 0
-    print(f"{facts['kind']} {facts['name']} ({facts['package']} {facts['version']}): {facts['summary']}")
-    print(f"  source: {facts['source']}")
-    for key, value in facts["capabilities"].items():
-        print(f"  {key}: {_text(value)}")
+    lines = [f"{facts['kind']} {facts['name']} ({facts['package']} {facts['version']}): {facts['summary']}"]
+    lines.append(f"  source: {facts['source']}")
+    lines += [f"  {key}: {_text(value)}" for key, value in facts["capabilities"].items()]
     for key, value in trained.items():
         parts = [f"{name}={part}" for name, part in value.items()] if isinstance(value, dict) else value
-        print(f"  {key}: {_text(parts)}")
-    print(f"options ({OPTION_FLAGS[plugin.kind]}):" if facts["options"] else "no options")
+        lines.append(f"  {key}: {_text(parts)}")
+    lines.append(f"options ({OPTION_FLAGS[plugin.kind]}):" if facts["options"] else "no options")
     for option in facts["options"]:
         unit = f" [{option['unit']}]" if option["unit"] else ""
-        print(f"  {option['name']}: {option['type']} = {_text(option['default'])}{unit}")
+        lines.append(f"  {option['name']}: {option['type']} = {_text(option['default'])}{unit}")
         if option["meaning"]:
-            print(f"      {option['meaning']}")
+            lines.append(f"      {option['meaning']}")
+    print("\n".join(map(wrapped, lines)))
     return 0
 
 

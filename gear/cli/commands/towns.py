@@ -97,6 +97,7 @@ def _report(problems: Iterable[GearError]) -> int:
 
 def show(town: Town) -> None:
     """Prints the size, the lanes and the scenes of a town."""
+    from gear.cli.streams import wrapped
     from gear.plugins.text import printable
     from gear.verbs.towns.legend import scene_note
 
@@ -109,7 +110,7 @@ def show(town: Town) -> None:
         print("  no scenes; give a scene library with --scenes FILE.yml")
         return
     for name, scene in town.scenes.scenes.items():
-        print(printable(f"  {name:14} {scene_note(scene)}"))
+        print(wrapped(printable(f"  {name:14} {scene_note(scene)}")))
         for board in scene.boards:
             x_m, y_m, _ = board.position_m
             print(f"  {'':14}   {printable(board.asset)} at ({x_m:g}, {y_m:g}), facing {board.facing_deg:g} deg")

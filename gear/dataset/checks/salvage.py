@@ -65,7 +65,8 @@ def restored(data: bytes) -> bytes | None:
 def listed_hashes(root: Path, paths: Iterable[str]) -> dict[str, set[str]]:
     """Reads all paths with their hashes from damaged JSON files of a dataset.
 
-    A path with one changed character counts as the file of the dataset whose path differs in this character.
+    A path to which there is no file may contain a changed character. It counts as a file whose path differs in one
+    character if this file is not listed itself, or is listed with the same hash.
 
     Args:
         root: root of the dataset.
@@ -80,11 +81,13 @@ def listed_hashes(root: Path, paths: Iterable[str]) -> dict[str, set[str]]:
             if name.decode(errors="replace") not in OTHER_HASHES:
                 found[name.decode(errors="replace")].add(digest.decode(errors="replace"))
     files = set(files_below(root))
-    for stray in sorted(found.keys() - files):
-        meant = next((file for file in files if _differ_in_one(file, stray)), stray)
+    listed = {path: frozenset(digests) for path, digests in found.items()}
+    for stray in sorted(listed.keys() - files):
         digests = found.pop(stray)
-        if meant in files or _is_path(root, stray):
-            found[meant] |= digests
+        near = (file for file in files if _differ_in_one(file, stray))
+        meant = next((file for file in near if file not in listed or digests & listed[file]), None)
+        if meant is not None or _is_path(root, stray):
+            found[meant or stray] |= digests
     return dict(found)
 
 

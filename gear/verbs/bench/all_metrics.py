@@ -15,7 +15,7 @@ from gear.verbs.evaluate.table import metric_title
 
 COLUMNS = (
     "task", "model", "defense", "scene", "patch", "samples", "quantity", "metric", "against", "value", "low", "high",
-    "p", "ceiling",
+    "p", "ceiling", "from_few_streets",
 )  # fmt: skip
 """Columns of metrics.csv. `quantity` is `value`; `change`, the difference to the pictures named in `against`; `mean
 change`, the mean over single pictures with its p; `auroc`; `detection`, the share of pictures with an alarm at a

@@ -32,6 +32,7 @@ COLUMNS = (
     "low",
     "high",
     "ceiling",
+    "from_few_streets",
     "against",
 )
 """Columns of bench.csv. `against` is the kind of patch in the pictures with which detected objects are compared."""

@@ -34,11 +34,13 @@ class Estimate:
 
     def as_json(self) -> Json:
         """Returns `value`, `low` and `high` as JSON; numbers that are not finite become null. A `ceiling` of 1 is left
-        out.
+        out, and so is `from_few_streets` unless there is an interval and it rests on fewer than three streets.
         """
         low, high = self.interval or (math.nan, math.nan)
         value = known_json({"value": self.value, "low": low, "high": high})
-        return value | ({"ceiling": self.ceiling} if self.ceiling < 1 else {})
+        is_marked = self.is_from_few and self.interval is not None
+        ceiling = {"ceiling": self.ceiling} if self.ceiling < 1 else {}
+        return value | ceiling | ({"from_few_streets": True} if is_marked else {})
 
 
 Metrics = Mapping[str, Mapping[str, Estimate]]

@@ -115,8 +115,8 @@ def _findings(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str]) 
 
 
 def _count(root: Path, checks: dict[str, SplitCheck], chosen: Sequence[str], findings: Sequence[Finding]) -> int:
-    unchecked = {one.path for one in findings if one.problem == "unchecked"}
-    return len({path for name in chosen for path in checks[name].known} | own_cards(root) | unchecked)
+    found = {one.path for one in findings if one.problem != "unexpected"}
+    return len({path for name in chosen for path in checks[name].known} | own_cards(root) | found)
 
 
 def _repair(root: Path, check: SplitCheck, sources: Sources, workers: int, callbacks: Callbacks) -> list[str]:

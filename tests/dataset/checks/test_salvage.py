@@ -32,10 +32,17 @@ def test_more_than_one_changed_byte_is_not_restored() -> None:
 
 def test_hashes_are_read_from_files_that_are_no_json(tmp_path: Path) -> None:
     (tmp_path / "left").mkdir()
-    (tmp_path / "left/0.png").touch()
-    digest, other = "a" * 64, "b" * 64
-    listing = {"sha256": digest, "left/0.png": digest, "left/1.png": digest, "../x/y": digest, "/etc/passwd": digest}
+    for name in ("0.png", "7.txt"):
+        (tmp_path / "left" / name).touch()
+    digest, other, third = "a" * 64, "b" * 64, "c" * 64
+    listing = {"sha256": digest, "left/0.png": digest, "left/1.png": third, "../x/y": digest, "/etc/passwd": digest}
     (tmp_path / "one.json").write_bytes(b"{" + sealed_json(listing))
-    (tmp_path / "two.json").write_bytes(sealed_json({"lefv/0.png": other, "lost": other}))
-    found = listed_hashes(tmp_path, ["one.json", "two.json"])
-    assert found == {"left/0.png": {digest, other}, "left/1.png": {digest}}
+    (tmp_path / "two.json").write_bytes(sealed_json({"lefv/0.png": digest, "left/0.png": other, "lost": other}))
+    (tmp_path / "three.json").write_bytes(sealed_json({"leftX7.txt": other, "left/8.png": third}))
+    found = listed_hashes(tmp_path, ["one.json", "two.json", "three.json"])
+    assert found == {
+        "left/0.png": {digest, other},
+        "left/1.png": {third},
+        "left/7.txt": {other},
+        "left/8.png": {third},
+    }

@@ -39,6 +39,8 @@ def test_a_ceiling_is_written_where_there_is_one() -> None:
 
 def test_an_interval_from_too_few_streets_is_marked_and_noted_once() -> None:
     few = Estimate(value=0.5, interval=(0.4, 0.6), is_from_few=True)
+    assert few.as_json() == {"value": 0.5, "low": 0.4, "high": 0.6, "from_few_streets": True}
+    assert "from_few_streets" not in Estimate(value=0.5, is_from_few=True).as_json()
     text = table(report({"miou": few, "iiou": few, "known": Estimate(value=0.5, is_from_few=True)}))
     assert text.count("0.500 [0.400, 0.600]*") == 2 and text.count(FEW_STREETS) == 1
     enough = table(report({"miou": Estimate(value=0.5, interval=(0.4, 0.6))}))
