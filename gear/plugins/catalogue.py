@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gear.contracts.specs import KINDS, AnySpec, Kind
+from gear.plugins.text import type_name
 from gear.values.errors import DuplicateNameError, PluginError, UnknownNameError
 
 
@@ -142,5 +143,5 @@ def as_iterable(value: Any) -> Iterable[Any]:
         TypeError: the value is not a collection, or a text or dictionary.
     """
     if isinstance(value, (str, bytes, dict)) or not isinstance(value, Iterable):
-        raise TypeError(f"a hook returns a list of specs, got {type(value).__name__}")
+        raise TypeError(f"a hook returns a list of specs, got {type_name(value)}")
     return value

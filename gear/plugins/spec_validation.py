@@ -12,7 +12,7 @@ from functools import cache
 from typing import Any, Literal, TypeVar
 
 from gear.contracts.specs import PROTOCOL_VERSION, SPEC_TYPES, Kind, MetricSpec, Spec
-from gear.plugins.text import one_line, printable
+from gear.plugins.text import one_line, printable, type_name
 
 HOOK_OF: dict[Kind, str] = {
     "task": "gear_tasks",
@@ -47,7 +47,7 @@ def spec_problem(kind: Kind, spec: Any) -> str | None:
 def _spec_problem(kind: Kind, spec: Any) -> str | None:
     expected = SPEC_TYPES[kind]
     if not isinstance(spec, expected):
-        return f"{HOOK_OF[kind]} returns {expected.__name__} objects, got {type(spec).__name__}"
+        return f"{HOOK_OF[kind]} returns {expected.__name__} objects, got {type_name(spec)}"
     if type(spec.name) is not str or not NAME.fullmatch(spec.name):
         return f"{printable(repr(spec.name))} is not a plugin's name (lower case letters, digits, _)"
     if spec.protocol != PROTOCOL_VERSION:
@@ -154,7 +154,7 @@ def _nested(problems: list[str | None], name: str) -> str | None:
 
 
 def _wrong(value: Any, hint: Any, name: str) -> str:
-    got = printable(repr(value)) if typing.get_origin(hint) is Literal else type(value).__name__
+    got = printable(repr(value)) if typing.get_origin(hint) is Literal else type_name(value)
     return f"{name} must be {_described(hint)}, got {got}"
 
 

@@ -32,9 +32,18 @@ def one_line(error: BaseException) -> str:
     Args:
         error: the exception, which may come from a plugin.
     """
-    name = printable(type(error).__name__)
+    name = type_name(error)
     try:
-        lines = str(error).strip().splitlines()
+        lines = str.strip(str(error)).splitlines()
     except BaseException as problem:  # a stranger's __str__ may raise anything
-        return f"{name} (whose text cannot be had: {printable(type(problem).__name__)})"
+        return f"{name} (whose text cannot be had: {type_name(problem)})"
     return f"{name}: {printable(lines[0])}" if lines else name
+
+
+def type_name(value: object) -> str:
+    """Returns the name of the type of a plugin's value as printable text; no code of the plugin runs.
+
+    Args:
+        value: the value; a metaclass of its type may compute `__name__`, and raise anything.
+    """
+    return printable(str(type.__dict__["__name__"].__get__(type(value))))

@@ -15,6 +15,26 @@ class OddError(Exception):
         return 3  # type: ignore[return-value]
 
 
+class NamelessType(type):
+    @property
+    def __name__(cls) -> str:  # type: ignore[override]
+        raise KeyboardInterrupt
+
+
+class NamelessError(Exception, metaclass=NamelessType):
+    pass
+
+
+class OddText(str):
+    def strip(self, chars: str | None = None) -> str:
+        raise KeyboardInterrupt
+
+
+class OddTextError(Exception):
+    def __str__(self) -> str:
+        return OddText("text\nmore")
+
+
 @pytest.mark.parametrize(
     ("error", "line"),
     [
@@ -24,6 +44,8 @@ class OddError(Exception):
         (MuteError(), "MuteError (whose text cannot be had: GeneratorExit)"),
         (OddError(), "OddError (whose text cannot be had: TypeError)"),
         (KeyError("boom"), "KeyError: 'boom'"),
+        (NamelessError("boom"), "NamelessError: boom"),
+        (OddTextError(), "OddTextError: text"),
     ],
 )
 def test_an_exception_is_one_printable_line(error: Exception, line: str) -> None:
