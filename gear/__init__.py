@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from gear.verbs.leaderboard.check import check_record
     from gear.verbs.merge import MergeReport, merge
     from gear.verbs.models import ModelFacts, list_models
+    from gear.verbs.plugins import list_plugins
     from gear.verbs.sheet import sheet
     from gear.verbs.towns.facts import Town, read_town, towns
     from gear.verbs.towns.write import TownReport, write_town
@@ -92,6 +93,7 @@ __all__ = [
     "gap",
     "import_archive",
     "list_models",
+    "list_plugins",
     "merge",
     "open_dataset",
     "open_twins",
@@ -146,6 +148,7 @@ _HOME = {
     "export": "gear.verbs.export",
     "gap": "gear.verbs.gap.run",
     "list_models": "gear.verbs.models",
+    "list_plugins": "gear.verbs.plugins",
     "import_archive": "gear.verbs.import_archive.run",
     "merge": "gear.verbs.merge",
     "open_dataset": "gear.plugins.datasets",
