@@ -11,6 +11,9 @@ from gear.values.frames import UInt8Image
 INK, PAPER = (235, 235, 235), (24, 24, 24)
 FONT, FONT_SCALE = cv2.FONT_HERSHEY_SIMPLEX, 0.4
 LINE_PX, MARGIN_PX, SWATCH_PX, GAP_PX = 20, 6, 12, 14
+DARK, FRAME = 64, (110, 110, 110)
+"""A swatch whose channels are all below `DARK` gets a frame of the colour `FRAME`, as it is as dark as the strip."""
+
 BAR_PX = (10, 360)
 """Height and largest width of a colour bar in pixels."""
 
@@ -40,7 +43,10 @@ def _names(legend: ColourNames, width_px: int) -> UInt8Image:
     strip = _paper((line + 1) * LINE_PX, width_px)
     for left, line, name, rgb in places:
         top = line * LINE_PX + (LINE_PX - SWATCH_PX) // 2
-        cv2.rectangle(strip, (left, top), (left + SWATCH_PX - 1, top + SWATCH_PX - 1), rgb, cv2.FILLED)
+        corner = (left + SWATCH_PX - 1, top + SWATCH_PX - 1)
+        cv2.rectangle(strip, (left, top), corner, rgb, cv2.FILLED)
+        if max(rgb) < DARK:
+            cv2.rectangle(strip, (left, top), corner, FRAME, 1)
         _write(strip, name, left + SWATCH_PX + 4, line)
     return strip
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gear.contracts.legends import ColourBar, ColourNames
-from gear.reporting.legend import PAPER, draw_legend
+from gear.reporting.legend import FRAME, LINE_PX, MARGIN_PX, PAPER, SWATCH_PX, draw_legend
 
 
 def columns_of(picture: np.ndarray, rgb: tuple[int, int, int]) -> np.ndarray:
@@ -36,3 +36,10 @@ def test_a_bar_runs_from_its_first_colour_to_its_last() -> None:
 
 def test_no_names_are_an_empty_strip() -> None:
     assert (draw_legend(ColourNames(entries=()), 100) == PAPER).all()
+
+
+def test_a_swatch_as_dark_as_the_strip_has_a_frame() -> None:
+    strip = draw_legend(ColourNames(entries=(("static", (0, 0, 0)),)), 200)
+    swatch = strip[LINE_PX // 2 - 5 : LINE_PX // 2 + 5, MARGIN_PX : MARGIN_PX + SWATCH_PX]
+    assert swatch[5, 5].tolist() == [0, 0, 0]
+    assert (swatch[5, [0, -1]] == FRAME).all()
