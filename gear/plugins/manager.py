@@ -9,10 +9,12 @@ import importlib.metadata
 import io
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache, partial
 from itertools import islice
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -200,7 +202,7 @@ def guarded(call: Callable[[], Any]) -> Any:
         PluginRaisedError: the code raised any exception, including SystemExit, GeneratorExit and KeyboardInterrupt.
         KeyboardInterrupt: the user pressed Ctrl-C meanwhile.
     """
-    with _noticing_interrupts() as interrupts:
+    with _noticing_interrupts() as interrupts, _restored_process():
         try:
             with contextlib.redirect_stdout(io.StringIO()):
                 return call()
@@ -208,6 +210,27 @@ def guarded(call: Callable[[], Any]) -> Any:
             if interrupts:
                 raise KeyboardInterrupt from None
             raise PluginRaisedError(error) from error
+
+
+@contextlib.contextmanager
+def _restored_process() -> Iterator[None]:
+    """A context at whose end the working folder and `sys.stderr` are those of its beginning."""
+    folder, stderr = _working_folder(), sys.stderr
+    try:
+        yield
+    finally:
+        sys.stderr = stderr
+        if folder is not None and _working_folder() != folder:
+            with contextlib.suppress(OSError):
+                os.chdir(folder)
+
+
+def _working_folder() -> Path | None:
+    """The working folder; None if it was deleted."""
+    try:
+        return Path.cwd()
+    except OSError:
+        return None
 
 
 @contextlib.contextmanager

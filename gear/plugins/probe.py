@@ -2,8 +2,8 @@
 
 Most exceptions can be caught in the process that raises them. Three failures cannot be handled there: the end of the
 process (`os._exit`, a crash in C code), a hang, and a KeyboardInterrupt, which looks like the user's Ctrl-C. A plugin
-that causes one of these during import, in a hook or in the checks of its specs is reported and not loaded into gear's
-process.
+that causes one of these during import, in a hook, in the checks of its specs or in its exit functions is reported and
+not loaded into gear's process. The same applies to one that closes the standard output, or leaves a thread running.
 
 Results are stored in `~/.cache/gear/plugins.json` (`$XDG_CACHE_HOME`), by distribution, version, and time and size of
 the package's files. Failures that occur only later, for example by chance or in `build`, are not detected.
@@ -119,15 +119,18 @@ def probe(entry_point: EntryPoint, limit_s: float = LIMIT_S) -> Verdict | None:
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
         said = notes.read_text(encoding="utf-8").splitlines() if notes.exists() else []
-    stages = [line for line in said if line not in (INTERRUPTED, DONE)]
+    stages = [line for line in said if line not in (INTERRUPTED, DONE) and not line.startswith(REFUSED)]
     if not stages:
         raise OSError(f"the process that probes {entry_point.name} did not start: {ending}")
+    refused = next((line.removeprefix(REFUSED) for line in said if line.startswith(REFUSED)), None)
+    if refused is not None:
+        return stages[-1], refused
     if DONE in said:
         return (stages[-1], "KeyboardInterrupt") if INTERRUPTED in said else None
     return stages[-1], ending
 
 
-DONE, INTERRUPTED = "done", "interrupted"
+DONE, INTERRUPTED, REFUSED = "done", "interrupted", "refused: "
 
 CODE = """
 import json, sys

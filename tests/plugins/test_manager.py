@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import os
 import sys
 import types
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -123,6 +125,17 @@ def test_broken_plugins_are_reported_and_nobody_else_suffers(package: Any, capsy
     ):
         found.get("defense", "thirdprty")
     assert found.broken_hint().startswith(f"({len(stages)} plugin(s) failed to load: ")
+
+
+def test_working_folder_and_stderr_are_restored(package: Any, tmp_path: Path) -> None:
+    def moves() -> list[Any]:
+        os.chdir(tmp_path)
+        sys.stderr = None  # type: ignore[assignment]
+        return []
+
+    folder, stderr = Path.cwd(), sys.stderr
+    assert discover([package("moves", moves)]).broken == ()
+    assert (Path.cwd(), sys.stderr) == (folder, stderr)
 
 
 def test_two_of_a_name_and_nobody_wins(package: Any) -> None:

@@ -51,7 +51,9 @@ def put(site: Path, name: str, code: str) -> EntryPoint:
         ("raise GeneratorExit", None),
         (HOOK.format(body="return [3]"), None),
         (HOOK.format(body="yield from iter(int, 1)"), None),
-        ("print('hello'); import atexit, time; atexit.register(time.sleep, 60)", None),
+        ("print('hello'); import atexit; atexit.register(print, 'bye'); atexit.register(1 .__truediv__, 0)", None),
+        ("import atexit, os; atexit.register(os._exit, 7)", ("exit functions", "ended the process with status 7")),
+        ("import os; os.close(2)", ("register", "closes or replaces the standard output of the process")),
     ],
 )
 def test_what_a_plugin_does_is_found_in_a_process_of_its_own(

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from gear.plugins.probe import DONE, INTERRUPTED
+from gear.plugins.probe import DONE, INTERRUPTED, REFUSED
+
+LAST = "exit functions"
 
 MODULES = {
     "sound": "from gear.contracts.hookspecs import hookimpl\n@hookimpl\ndef gear_tasks():\n    return []\n",
@@ -16,6 +18,9 @@ MODULES = {
     "interrupts": "raise KeyboardInterrupt\n",
     "ends": "import os\nos._exit(3)\n",
     "prints": "print('hello')\n",
+    "threads": "import threading\nthreading.Thread(target=threading.Event().wait).start()\n",
+    "closes": "import os\nos.close(1)\n",
+    "leaves": "import atexit, os\natexit.register(os._exit, 7)\n",
 }
 
 
@@ -33,11 +38,14 @@ def notes_of(name: str, folder: Path) -> tuple[int, list[str]]:
 @pytest.mark.parametrize(
     ("name", "code", "notes"),
     [
-        ("sound", 0, ["import", "register", "hook gear_tasks", DONE]),
+        ("sound", 0, ["import", "register", "hook gear_tasks", LAST, DONE]),
         ("fails", 0, ["import", DONE]),
         ("interrupts", 0, ["import", INTERRUPTED, DONE]),
         ("ends", 3, ["import"]),
-        ("prints", 0, ["import", "register", DONE]),
+        ("prints", 0, ["import", "register", LAST, DONE]),
+        ("threads", 0, ["import", "register", f"{REFUSED}leaves a thread running, so that no command would end", DONE]),
+        ("closes", 0, ["import", "register", f"{REFUSED}closes or replaces the standard output of the process", DONE]),
+        ("leaves", 7, ["import", "register", LAST]),
     ],
 )
 def test_the_notes_say_how_far_it_came(name: str, code: int, notes: list[str], tmp_path: Path) -> None:
