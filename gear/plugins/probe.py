@@ -34,6 +34,9 @@ from gear.values.user_cache import user_cache_folder
 LIMIT_S = 30.0
 """Time limit in seconds for the import and the hooks of a plugin; importing torch takes far less."""
 
+CHECKS = 2
+"""Version of the checks in the separate process; a new number makes cached results of earlier checks invalid."""
+
 MOST_FILES = 2000
 """Largest number of a package's files whose times and sizes are compared to detect changes."""
 
@@ -150,7 +153,7 @@ def stamp(entry_point: EntryPoint) -> str:
     Args:
         entry_point: entry point of the plugin.
     """
-    facts: list[Any] = [sys.executable, sys.version, entry_point.name, entry_point.value, __file__]
+    facts: list[Any] = [CHECKS, sys.executable, sys.version, entry_point.name, entry_point.value, __file__]
     with contextlib.suppress(Exception):  # damaged metadata, or a finder that raises: then there is less to look at
         if entry_point.dist is not None:
             facts += [entry_point.dist.name, entry_point.dist.version]
