@@ -61,6 +61,7 @@ def test_the_network_takes_them(path: Path) -> None:
 
 
 UNSEEN: dict[str, tuple[str, dict[str, tuple[float, float]]]] = {
+    "adabins_lite0": ("reference", {"d1": (0.6, 1), "rmse_m": (0, 12)}),
     "ddrnet23_slim_depth": ("reference", {"d1": (0.75, 1), "rmse_m": (0, 10)}),
     "ddrnet23_slim": (
         "reference",
