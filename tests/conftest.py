@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("MUJOCO_GL", "egl")  # tests of assets draw without a display; read when mujoco is first imported
 
 import authoring
-from tests import compiled_worlds
+from tests import compiled_worlds, shared
 
 assert authoring.KERNELS in os.environ
 
@@ -29,10 +30,27 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     COMPILED.is_on = "tests/world/" not in item.path.as_posix()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def mypy_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where mypy keeps what it knows of gear and NumPy from one package of a module's tests to the next."""
-    return tmp_path_factory.mktemp("mypy")
+    """Where mypy keeps what it finds in gear, NumPy and torch, so that it does not check them again for each test.
+
+    One process of a run fills it, in most of a minute. The others get a copy, because mypy's database is not made for
+    several writers.
+    """
+    filled = shared.once(tmp_path_factory, "mypy", shared.fill_mypy_cache)
+    return Path(shutil.copytree(filled, tmp_path_factory.mktemp("mypy") / "cache"))
+
+
+@pytest.fixture(scope="session")
+def builder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A fresh environment with the tests' packages and with what builds packages, for all processes of a run."""
+    return shared.once(tmp_path_factory, "builder", shared.make_builder)
+
+
+@pytest.fixture(scope="session")
+def gear_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of gear, built once for all processes of a run."""
+    return next(shared.once(tmp_path_factory, "wheel", shared.build_gear).glob("*.whl"))
 
 
 def pytest_collection_finish() -> None:

@@ -1,16 +1,12 @@
 """The example packages, from wheels, in one fresh environment, run from an empty folder as a user would.
 
-The environment also sees the packages of the tests' own environment, so that pip installs only what is missing there
-and torch's bytecode is not made again. That gear and the examples declare what they import, deptry checks.
+That gear and the examples declare what they import, deptry checks.
 """
 
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
-import sysconfig
-import venv
 from pathlib import Path
 
 import cv2
@@ -19,9 +15,8 @@ import pytest
 
 from gear.config.nodes import parse_file
 from gear.config.reader import read_node
-from gear.dataset.locks import dataset_lock
 from gear.verbs.bench.config import BenchConfig
-from tests.shared import shared_folder
+from tests.shared import call, make_environment, once
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted(path.parent for path in (ROOT / "examples").glob("gear-*/pyproject.toml"))
@@ -31,30 +26,19 @@ SCENES = f"scenes={ROOT / 'gear/testing/data/scenes/tiny.yml'}"
 pytestmark = pytest.mark.slow
 
 
-def call(*command: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run([str(word) for word in command], cwd=cwd, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
-    return done
-
-
 @pytest.fixture(scope="module")
-def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def environment(tmp_path_factory: pytest.TempPathFactory, builder: Path, gear_wheel: Path) -> Path:
     """An environment with gear and all examples from wheels, which all of a run's processes share."""
-    shared = shared_folder(tmp_path_factory, "examples")
-    with dataset_lock(shared):
-        if not (shared / "whole").exists():
-            install(shared / "env", shared / "wheels")
-            (shared / "whole").touch()
-    return shared / "env"
+    return once(tmp_path_factory, "examples", lambda folder: install(folder, builder, gear_wheel)) / "env"
 
 
-def install(env: Path, wheels: Path) -> None:
-    call(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", wheels, ROOT, *EXAMPLES, cwd=wheels.parent)
-    venv.create(env, with_pip=True)
-    (site,) = (env / "lib").glob("python*/site-packages")
-    (site / "parent.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
+def install(folder: Path, builder: Path, gear_wheel: Path) -> None:
+    env, wheels = folder / "env", folder / "wheels"
+    wheel = (builder / "bin/python", "-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", wheels)
+    call(*wheel, *EXAMPLES, cwd=folder)
+    make_environment(env)
     pip = (env / "bin/python", "-m", "pip", "install", "-q", "-c", ROOT / "constraints.txt")
-    packages = sorted(wheels.glob("*.whl"))
+    packages = [gear_wheel, *sorted(wheels.glob("*.whl"))]
     # gear of the tests' environment is not to stand in for the wheel.
     call(*pip, "--no-deps", "--ignore-installed", *packages, cwd=wheels)
     call(*pip, *packages, "pytest", "cityscapesScripts", cwd=wheels)
@@ -70,7 +54,7 @@ def home(environment: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def gear(home: Path, *words: str) -> str:
-    return call(home / "env/bin/gear", *words, cwd=home / "empty").stdout
+    return call(home / "env/bin/gear", *words, cwd=home / "empty")
 
 
 def test_all_are_found_and_the_broken_ones_are_named(home: Path) -> None:

@@ -9,20 +9,10 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("wheel")
-    build = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", str(ROOT), "-w", str(out)]
-    subprocess.run(build, check=True, capture_output=True)
-    return next(out.glob("*.whl"))
-
 
 @pytest.mark.slow
-def test_the_wheel_is_whole_and_not_too_large(wheel: Path) -> None:
-    files = zipfile.ZipFile(wheel).infolist()
+def test_the_wheel_is_whole_and_not_too_large(gear_wheel: Path) -> None:
+    files = zipfile.ZipFile(gear_wheel).infolist()
     names = {file.filename for file in files}
     assert {
         "gear/py.typed",
@@ -35,12 +25,12 @@ def test_the_wheel_is_whole_and_not_too_large(wheel: Path) -> None:
     } <= names
     assert not [name for name in names if name.startswith(("tests/", "authoring/", "benchmarks/"))]
     assert sum(file.compress_size for file in files if "/data/mjcf/" in file.filename) <= 45e6
-    assert wheel.stat().st_size <= 48e6
+    assert gear_wheel.stat().st_size <= 48e6
 
 
 @pytest.mark.slow
-def test_the_wheel_collects_from_an_empty_folder(wheel: Path, tmp_path: Path) -> None:
-    zipfile.ZipFile(wheel).extractall(tmp_path / "site")
+def test_the_wheel_collects_from_an_empty_folder(gear_wheel: Path, tmp_path: Path) -> None:
+    zipfile.ZipFile(gear_wheel).extractall(tmp_path / "site")
     empty = tmp_path / "empty"
     empty.mkdir()
     code = (

@@ -5,10 +5,8 @@ from __future__ import annotations
 import ast
 import os
 import re
-import subprocess
 import sys
 import sysconfig
-import venv
 from pathlib import Path
 
 import pytest
@@ -17,6 +15,7 @@ from gear.cli.main import main
 from gear.contracts.specs import KINDS
 from gear.values.errors import GearError, UnknownNameError
 from gear.verbs.scaffold.write import new_package
+from tests.shared import call, make_builder
 
 ROOT = Path(__file__).parents[3]
 
@@ -118,13 +117,6 @@ def test_out_that_cannot_be_written(tmp_path: Path) -> None:
         new_package("defense", "my_blur", out=tmp_path / "file")
 
 
-def call(*command: str | Path, cwd: Path, env: dict[str, str] | None = None) -> str:
-    words = [str(word) for word in command]
-    done = subprocess.run(words, cwd=cwd, env=env, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{words}\n{done.stdout}\n{done.stderr}"
-    return done.stdout
-
-
 BLOCK = re.compile(r"```(?:sh)?(?: run)?\n(.*?)```", re.DOTALL)
 
 
@@ -157,17 +149,14 @@ def test_instructions_agree_wherever_they_stand(kind: str, tmp_path: Path, capsy
         assert [line for line in lines if "pip install" in line or "-m pytest" in line] == steps
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A fresh environment that has gear, everything that the tests' own environment has, and what builds packages."""
     folder = tmp_path_factory.mktemp("fresh") / "env"
-    venv.create(folder, with_pip=True)
-    (site,) = (folder / "lib").glob("python*/site-packages")
-    (site / "parent.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
+    make_builder(folder)
     (folder / "bin/gear").write_text(f'#!/bin/sh\nexec {folder}/bin/python -m gear.cli.main "$@"\n')
     (folder / "bin/gear").chmod(0o755)
     (folder / "bin/ruff").symlink_to(Path(sysconfig.get_path("scripts")) / "ruff")
-    call(folder / "bin/python", "-m", "pip", "install", "-q", "hatchling", "editables", cwd=folder)
     return folder
 
 
