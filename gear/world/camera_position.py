@@ -53,7 +53,7 @@ def enclosed_share(shape: Shape, point_m: Array) -> float:
             u = np.einsum("nd,nd->n", away, normal) / area
             v = across @ direction / area
             distance = np.einsum("nd,nd->n", second, across) / area
-        hits += bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0)).any())
+            hits += bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0)).any())
     return hits / DIRECTIONS
 
 

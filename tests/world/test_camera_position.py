@@ -37,6 +37,16 @@ def test_rays_from_inside_end_at_the_shape() -> None:
     assert 0.5 < enclosed_share(open_top, np.array([0.0, 0.0, 1.3])) < 0.8
 
 
+@pytest.mark.filterwarnings("error")
+def test_faces_without_an_area_are_hit_by_no_ray() -> None:
+    thin = np.array([[0, 1, 1], [0, 7, 7], [3, 4, 4]], np.int32)
+    shape = Shape(
+        vertices_m=BOX.vertices_m, faces=np.concatenate([FACES, thin]), face_label_code=np.zeros(15, np.uint8),
+        box_centre_m=BOX.box_centre_m, box_size_m=BOX.box_size_m,
+    )  # fmt: skip
+    assert enclosed_share(shape, np.array([0.5, 0.1, 0.9])) == 1.0
+
+
 def test_a_camera_inside_is_refused_with_its_position() -> None:
     def rig(x: float, z: float) -> Rig:
         return Rig(cameras=(CameraMount(name="rgb", width_px=64, height_px=32, position_m=(x, 0.0, z)),))
