@@ -162,20 +162,19 @@ class PlacementSpace:
         """
         self._pose(poses)
         mujoco.mj_collision(self._model, self._data)
+        # Arrays of all contacts: there are hundreds of them, mostly of feet on the ground.
+        geoms = self._data.contact.geom[self._data.contact.dist <= -OVERLAP_M]
+        group = self._model.geom_group[geoms]
+        is_actor = group == ACTOR_GROUP
+        is_body_contact = is_actor.any(axis=1) & (is_actor | (group == OBSTACLE_GROUP)).all(axis=1)
+        bodies = self._model.body_rootid[self._model.geom_bodyid[geoms[is_body_contact]]]
         pairs: set[tuple[str, str]] = set()
-        for contact in self._data.contact[: self._data.ncon]:
-            if contact.dist > -OVERLAP_M:
-                continue
-            names = [self._body_of_id.get(int(self._model.body_rootid[self._model.geom_bodyid[g]]), "")
-                     for g in contact.geom]  # fmt: skip
-            if any(name in poses for name in names) and self._is_body_contact(contact.geom):
+        for pair in np.unique(bodies, axis=0).tolist():
+            names = [self._body_of_id.get(body, "") for body in pair]
+            if any(name in poses for name in names):
                 first, second = sorted(names, reverse=True)
                 pairs.add((first, second))
         return sorted(pairs)
-
-    def _is_body_contact(self, geoms: npt.NDArray[np.int32]) -> bool:
-        groups = [int(self._model.geom_group[g]) for g in geoms]
-        return ACTOR_GROUP in groups and all(group in (ACTOR_GROUP, OBSTACLE_GROUP) for group in groups)
 
     def settle(self, poses: Mapping[str, RigidTransform]) -> dict[str, RigidTransform]:
         """Drops actors from just above the given poses and simulates until they come to rest on uneven ground.

@@ -199,7 +199,7 @@ class Crowd:
         wide = spawn.footprint.grown(*gap_m)
         if any(wide.overlaps(other) for other in road_users.keep_out):
             return False
-        if any(wide.overlaps(other.footprint) for other in road_users.spawns.values()):
+        if any(_may_touch(wide, other) and wide.overlaps(other.footprint) for other in road_users.spawns.values()):
             return False
         road_users.free.take(spawn.actor_type.facts.name)
         road_users.spawns[spawn.body] = spawn
@@ -240,6 +240,12 @@ class Crowd:
         for body in sorted(overlapping):
             road_users.drop(body)
         return bool(overlapping)
+
+
+def _may_touch(footprint: Footprint, other: Spawn) -> bool:
+    """A fast test that is False only if the bounding circles of a footprint and of a road user are apart."""
+    reach_m = footprint.radius_m + other.actor_type.half_length_m + other.actor_type.half_width_m
+    return abs(other.x_m - footprint.x_m) <= reach_m and abs(other.y_m - footprint.y_m) <= reach_m
 
 
 def is_upright(pose: RigidTransform) -> bool:
