@@ -15,17 +15,15 @@ from gear.values.geometry import Array
 VERTEX = np.dtype([("position_m", "<f4", 3), ("normal", "<i2", 4), ("texcoord", "<f4", 2)])
 """Memory layout of a vertex; components of normals are multiplied by 32767."""
 
-DRAW_COMMAND = np.dtype([(name, "<u4") for name in ("count", "instances", "first", "base", "piece")])
-"""Memory layout of an indirect draw command (OpenGL's `DrawElementsIndirectCommand`); `piece` is its base instance."""
+DRAW_COMMAND = np.dtype([("count", "<i4"), ("first", "<i8"), ("base", "<i4")])
+"""A draw command: number of indices, first index, and the number that is added to all indices."""
 
 _MESHES = (int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_SDF))
 _PLANE, _FIELD = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
 _BITS = 21
 _CELL_M = 48.0
 _WHOLE = 512
-"""Meshes with fewer triangles than this are not cut into pieces, because a draw command takes about as long as this
-number of triangles.
-"""
+"""Meshes with fewer triangles than this are not cut into pieces, because each piece takes a draw command."""
 
 _Key = tuple[int, int, tuple[float, ...], tuple[float, ...]]
 
@@ -88,18 +86,16 @@ def geometry_of(model: mujoco.MjModel, drawn: npt.NDArray[np.bool_]) -> Geometry
         pieces = np.zeros(len(shape.radii_m), DRAW_COMMAND)
         pieces["count"] = np.diff(shape.starts)
         pieces["first"] = shape_first + shape.starts[:-1]
-        pieces["instances"], pieces["base"] = 1, shape_base
+        pieces["base"] = shape_base
         commands.append(pieces)
         geoms += [geom] * len(pieces)
         centres.append(shape.centres_m)
         radii.append(shape.radii_m)
-    all_commands = np.concatenate(commands)
-    all_commands["piece"] = np.arange(len(all_commands))
     made_shapes = [shape for shape, _, _ in shapes.values()]
     return Geometry(
         vertices=np.concatenate([np.zeros(0, VERTEX), *(shape.vertices for shape in made_shapes)]),
         indices=np.concatenate([np.zeros(0, np.uint32), *(shape.indices for shape in made_shapes)]),
-        commands=all_commands,
+        commands=np.concatenate(commands),
         geoms=np.array(geoms, np.intp),
         centres_m=np.concatenate(centres),
         radii_m=np.concatenate(radii),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import re
 from dataclasses import dataclass
 from importlib.resources import files
@@ -15,6 +16,11 @@ from gear.values.errors import BackendError
 
 _VERSION = "#version 450 core\n"
 _LEAST = (4, 5)
+
+PIECES = 800
+"""Largest number of pieces of geometry in one draw call: uniform blocks have at least 64 KiB on all desktop drivers."""
+
+_HEAD_OF_GEOMS = f"#extension GL_ARB_shader_draw_parameters : require\n#define PIECES {PIECES}\n"
 _OF_GEOMS = ("positions.vert", "surface.vert")
 _REMEDY = "update the driver, or use --renderer filament"
 
@@ -46,11 +52,11 @@ class Program:
             BackendError: a shader does not compile; the message is the driver's.
         """
         self.handle = GL.glCreateProgram()
-        head = _VERSION + "".join(f"#define {flag}\n" for flag in flags) + _source("frame")
+        head = "".join(f"#define {flag}\n" for flag in flags) + _source("frame")
         for kind, name in ((GL.GL_VERTEX_SHADER, vertex), (GL.GL_FRAGMENT_SHADER, fragment)):
             shader = GL.glCreateShader(kind)
-            pose = _source("pose") if name in _OF_GEOMS else ""
-            GL.glShaderSource(shader, head + pose + _source(name))
+            first, pose = (_HEAD_OF_GEOMS, _source("pose")) if name in _OF_GEOMS else ("", "")
+            GL.glShaderSource(shader, _VERSION + first + head + pose + _source(name))
             GL.glCompileShader(shader)
             if not GL.glGetShaderiv(shader, GL.GL_COMPILE_STATUS):
                 raise BackendError("raster", f"{name}.glsl: {_text(GL.glGetShaderInfoLog(shader))}", _REMEDY)
@@ -114,6 +120,25 @@ class StreamBuffer:
         """
         GL.glBindBuffer(self._target, self.handle)
         GL.glBufferData(self._target, content.nbytes, np.ascontiguousarray(content), GL.GL_STREAM_DRAW)
+
+
+def draw_elements(counts: npt.NDArray[np.int32], firsts: npt.NDArray[np.int64], bases: npt.NDArray[np.int32]) -> None:
+    """Draws runs of triangles from the current buffer of 32-bit indices; shaders know the number of each run.
+
+    Args:
+        counts: (N,) number of indices of each run.
+        firsts: (N,) first index of each run.
+        bases: (N,) number that is added to the indices of each run.
+    """
+    offsets = (ctypes.c_void_p * len(firsts))(*(4 * firsts).tolist())
+    GL.glMultiDrawElementsBaseVertex(
+        GL.GL_TRIANGLES,
+        np.ascontiguousarray(counts),
+        GL.GL_UNSIGNED_INT,
+        offsets,
+        len(counts),
+        np.ascontiguousarray(bases),
+    )
 
 
 @dataclass(frozen=True, slots=True)

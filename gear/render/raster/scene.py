@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-
 import mujoco
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +10,7 @@ from OpenGL import GL  # type: ignore[import-untyped]
 from gear.contracts.rendering import Stage
 from gear.render.culling import Mask
 from gear.render.raster import gl
-from gear.render.raster.geometry import DRAW_COMMAND, VERTEX, Geometry, geometry_of
+from gear.render.raster.geometry import VERTEX, Geometry, geometry_of
 from gear.render.raster.lights import MAX_LIGHTS, Environment, Lights, environment_of
 from gear.render.raster.materials import TEXTURE_ROLES, materials_of
 from gear.render.raster.shadow_cascades import ShadowMaps
@@ -24,8 +22,12 @@ Selection = npt.NDArray[np.intp]
 
 _SEEN_GROUPS, _VERTEX_SAMPLES = 3, 8
 _ENVIRONMENT_UNIT, _SPLIT_SUM_UNIT = 5, 7
-_VERTICES, _NUMBERS, _PIECES = 0, 1, 2
-_PIECE = np.dtype([("camera_from_geom", "<f4", (3, 4)), ("colour", "<f4", 4), ("surface", "<f4", 4)])
+_VERTICES = 0
+_PIECES_BINDING = 1
+_PIECE = np.dtype([("camera_from_geom", "<f4", (3, 4)), ("colour", "<f4", 3), ("number", "<i4"), ("surface", "<f4", 4)])
+_ALIGNED = 16
+"""Number of `_PIECE` records whose size is a multiple of 256 bytes, the largest alignment that drivers ask for."""
+
 _FRAME = np.dtype(
     [
         ("sun_axes", "<f4", (3, 4)),
@@ -70,9 +72,9 @@ class Scene:
         self._split_sum = gl.upload_table(split_sum_table())
         sky = sky_of(model)
         self.sky = 0 if sky is None or sky not in cubes else gl.upload_cubemap((cubes[sky],))
-        self._pieces = gl.StreamBuffer(GL.GL_ARRAY_BUFFER)
+        self._geoms = np.zeros(model.ngeom, _PIECE)
+        self._pieces = gl.StreamBuffer(GL.GL_UNIFORM_BUFFER)
         self._frame = gl.StreamBuffer(GL.GL_UNIFORM_BUFFER)
-        self._draws = gl.StreamBuffer(GL.GL_DRAW_INDIRECT_BUFFER)
         self._surfaces: dict[tuple[str, ...], gl.Program] = {}
         self._light_flags: tuple[str, ...] = ("LIGHTS 0",)
 
@@ -86,7 +88,7 @@ class Scene:
         self._face_of_geom = self._textures.faces(stage.faces)
 
     def set_poses(self, stage: Stage, camera_m: Array) -> None:
-        """Uploads the poses and colours of all geoms of a posed world.
+        """Takes the poses and colours of all geoms of a posed world; the next draw calls use them.
 
         Args:
             stage: the posed world.
@@ -95,14 +97,13 @@ class Scene:
         geoms = np.zeros(stage.model.ngeom, _PIECE)
         geoms["camera_from_geom"][..., :3] = stage.data.geom_xmat.reshape(-1, 3, 3)
         geoms["camera_from_geom"][..., 3] = stage.data.geom_xpos - camera_m
-        geoms["colour"][:, :3] = self._materials.albedo
+        geoms["colour"] = self._materials.albedo
         geoms["surface"] = self._materials.surface
         for geom, rgb in stage.paint_rgb.items():
-            geoms["colour"][geom, :3] = rgb
+            geoms["colour"][geom] = rgb
         for geom in stage.faces:
-            geoms["colour"][geom, :3] = 1.0
-        self._pieces.upload(geoms[self.geom_of_piece])
-        GL.glVertexArrayVertexBuffer(self._vertex_array, _PIECES, self._pieces.handle, 0, _PIECE.itemsize)
+            geoms["colour"][geom] = 1.0
+        self._geoms = geoms
 
     def set_lights(self, lights: Lights, maps: ShadowMaps | None, camera_m: Array) -> None:
         """Uploads the lights of a frame.
@@ -189,19 +190,34 @@ class Scene:
         self._submit([(group, (matrix, flags)) for group in groups])
 
     def _submit(self, groups: list[tuple[Selection, tuple[Array, tuple[str, ...]] | None]]) -> None:
-        """Issues one draw call for each group, from one buffer of commands."""
-        if not any(len(group) for group, _ in groups):
+        """Issues draw calls for each group, of at most `gl.PIECES` pieces each."""
+        batches = [
+            (group[first : first + gl.PIECES], look)
+            for group, look in groups
+            for first in range(0, len(group), gl.PIECES)
+        ]
+        if not batches:
             return
-        self._draws.upload(self._commands[np.concatenate([group for group, _ in groups])])
-        begin = 0
-        for group, look in groups:
-            if look is not None:
-                self._bind_material(int(self.geom_of_piece[group[0]]), *look)
-            offset = ctypes.c_void_p(begin * DRAW_COMMAND.itemsize)
-            GL.glMultiDrawElementsIndirect(
-                GL.GL_TRIANGLES, GL.GL_UNSIGNED_INT, offset, len(group), DRAW_COMMAND.itemsize
+        sizes = np.array([len(batch) for batch, _ in batches])
+        ends = np.cumsum(-(-sizes // _ALIGNED) * _ALIGNED)
+        begins = (ends - -(-sizes // _ALIGNED) * _ALIGNED).tolist()
+        # Each range has the full length of the uniform block.
+        records = np.zeros(begins[-1] + gl.PIECES, _PIECE)
+        for (batch, _), begin in zip(batches, begins, strict=True):
+            part = records[begin : begin + len(batch)]
+            part[:] = self._geoms[self.geom_of_piece[batch]]
+            part["number"] = batch
+        self._pieces.upload(records)
+        shown: object = None
+        for (batch, look), begin in zip(batches, begins, strict=True):
+            if look is not None and shown is not look:
+                self._bind_material(int(self.geom_of_piece[batch[0]]), *look)
+                shown = look
+            size = gl.PIECES * _PIECE.itemsize
+            GL.glBindBufferRange(
+                GL.GL_UNIFORM_BUFFER, _PIECES_BINDING, self._pieces.handle, begin * _PIECE.itemsize, size
             )
-            begin += len(group)
+            gl.draw_elements(*(self._commands[name][batch] for name in ("count", "first", "base")))
 
     def _bind_material(self, geom: int, matrix: Array, flags: tuple[str, ...]) -> None:
         """Makes the program and the textures of a geom's material current."""
@@ -230,13 +246,11 @@ def _sample_vertices(geometry: Geometry) -> Array:
 
 
 def _vertex_array(geometry: Geometry) -> int:
-    """A vertex array: vertices and indices; per draw command the piece's number, and (not yet bound) its `_PIECE`."""
+    """A vertex array with the vertices and indices of all pieces."""
     array = np.zeros(1, np.uint32)
     GL.glCreateVertexArrays(1, array)
     handle = int(array[0])
-    numbers = np.arange(len(geometry.geoms), dtype=np.uint32)
     GL.glVertexArrayVertexBuffer(handle, _VERTICES, gl.static_buffer(geometry.vertices), 0, VERTEX.itemsize)
-    GL.glVertexArrayVertexBuffer(handle, _NUMBERS, gl.static_buffer(numbers), 0, numbers.itemsize)
     GL.glVertexArrayElementBuffer(handle, gl.static_buffer(geometry.indices))
     for place, (name, count, kind) in enumerate(
         (("position_m", 3, GL.GL_FLOAT), ("normal", 3, GL.GL_SHORT), ("texcoord", 2, GL.GL_FLOAT))
@@ -245,13 +259,4 @@ def _vertex_array(geometry: Geometry) -> int:
         GL.glEnableVertexArrayAttrib(handle, place)
         GL.glVertexArrayAttribFormat(handle, place, count, kind, kind == GL.GL_SHORT, offset)
         GL.glVertexArrayAttribBinding(handle, place, _VERTICES)
-    GL.glEnableVertexArrayAttrib(handle, 3)
-    GL.glVertexArrayAttribIFormat(handle, 3, 1, GL.GL_UNSIGNED_INT, 0)
-    GL.glVertexArrayAttribBinding(handle, 3, _NUMBERS)
-    for place in range(_PIECE.itemsize // 16):
-        GL.glEnableVertexArrayAttrib(handle, 4 + place)
-        GL.glVertexArrayAttribFormat(handle, 4 + place, 4, GL.GL_FLOAT, False, 16 * place)
-        GL.glVertexArrayAttribBinding(handle, 4 + place, _PIECES)
-    for binding in (_NUMBERS, _PIECES):
-        GL.glVertexArrayBindingDivisor(handle, binding, 1)
     return handle

@@ -3,9 +3,6 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec2 texcoord;
-layout(location = 3) in uint piece;
-layout(location = 7) in vec4 colour; // linear albedo
-layout(location = 8) in vec4 material; // perceptual roughness, metallic, emission, reflectance at normal incidence (f0)
 
 uniform mat4 clip_from_relative;
 out vec3 position_m;
@@ -29,9 +26,9 @@ vec3 shadow_coordinates(int map, vec3 position_by_sun, vec3 facing_by_sun) {
 }
 
 void main() {
-    id = int(piece);
-    albedo = colour.rgb;
-    surface = material;
+    id = pieces[gl_DrawIDARB].number;
+    albedo = pieces[gl_DrawIDARB].colour;
+    surface = pieces[gl_DrawIDARB].material;
     uv = texcoord;
     position_m = relative_position(position);
     smooth_normal = rotate_to_world(normal);

@@ -32,7 +32,6 @@ def test_geoms_of_one_shape_share_its_triangles(model: mujoco.MjModel) -> None:
     found = geometry_of(model, np.ones(4, bool))
     assert (found.vertices.dtype, found.commands.dtype) == (VERTEX, DRAW_COMMAND)
     assert found.geoms.tolist() == [0, 1, 2, 3]
-    assert found.commands["piece"].tolist() == [0, 1, 2, 3]
     assert found.commands["count"].tolist() == [36, 36, 36, 12]
     assert found.commands["first"].tolist() == [0, 0, 36, 72]
     assert found.commands["base"][0] == found.commands["base"][1] == 0

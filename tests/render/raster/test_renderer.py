@@ -271,3 +271,22 @@ def test_geoms_that_a_stage_leaves_out_are_drawn_nowhere() -> None:
     finally:
         renderer.close()
     assert np.array_equal(frames[1], frames[2]) and not np.array_equal(frames[0], frames[1])
+
+
+def test_more_pieces_than_one_draw_call_takes_are_all_in_their_places() -> None:
+    """Shaders find the pose of a piece by its number in a draw call of at most 800 pieces."""
+    side = 30
+    places = [(10.0, 0.3 * (column - side / 2), 0.3 * row - 2.8) for row in range(side) for column in range(side)]
+    boxes = "".join(f'<geom type="box" size=".12 .12 .12" pos="{x} {y:.2f} {z:.2f}"/>' for x, y, z in places)
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{boxes}</worldbody></mujoco>")
+    record = camera(320, 192, y_m=0.0, yaw_deg=0.0)
+    renderer = open_renderer("raster", model, quality="fast")
+    try:
+        (view,) = renderer.render(Stage(model=model, data=posed(model)), (record,))
+    finally:
+        renderer.close()
+    in_camera = record.world_from_camera_transform.inverse().apply(np.array(places))
+    columns, rows = np.rint(record.intrinsics.project(in_camera)).astype(int).T
+    is_inside = (columns >= 0) & (columns < 320) & (rows >= 0) & (rows < 192)
+    assert is_inside.sum() > 800
+    assert np.array_equal(view.geom_id[rows[is_inside], columns[is_inside]], np.flatnonzero(is_inside))
