@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 import platform
 import re
@@ -25,6 +24,7 @@ from gear.contracts.executors import MOST_FAILURES, Outcome, Report
 from gear.dataset.claims import Claims
 from gear.dataset.executors.in_process import InThisProcess
 from gear.dataset.executors.processes import Processes
+from gear.dataset.sealed_json import load_sealed
 from gear.dataset.sharding.shards import WHOLE
 from gear.dataset.store import Store
 from gear.plugins.build import build_task
@@ -111,7 +111,7 @@ def test_a_sample_that_cannot_be_made_is_noted_and_the_rest_is_made(tmp_path: Pa
         r"1 of 4 samples of split 'test' could not be made \(sample 1: fault 2\); .* gear/test/failed", said
     )
     assert "\n" not in said and "run the same command again" in said
-    note = json.loads((tmp_path / "out/gear/test/failed/000001.json").read_text())
+    note = load_sealed(tmp_path / "out/gear/test/failed/000001.json")
     assert note == {"index": 1, "tries": 3, "error": "fault 2", "traceback": ["Traceback", "here"]}
     assert Store(job.root, job.plan).missing() == [1]
     assert collect(job) == 1, "the fourth try fails, and the fifth one does not"
