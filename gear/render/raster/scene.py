@@ -192,15 +192,14 @@ class Scene:
     def _submit(self, groups: list[tuple[Selection, tuple[Array, tuple[str, ...]] | None]]) -> None:
         """Issues draw calls for each group, of at most `gl.PIECES` pieces each."""
         batches = [
-            (group[first : first + gl.PIECES], look)
+            (group[first : first + gl.PIECES], look if first == 0 else None)  # further batches show the same material
             for group, look in groups
             for first in range(0, len(group), gl.PIECES)
         ]
         if not batches:
             return
-        sizes = np.array([len(batch) for batch, _ in batches])
-        ends = np.cumsum(-(-sizes // _ALIGNED) * _ALIGNED)
-        begins = (ends - -(-sizes // _ALIGNED) * _ALIGNED).tolist()
+        lengths = [-(-len(batch) // _ALIGNED) * _ALIGNED for batch, _ in batches]
+        begins = (np.cumsum(lengths) - lengths).tolist()
         # Each range has the full length of the uniform block.
         records = np.zeros(begins[-1] + gl.PIECES, _PIECE)
         for (batch, _), begin in zip(batches, begins, strict=True):
@@ -208,11 +207,9 @@ class Scene:
             part[:] = self._geoms[self.geom_of_piece[batch]]
             part["number"] = batch
         self._pieces.upload(records)
-        shown: object = None
         for (batch, look), begin in zip(batches, begins, strict=True):
-            if look is not None and shown is not look:
+            if look is not None:
                 self._bind_material(int(self.geom_of_piece[batch[0]]), *look)
-                shown = look
             size = gl.PIECES * _PIECE.itemsize
             GL.glBindBufferRange(
                 GL.GL_UNIFORM_BUFFER, _PIECES_BINDING, self._pieces.handle, begin * _PIECE.itemsize, size
