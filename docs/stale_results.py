@@ -19,6 +19,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from gear.world.assets.asset_hash import without_key_points
+
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "docs" / "results"
 INDEX = RESULTS / "index.md"
@@ -35,9 +37,6 @@ IGNORED = {".md", ".pyc"}
 
 UNSEEN = "dynamics/"
 """Folder of `mjcf` that no picture shows: the physics of the ego car."""
-
-KEY_POINT = re.compile(rb"""\s*<numeric\s+name=["']key_point\.[^<>]*/>""")
-"""An element of MJCF that no picture shows, with the white space before it."""
 
 BEGIN, END = "<!-- states: written by docs/stale_results.py -->", "<!-- end of states -->"
 LINE = re.compile(r"^- \*\*Inputs:\*\* (.*)$", re.MULTILINE)
@@ -57,7 +56,7 @@ def digest(folder: Path) -> str:
 
 def _blob(suffix: str, content: bytes) -> str:
     """Git's hash of a file's content; MJCF counts without key points."""
-    data = KEY_POINT.sub(b"", content) if suffix == ".xml" else content
+    data = without_key_points(content) if suffix == ".xml" else content
     return hashlib.sha1(b"blob %d\0" % len(data) + data, usedforsecurity=False).hexdigest()
 
 

@@ -108,7 +108,12 @@ def assets_digest(library: AssetLibrary) -> str:
     Args:
         library: the asset library of the town.
     """
-    return _digest_of(asset_files(library), lambda content: _KEY_POINT_LINE.sub(b"", content))
+    return _digest_of(asset_files(library), without_key_points)
+
+
+def without_key_points(mjcf: bytes) -> bytes:
+    """Returns the content of an MJCF file without the elements that name key points."""
+    return _KEY_POINT_LINE.sub(b"", mjcf)
 
 
 def key_points_digest(library: AssetLibrary) -> str:
