@@ -26,6 +26,11 @@ OTHER_HASHES = (SEAL, "content_key", "twin_key", "assets")
 MOST_RESTORED = 16_384
 """Largest size in bytes of a file in which the changed byte is searched for: 256 hashes are computed for every byte."""
 
+MOST_STRAYS = 100
+"""Largest number of listed paths without a file for which a file with a similar path is searched. Each search compares
+all files of the dataset, and a dataset of unknown origin may list any number of paths.
+"""
+
 BITS = tuple(1 << bit for bit in range(8))
 OTHER_CHANGES = tuple(change for change in range(1, 256) if change not in BITS)
 
@@ -82,9 +87,9 @@ def listed_hashes(root: Path, paths: Iterable[str]) -> dict[str, set[str]]:
                 found[name.decode(errors="replace")].add(digest.decode(errors="replace"))
     files = set(files_below(root))
     listed = {path: frozenset(digests) for path, digests in found.items()}
-    for stray in sorted(listed.keys() - files):
+    for place, stray in enumerate(sorted(listed.keys() - files)):
         digests = found.pop(stray)
-        near = (file for file in files if _differ_in_one(file, stray))
+        near = (file for file in files if place < MOST_STRAYS and _differ_in_one(file, stray))
         meant = next((file for file in near if file not in listed or digests & listed[file]), None)
         if meant is not None or _is_path(root, stray):
             found[meant or stray] |= digests

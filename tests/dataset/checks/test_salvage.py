@@ -46,3 +46,14 @@ def test_hashes_are_read_from_files_that_are_no_json(tmp_path: Path) -> None:
         "left/7.txt": {other},
         "left/8.png": {third},
     }
+
+
+def test_similar_paths_are_searched_for_a_limited_number_of_listed_paths(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "images").mkdir()
+    (tmp_path / "images/0.png").touch()
+    (tmp_path / "one.json").write_text(f'{{"images/1.png": "{"a" * 64}"}}')
+    assert listed_hashes(tmp_path, ["one.json"]).keys() == {"images/0.png"}
+    monkeypatch.setattr("gear.dataset.checks.salvage.MOST_STRAYS", 0)
+    assert listed_hashes(tmp_path, ["one.json"]).keys() == {"images/1.png"}
