@@ -36,32 +36,32 @@ ROOMS: dict[str, tuple[float, str, str]] = {
         "what verbs share when they measure: a guarded model, statistics, twins, the gap",
     ),
     "leaderboard": (
-        0.9,
+        0.64,
         "records, rules",
         "records of benchmark results, the rules that they must keep, and the rows of a leaderboard",
     ),
     "collecting": (
-        0.71,
+        0.76,
         "making samples",
         "what verbs share when they collect: jobs, what each worker does, patches, probes",
     ),
     "readers": (0.09, "torch datasets", "datasets of any task as torch reads them: batches, order, prefetching"),
-    "testing": (0.91, "for plugin authors", "contract tests and small worlds that plugin authors use"),
-    "augment": (0.57, "augmentation", "changes of pictures that keep their ground truth exact"),
+    "testing": (0.92, "for plugin authors", "contract tests and small worlds that plugin authors use"),
+    "augment": (0.58, "augmentation", "changes of pictures that keep their ground truth exact"),
     "plugins": (
         0.31,
         "built-in plugins",
         "discovery, datasets with their tasks, and the built-in plugins, one file each",
     ),
-    "compositor": (0.59, "patch into picture", "puts patches into pictures, exactly and differentiably"),
+    "compositor": (0.67, "patch into picture", "puts patches into pictures, exactly and differentiably"),
     "networks": (0.2, "graphs, losses", "network graphs, losses, weights, by task"),
-    "groundtruth": (0.35, "labels, boxes", "measures labels, boxes and visibility in a frame"),
-    "metrics": (0.16, "scores", "the benchmarks' own metrics"),
+    "groundtruth": (0.25, "labels, boxes", "measures labels, boxes and visibility in a frame"),
+    "metrics": (0.08, "scores", "the benchmarks' own metrics"),
     "formats": (0.42, "file formats", "reads and writes Cityscapes, COCO, KITTI, PNG"),
-    "world": (0.91, "towns, traffic", "towns, roads, traffic, weather and surfaces as MuJoCo models"),
-    "render": (0.68, "renderers", "`raster`, `filament` and `classic` behind one protocol"),
+    "world": (0.92, "towns, traffic", "towns, roads, traffic, weather and surfaces as MuJoCo models"),
+    "render": (0.75, "renderers", "`raster`, `filament` and `classic` behind one protocol"),
     "dataset": (
-        0.14,
+        0.42,
         "files on disk",
         "whole files, plans, sidecars, manifests, locks, worker processes",
     ),
@@ -79,9 +79,9 @@ ROOMS: dict[str, tuple[float, str, str]] = {
 
 GROUPS = (
     ("what users run", 2),
-    ("what verbs share", 4),
+    ("what verbs share", 3),
     ("plugins and their parts", 2),
-    ("worlds, labels, files", 2),
+    ("worlds, labels, files", 1),
     ("basics", 4),
 )
 """Groups of floors, from the top: a name for the picture, and the number of floors."""
@@ -89,7 +89,7 @@ GROUPS = (
 GROUP_PX = 170
 """Width of the column with the names of the groups, left of the rooms."""
 
-WIDTH_PX, FLOOR_PX, BOX_PX, BOX_HEIGHT_PX, MARGIN_PX = 920, 74, 150, 44, 20
+WIDTH_PX, FLOOR_PX, BOX_PX, BOX_HEIGHT_PX, MARGIN_PX = 1020, 74, 150, 44, 20
 
 
 def floors() -> list[list[str]]:
