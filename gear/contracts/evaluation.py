@@ -1,5 +1,5 @@
 """Optional protocols of tasks and evaluators: stored predictions, masked ground truth, further reports, fast
-intervals.
+intervals, directions of metrics.
 
 gear tests with `isinstance` which of these runtime-checkable protocols a task or an evaluator implements.
 """
@@ -211,5 +211,22 @@ class Counting(Protocol):
     def counted(self) -> frozenset[str]:
         """The names of the metrics that are numbers of events per picture. If `Ranged` states their range, it is 0
         to infinity.
+        """
+        ...
+
+
+@runtime_checkable
+class Directed(Protocol):
+    """An evaluator that states for each of its metrics which direction is better; logs and figures show it.
+
+    Without this protocol, the direction of the main metric alone is known, from the spec.
+    """
+
+    def lower_is_better(self, metric: str) -> bool | None:
+        """Whether lower values of a metric are better; None for a metric without a better direction, such as a number
+        of objects, or a signed error, of which 0 is the best value.
+
+        Args:
+            metric: name of the metric, as in `result`.
         """
         ...

@@ -95,6 +95,14 @@ class ObjectEvaluator:
         """
         return 0.0, 1.0 if metric in STATE_METRICS else math.inf
 
+    def lower_is_better(self, metric: str) -> bool | None:
+        """False for the share of found objects; True for shares of all other states, and for false alarms.
+
+        Args:
+            metric: name of the metric.
+        """
+        return metric != "found_share"
+
     def counted(self) -> frozenset[str]:
         """The metrics that are numbers of events per picture: the false alarms."""
         return frozenset(ALARM_METRICS)

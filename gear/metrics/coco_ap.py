@@ -140,6 +140,14 @@ class CocoEvaluator(Generic[SampleT]):
         """
         return 0.0, 1.0
 
+    def lower_is_better(self, metric: str) -> bool | None:
+        """False: every metric is average precision or recall.
+
+        Args:
+            metric: name of the metric.
+        """
+        return False
+
     def _matched(self) -> Any:
         """A `COCOeval` after matching, before accumulation."""
         occurring = sorted({item.category_id for item in _labelled(self.pictures)})

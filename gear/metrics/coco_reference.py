@@ -50,6 +50,14 @@ class TallObjects(CocoEvaluator[SampleT]):
         instances = {f"instances_{name}": float(count) if self.pictures else np.nan for name, count in counts.items()}
         return {"ap50": total, **{f"ap50_{name}": value for name, value in values.items()}, **instances}
 
+    def lower_is_better(self, metric: str) -> bool | None:
+        """False for average precision; None for `instances_<category>`, which describe the dataset.
+
+        Args:
+            metric: name of the metric.
+        """
+        return None if metric.startswith("instances_") else False
+
     def resampled(self, draws: Draws) -> Spread:
         """The metrics `ap50` and `ap50_<category>` of R resampled datasets, from which confidence intervals are
         computed. The categories with at least 50 instances in the whole dataset count.

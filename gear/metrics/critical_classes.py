@@ -49,6 +49,14 @@ class CriticalClasses(SemanticEvaluator):
         super().update(sample, prediction)
         return {name: float(value) for name, value in self._shares(self.confusion - before).items()}
 
+    def lower_is_better(self, metric: str) -> bool | None:
+        """True for `as_road_share` and `invented_share`, which are shares of errors; False for all other metrics.
+
+        Args:
+            metric: name of the metric.
+        """
+        return metric in ("as_road_share", "invented_share")
+
     def metrics(self, totals: Mapping[str, npt.NDArray[Any]]) -> dict[str, Values]:
         """Computes the metrics, shares in 0..1, from counts by name; NaN where no pixel counts.
 

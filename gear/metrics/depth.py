@@ -21,6 +21,9 @@ T = TypeVar("T")
 
 Crop = Literal["none", "garg", "eigen"]
 
+SHARES = ("d1", "d2", "d3")
+"""Names of the shares of pixels with a small error, without the prefix `eigen_`."""
+
 CROPS: dict[str, tuple[float, float, float, float]] = {
     "none": (0.0, 1.0, 0.0, 1.0),
     "garg": (0.40810811, 0.99189189, 0.03594771, 0.96405229),
@@ -163,7 +166,16 @@ class DepthEvaluator:
         Args:
             metric: name of the metric, with or without the prefix `eigen_`.
         """
-        return 0.0, 1.0 if metric.removeprefix("eigen_") in ("d1", "d2", "d3") else math.inf
+        return 0.0, 1.0 if metric.removeprefix("eigen_") in SHARES else math.inf
+
+    def lower_is_better(self, metric: str) -> bool | None:
+        """False for `d1` to `d3`, the shares of pixels with a small error; True for all other metrics, which are
+        errors.
+
+        Args:
+            metric: name of the metric, with or without the prefix `eigen_`.
+        """
+        return metric.removeprefix("eigen_") not in SHARES
 
     @staticmethod
     def _names() -> tuple[str, ...]:

@@ -141,6 +141,14 @@ class KittiEvaluator(Generic[SampleT]):
         """
         return 0.0, 1.0
 
+    def lower_is_better(self, metric: str) -> bool | None:
+        """False: every metric is an average precision or similarity.
+
+        Args:
+            metric: name of the metric.
+        """
+        return False
+
     def ceilings(self) -> Mapping[str, float]:
         """The values that perfect detections would reach, by name of the metric; only metrics whose value would be
         below 1.

@@ -124,6 +124,15 @@ class ObstacleDepth:
             return -1.0, math.inf
         return 0.0, math.inf if metric in ("mae_m", "abs_rel") else 1.0
 
+    def lower_is_better(self, metric: str) -> bool | None:
+        """True for errors, and for shares of obstacles that appear too far away. None for `bias_rel`, whose best value
+        is 0, and for `has_obstacle`, which describes the dataset.
+
+        Args:
+            metric: name of the metric.
+        """
+        return None if metric in ("bias_rel", "has_obstacle") else True
+
 
 def _errors(true_m: np.ndarray, said_m: np.ndarray) -> dict[str, float]:
     """The errors on (N,) pixels of an obstacle with true and predicted depths in metres."""

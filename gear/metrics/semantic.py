@@ -138,6 +138,14 @@ class SemanticEvaluator:
         """
         return 0.0, 1.0
 
+    def lower_is_better(self, metric: str) -> bool | None:
+        """False: every metric is a share of what is right.
+
+        Args:
+            metric: name of the metric.
+        """
+        return False
+
     def totals(self) -> Mapping[str, npt.NDArray[Any]]:
         """The gathered counts by name: the (COUNT, COUNT) confusion matrix of pixels, and (COUNT,) weighted counts
         of instances; COUNT is the number of label ids.

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from gear.contracts.evaluation import Directed, Reports
+from gear.contracts.specs import TaskSpec
+from gear.contracts.tasks import Task
+
 UP, DOWN = "up is better", "down is better"
 
 FOR_THE_ATTACK = "for the attack"
@@ -20,3 +26,19 @@ def with_direction(name: str, *, lower_is_better: bool | None, whose: str = "") 
     if lower_is_better is None:
         return name
     return f"{name} ({' '.join(filter(None, (DOWN if lower_is_better else UP, whose)))})"
+
+
+def metric_direction(name: str, spec: TaskSpec[Any], task: Task[Any, Any]) -> bool | None:
+    """Whether lower values of a task's metric are better; None if no direction is better, or if none is stated.
+
+    Args:
+        name: name of the metric; `<report>.<metric>` for a metric of a report.
+        spec: spec of the task, which states the direction of its main metric.
+        task: the task, whose evaluators state the directions of all metrics if they implement `Directed`.
+    """
+    if name == spec.metric:
+        return spec.lower_is_better
+    evaluators = task.reports() if isinstance(task, Reports) else {}
+    report, _, metric = name.partition(".")
+    evaluator, known = (evaluators[report], metric) if report in evaluators else (task.evaluator(), name)
+    return evaluator.lower_is_better(known) if isinstance(evaluator, Directed) else None

@@ -24,7 +24,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from gear.contracts.evaluation import KeepsPredictions, Maskable, Reports, WithObjects
+from gear.contracts.evaluation import Directed, KeepsPredictions, Maskable, Reports, WithObjects
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import Encoded, ExtendsIndexes, Sample, Sidecar, SplitInfo, Task
 from gear.metrics.object_matching import outcomes
@@ -50,6 +50,7 @@ class TaskContract:
         headline: name of the metric by which predictions are compared.
         perfect: value of that metric for a perfect prediction.
         repeats: number of times that each sample is added to the evaluator before the metric is read.
+        undirected: names of the metrics without a better direction, `<report>.<metric>` for those of reports.
     """
 
     spec: ClassVar[TaskSpec[Any]]
@@ -57,6 +58,7 @@ class TaskContract:
     headline: ClassVar[str]
     perfect: ClassVar[float] = 1.0
     repeats: ClassVar[int] = 2
+    undirected: ClassVar[frozenset[str]] = frozenset()
 
     def spoil(self, prediction: Any) -> Any:
         """A prediction that is clearly worse, made from a good prediction; subclasses define it.
@@ -291,6 +293,29 @@ class TaskContract:
         for name, evaluator in task.reports().items() if isinstance(task, Reports) else ():
             assert all(value != value for value in evaluator.result().values()), name
             assert not any(math.isinf(v) for v in self._gather(evaluator, [0, 1]).result().values()), name
+
+    def test_metrics_get_worse_in_their_direction(self) -> None:
+        """Spoilt predictions improve no metric whose evaluator states a direction. The other metrics, such as numbers
+        of objects, are those in `undirected`.
+
+        The test is skipped for evaluators that state no directions (protocol `Directed`).
+        """
+        task = self.task()
+        reports = task.reports() if isinstance(task, Reports) else {}
+        undirected = set()
+        for name, evaluator in {"": task.evaluator(), **reports}.items():
+            if not isinstance(evaluator, Directed):
+                continue
+            good = dict(self._gather(evaluator, [0, 1]).result())
+            fresh = task.reports()[name] if name else task.evaluator()
+            bad = self._gather(fresh, [0, 1], spoilt=True).result()
+            for metric, value in good.items():
+                lower = evaluator.lower_is_better(metric)
+                if lower is None:
+                    undirected.add(f"{name}.{metric}" if name else metric)
+                    continue
+                assert not (bad[metric] < value if lower else bad[metric] > value), (name, metric, value, bad[metric])
+        assert undirected == self.undirected
 
     def test_preview_shows_pictures(self) -> None:
         """`preview` returns at least one picture; all are (H, W, 3) uint8."""

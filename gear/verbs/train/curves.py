@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from gear.contracts.specs import TaskSpec
 from gear.dataset.files import write_whole
+from gear.reporting.directions import with_direction
 from gear.verbs.train.checkpoint import TrainingState
-from gear.verbs.train.run_log import metric_title
+from gear.verbs.train.validate import LOSS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +45,7 @@ def write_curves(root: Path, spec: TaskSpec, progress: TrainingState, title: str
     _line(left, losses, color=BLUE, label="training")
     steps = [entry["step"] for entry in progress.validations]
     left.plot(steps, [entry["loss"] for entry in progress.validations], "o-", color=RED, ms=3, label="validation")
-    left.set(xlabel="step", ylabel=metric_title("loss", spec))
+    left.set(xlabel="step", ylabel=with_direction(LOSS, lower_is_better=True))
     left.grid(alpha=0.3)
     left.legend(frameon=False, fontsize=8)
 
@@ -52,7 +53,7 @@ def write_curves(root: Path, spec: TaskSpec, progress: TrainingState, title: str
         values = [entry.get(spec.metric, float("nan")) for entry in progress.validations]
         right.plot(steps, values, "o-", color=GREEN, ms=3)
         right.axvline(progress.best_step, color=GREEN, lw=0.8, ls=":")
-    right.set(xlabel="step", ylabel=metric_title(spec.metric, spec))
+    right.set(xlabel="step", ylabel=with_direction(spec.metric, lower_is_better=spec.lower_is_better))
     right.grid(alpha=0.3)
     if progress.steps:
         rate = right.twinx()

@@ -18,7 +18,7 @@ from gear.dataset.files import write_whole
 from gear.measuring.run_log import RunLog
 from gear.measuring.sample_figures import ShownPictures, ShownSample, sample_figure
 from gear.networks.runtime import as_bytes, seeded
-from gear.reporting.directions import with_direction
+from gear.reporting.directions import metric_direction, with_direction
 from gear.values.frames import UInt8Image
 from gear.values.serial import Json
 from gear.verbs.train.adversary import Adversary
@@ -35,16 +35,14 @@ SAMPLES_FILE, QUALITY = "samples.jpg", 92
 """Name of the figure of the finished training in its folder, and its JPEG quality."""
 
 
-def metric_title(name: str, spec: TaskSpec[Any]) -> str:
-    """Returns the name of a validation metric with its direction, which is known for the loss and for the metric by
-    which the training chooses among checkpoints.
+def metric_title(name: str, spec: TaskSpec[Any], task: Task[Any, Any]) -> str:
+    """Returns the name of a validation metric with its direction, such as `miou (up is better)`.
 
     Args:
-        name: name of the metric.
-        spec: spec of the task.
+        name: name of the metric, or `loss`.
+        spec, task: spec of the task, and the task, which state the directions of their metrics.
     """
-    known = {LOSS: True} | ({spec.metric: spec.lower_is_better} if spec.metric else {})
-    return with_direction(name, lower_is_better=known.get(name))
+    return with_direction(name, lower_is_better=True if name == LOSS else metric_direction(name, spec, task))
 
 
 class TrainLog:
@@ -95,7 +93,7 @@ class TrainLog:
             views: names of the cameras whose pictures the network uses.
             samples: the validation samples.
         """
-        titled = {f"validation/{metric_title(name, self._spec)}": value for name, value in metrics.items()}
+        titled = {f"validation/{metric_title(name, self._spec, self._task)}": value for name, value in metrics.items()}
         self._log.scalars(titled, state.step)
         self._log.pictures(state.step, lambda: {FIGURE: figure_of(self._task, network, views, samples)})
 

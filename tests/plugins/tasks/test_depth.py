@@ -16,6 +16,7 @@ class TestDepth(TaskContract):
     options: ClassVar = {"width_px": 408, "height_px": 124}
     headline = "rmse_m"
     perfect = 0.0
+    undirected = frozenset({"nearest_obstacle.bias_rel", "nearest_obstacle.has_obstacle"})
 
     def spoil(self, prediction: Any) -> Any:
         return prediction * np.float32(1.1)

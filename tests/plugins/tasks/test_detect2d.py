@@ -15,6 +15,7 @@ from gear.augment.apply import shrunk
 from gear.formats import rle
 from gear.formats.coco import Detection
 from gear.groundtruth.visibility import Visibility
+from gear.metrics.coco_reference import CATEGORIES
 from gear.plugins.tasks.detect2d import Detect2dConfig, Detect2dTask, detect2d, flip
 from gear.testing.synthetic import synthetic_frame
 from gear.testing.task_contract import INFO, TaskContract
@@ -33,6 +34,7 @@ class TestDetect2d(TaskContract):
     spec = detect2d
     options: ClassVar = {"width_px": 667, "height_px": 400}
     headline = "ap"
+    undirected = frozenset(f"reference.instances_{name}" for name in CATEGORIES)
 
     def spoil(self, prediction: Any) -> Any:
         return tuple(replace(found, box_px=tuple(v + 9 for v in found.box_px)) for found in prediction)

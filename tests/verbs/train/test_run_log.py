@@ -53,6 +53,8 @@ def test_a_training_is_logged_and_its_weights_are_the_same(
     assert [step for step, _ in found.scalars[TRAINING_LOSS]] == [2, 4, 6, 8, 10, 12]
     assert dict(found.scalars[MIOU])[report.best_step] == pytest.approx(report.metrics["miou"], rel=1e-4)
     assert len(found.scalars["training/learning rate"]) == 6
+    undirected = {name for name in found.scalars if not name.endswith(" is better)")}
+    assert undirected == {"training/learning rate"} and len(found.scalars) > 50
     assert [step for step, _ in found.pictures[FIGURE]] == [2, 4, 6, 8, 10, 12]
     assert '"learning_rate"' in found.texts["config"] and "tiny_segmenter on semseg" in found.texts["config"]
 
@@ -96,9 +98,12 @@ def test_a_task_that_cannot_draw_loses_no_weights(
 
 def test_metrics_state_a_direction_that_is_known() -> None:
     spec: Any = catalogue().get("task", "depth").spec
-    assert metric_title("loss", spec) == "loss (down is better)"
-    assert metric_title(spec.metric, spec).endswith("is better)")
-    assert metric_title("pixels", spec) == "pixels"
+    task = spec.build(spec.config())
+    assert metric_title("loss", spec, task) == "loss (down is better)"
+    assert metric_title("eigen_d1", spec, task) == "eigen_d1 (up is better)"
+    assert metric_title("rmse_m", spec, task) == "rmse_m (down is better)"
+    assert metric_title("reference.d1", spec, task) == "reference.d1 (up is better)"
+    assert metric_title("nearest_obstacle.bias_rel", spec, task) == "nearest_obstacle.bias_rel"
 
 
 def test_the_command_logs(street: Street, tmp_path: Path, install: Any) -> None:

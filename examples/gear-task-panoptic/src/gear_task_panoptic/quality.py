@@ -79,6 +79,10 @@ class QualityEvaluator:
             metrics[name] = _mean([row[0] for c, row in rows.items() if (c in self.things) == wanted])
         return metrics
 
+    def lower_is_better(self, metric: str) -> bool | None:
+        """False: every metric is a share of what is right."""
+        return False
+
 
 def match(truth: Panoptic, prediction: Panoptic) -> dict[int, list[float]]:
     """By category: sum of IoU, true positives, false positives, false negatives."""
