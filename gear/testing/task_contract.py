@@ -301,14 +301,15 @@ class TaskContract:
         The test is skipped for evaluators that state no directions (protocol `Directed`).
         """
         task = self.task()
-        reports = task.reports() if isinstance(task, Reports) else {}
+        first, second = (
+            {"": task.evaluator(), **(task.reports() if isinstance(task, Reports) else {})} for _ in range(2)
+        )
         undirected = set()
-        for name, evaluator in {"": task.evaluator(), **reports}.items():
+        for name, evaluator in first.items():
             if not isinstance(evaluator, Directed):
                 continue
             good = dict(self._gather(evaluator, [0, 1]).result())
-            fresh = task.reports()[name] if name else task.evaluator()
-            bad = self._gather(fresh, [0, 1], spoilt=True).result()
+            bad = self._gather(second[name], [0, 1], spoilt=True).result()
             for metric, value in good.items():
                 lower = evaluator.lower_is_better(metric)
                 if lower is None:

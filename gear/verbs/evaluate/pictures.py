@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
 
 from gear.contracts.legends import ColourNames
 from gear.contracts.tasks import NO_PATCH, Sample
@@ -33,6 +34,11 @@ PICTURES = "pictures"
 
 CELL_WIDTH_PX, QUALITY = 560, 92
 """Width of a picture in a sheet in pixels, and JPEG quality of a sheet."""
+
+MIN_CHANGE, DARKENING = 24, 4
+"""Smallest difference of a colour between the pictures of two predictions, in levels of 255, which counts as a change,
+and the divisor of the colours elsewhere.
+"""
 
 LABEL_LENGTH = 48
 """Largest number of characters of a patch's label in a caption: the label of a shipped patch has 47."""
@@ -80,7 +86,8 @@ def draw_sheet(root: Path, row: EvaluatedDataset, twin: EvaluatedDataset | None,
     """Draws the sheet of one dataset, with the legend of the predictions.
 
     A sample has one line of pictures, or two if there is a twin: the first shows the twin and the ground truth, the
-    second shows the dataset itself and the defended picture.
+    second shows the dataset itself, and the defended picture or, without a defense, where the patch changed the
+    prediction.
 
     Args:
         root: folder of the evaluation.
@@ -161,8 +168,18 @@ def _cells(
         lines[0] += true + guarded
     else:
         seen = _predicted(twin, other, twin.results[result.index])
-        lines = [_line(f"{index}  without a patch", other.images[camera], seen) + true, lines[0] + guarded]
+        changed = [(f"{index}  bright: prediction changed", shown) for shown in _changed(drawn, seen)]
+        lines = [_line(f"{index}  without a patch", other.images[camera], seen) + true, lines[0] + (guarded or changed)]
     return [[captioned(shown, text, CELL_WIDTH_PX) for text, shown in line] for line in lines]
+
+
+def _changed(drawn: Mapping[str, UInt8Image], seen: Mapping[str, UInt8Image]) -> list[UInt8Image]:
+    """Returns the first picture of a prediction, dark where it equals that of the twin; nothing without predictions."""
+    name = next((name for name in drawn if name in seen and drawn[name].shape == seen[name].shape), None)
+    if name is None:
+        return []
+    is_equal = cv2.absdiff(drawn[name], seen[name]).max(axis=2) < MIN_CHANGE
+    return [np.where(is_equal[..., None], drawn[name] // DARKENING, drawn[name])]
 
 
 def _line(caption: str, picture: UInt8Image, drawn: Mapping[str, UInt8Image]) -> list[tuple[str, UInt8Image]]:

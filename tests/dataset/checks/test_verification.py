@@ -19,11 +19,26 @@ def test_a_plan_of_any_number_of_samples_costs_no_memory(tmp_path: Path, monkeyp
     monkeypatch.setattr(verification, "MOST_MISSING", 3)
     calls: list[tuple[int, int]] = []
     check = check_split(tmp_path, "test", lambda done, total: calls.append((done, total)))
-    assert check.broken_samples == {1, 2, 4} and calls[0] == (0, 5) and calls[-1] == (5, 5)
+    assert check.broken_samples == {1, 2, 4} and calls[0] == (0, 2) and calls[-1] == (2, 2)
     samples = [one for one in check.findings if "/samples/" in one.path]
     assert [one.path[-11:] for one in samples] == ["000001.json", "000002.json", "000004.json", "000005.json"]
     last = Finding(path="gear/test/samples/000005.json", problem="missing", detail="and 999999999994 more samples")
     assert samples[-1] == last
+
+
+def test_missing_samples_are_not_looked_for_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fill(tmp_path, plan(samples=4), [0, 3], is_closed=False)
+    write_plan(tmp_path, plan(samples=10**12))
+    looks: list[str] = []
+    inside = verification.inside
+
+    def counted(root: Path, relative: str) -> Path:
+        looks.append(relative)
+        return inside(root, relative)
+
+    monkeypatch.setattr(verification, "inside", counted)
+    assert len(check_split(tmp_path, "test").broken_samples) == verification.MOST_MISSING
+    assert len(looks) < 20
 
 
 def test_a_sidecar_of_any_number_costs_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ import gear
 from gear.measuring.scoring import SampleResult
 from gear.reporting.picture_grid import CAPTION_PX, captioned, side_by_side, stacked
 from gear.verbs.evaluate.page import PAGE
-from gear.verbs.evaluate.pictures import CELL_WIDTH_PX, most_changed
+from gear.verbs.evaluate.pictures import CELL_WIDTH_PX, DARKENING, MIN_CHANGE, _changed, most_changed
 from gear.verbs.evaluate.run import evaluate
 from tests.verbs.conftest import Install, Small
 from tests.verbs.evaluate.conftest import Oracle, model_spec
@@ -55,6 +55,12 @@ def test_every_row_has_a_sheet_and_links_to_it(tmp_path: Path, small: Small, ins
         assert np.abs(shown.astype(int) - wanted).mean() < 6
     predicted = sheet[:, CELL_WIDTH_PX : 2 * CELL_WIDTH_PX].astype(int)
     assert np.abs(predicted[CAPTION_PX:height] - predicted[height + CAPTION_PX : 2 * height]).mean() > 20
+    # Without a defense the third picture below is bright where the prediction changed.
+    third = sheet[height + CAPTION_PX : 2 * height, 2 * CELL_WIDTH_PX :].astype(int)
+    upper, lower = predicted[CAPTION_PX:height], predicted[height + CAPTION_PX : 2 * height]
+    is_changed, is_equal = np.abs(upper - lower).min(axis=2) > 40, np.abs(upper - lower).max(axis=2) < 8
+    assert is_changed.mean() > 0.2 and np.abs(third - lower)[is_changed].mean() < 12
+    assert is_equal.mean() > 0.1 and np.abs(third - lower // DARKENING)[is_equal].mean() < 12
     page = (tmp_path / "out" / PAGE).read_text()
     for row in (none, random):
         assert f'href="#{row.name}"' in page and f'src="pictures/{row.name}.jpg"' in page
@@ -63,6 +69,17 @@ def test_every_row_has_a_sheet_and_links_to_it(tmp_path: Path, small: Small, ins
     again = evaluate(roots, model="odd", out=tmp_path / "none", pictures=0)
     assert again.row("random").pictures is None and not (tmp_path / "none/pictures").exists()
     assert "<img" not in (tmp_path / "none/report.html").read_text()
+
+
+def test_unchanged_parts_of_a_prediction_are_dark() -> None:
+    seen = np.full((4, 6, 3), 200, np.uint8)
+    drawn = seen.copy()
+    drawn[1, 2, 0] -= MIN_CHANGE
+    drawn[3, 3] -= MIN_CHANGE - 1
+    (shown,) = _changed({"left": drawn}, {"left": seen})
+    assert (shown[1, 2] == drawn[1, 2]).all() and (shown[3, 3] == drawn[3, 3] // DARKENING).all()
+    assert (shown[0] == 200 // DARKENING).all()
+    assert not _changed({"left": drawn}, {"left": seen[:3]}) and not _changed({"left": drawn}, {})
 
 
 def test_a_task_that_cannot_draw_costs_the_pictures_alone(
