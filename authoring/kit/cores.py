@@ -1,4 +1,4 @@
-"""What closes a building from within.
+"""The core of a building, which closes gaps between the panels of its walls.
 
 Walls are laid in panels around their openings, so that panels meet in T-junctions. A rasteriser leaves a pixel open
 here and there along them, and all behind it is seen from inside and is not drawn: the sky shows through the house. A

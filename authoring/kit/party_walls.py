@@ -44,7 +44,7 @@ def party_wall(
         top_m: height of the walls.
         ridge_m: how far the roof or its parapet rises over them here.
         covered_m: up to where a neighbour stands before it.
-        rng: decides what there is.
+        rng: decides which details the wall has.
     """
     width = facade.width_m
     kind = str(rng.choice(["house", "advert", "render", "plain"], p=[0.3, 0.2, 0.3, 0.2]))

@@ -1,4 +1,4 @@
-"""Traffic signs on their posts. A sign faces -y, towards the driver who comes from there."""
+"""Traffic signs on their posts. A sign faces -y, towards approaching drivers."""
 
 from __future__ import annotations
 

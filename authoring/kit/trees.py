@@ -189,7 +189,7 @@ def _crown(habit: Species, height_m: float, rng: np.random.Generator, *, near: b
 
 
 def _wood(sink: Sink, habit: Species, height_m: float, tips: Array, *, near: bool, rng: np.random.Generator) -> None:
-    """Trunk and limbs; the trunk of a near tree goes on into the topmost bough, and limbs leave it below the crown."""
+    """Trunk and limbs; the trunk of a near tree continues in the topmost bough, and limbs leave it below the crown."""
     top = tips[-1, 2] if near else habit.centre * height_m
     levels = np.array([0.0, 0.04, 0.3, 0.62, 1.0]) if near else np.array([0.0, 1.0])
     sway = rng.uniform(-1, 1, (len(levels), 2)) * habit.trunk * height_m * np.minimum(levels * 3, 1)[:, None]

@@ -47,7 +47,7 @@ PAINTERS: tuple[Painter, ...] = (
     freight.containers,
     freight.direction_signs,
 )
-# Normals say less than colours do, and cost as much; occlusion, roughness and metalness say less still.
+# Normal maps add less to a picture than colours and need as many bytes; the other maps add even less.
 LARGEST_MAP_PX = 512
 
 
@@ -68,12 +68,12 @@ def registered_stems() -> set[str]:
 def written_textures(textures: dict[str, Image]) -> dict[str, Image]:
     """The registered textures at the sizes that they are written with, in order of their names."""
     if missing := registered_stems() - set(textures):
-        raise ValueError(f"nobody paints {', '.join(sorted(missing))}")
+        raise ValueError(f"no function paints {', '.join(sorted(missing))}")
     largest = {material.rgb: max(textures[material.rgb].shape) for material in MATERIALS.values()}
     for material in MATERIALS.values():
         side = max(textures[material.rgb].shape)
         if material.normal:
-            # What an atlas has of relief is edges of a few pixels, with nothing between them.
+            # The relief of an atlas is only edges of a few pixels.
             largest[material.normal] = LARGEST_MAP_PX if material.tile_m else side
         if material.orm:
             largest[material.orm] = min(LARGEST_MAP_PX, max(largest.get(material.orm, 0), side // 2))

@@ -9,7 +9,7 @@ from authoring.materials.noise import wrapped_blur
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
-# A surface's grain is no pit: what it hides, its colour shows already.
+# Small grain is no pit: the colour texture already contains its shadows.
 GRAIN_M = 0.0005
 
 

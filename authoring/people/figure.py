@@ -22,7 +22,7 @@ GROUPS = ("paint", "cloth", "skin", "hair", "shoes", "extra")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Person:
-    """Somebody to model.
+    """A person to model.
 
     Attributes:
         name: of the files.

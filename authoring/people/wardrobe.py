@@ -1,4 +1,4 @@
-"""Who there is: builds, faces, clothes, colours."""
+"""The list of people: builds, faces, clothes and colours."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class Slab:
 
 
 def build_bridge(sink: Sink, network: Network, street: Street) -> None:
-    """Everything that is seen of one bridge, from the foot of one ramp to that of the other."""
+    """Build the visible parts of one bridge, from the foot of one ramp to the foot of the other."""
     line, z = _profile(network, street)
     half = street.profile.half_width_m
     edge = half + BRIDGE_SIDEWALK_M
@@ -60,7 +60,7 @@ def build_bridge(sink: Sink, network: Network, street: Street) -> None:
 
 
 def slabs(network: Network, street: Street) -> Iterator[Slab]:
-    """What carries cars and people on a bridge."""
+    """Collision boxes of a bridge, which carry cars and people."""
     line, z = _profile(network, street)
     half = street.profile.half_width_m
     strips = [("road", 0.0, half, 0.0)]

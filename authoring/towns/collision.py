@@ -1,4 +1,4 @@
-"""What carries and what stops: boxes under roads and sidewalks, boxes in buildings; never rendered."""
+"""Collision geoms of a town, which are never rendered: boxes under roads and sidewalks, and boxes in buildings."""
 
 from __future__ import annotations
 

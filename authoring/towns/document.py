@@ -16,7 +16,7 @@ from authoring.towns.walks import Walk
 
 # The one material without a texture: a dark, smooth, rippleless canal.
 WATER_XML = '<material name="water" rgba="0.035 0.06 0.055 1" metallic="0" roughness="0.08" specular="0.6"/>'
-# Below all that is seen: meshes that meet in a T leave cracks of a pixel, which would show the sky.
+# Below all visible ground: T-junctions of meshes leave cracks of a pixel, which would show the sky.
 UNDERGROUND_TOP_M = -2.2
 UNDERGROUND_MATERIAL_XML = '<material name="underground" rgba="0.03 0.03 0.03 1" metallic="0" roughness="1"/>'
 UNDERGROUND_XML = (
@@ -69,7 +69,7 @@ class Body:
 
 @dataclass(slots=True)
 class Document:
-    """Everything a town's file says."""
+    """The content of a town's file."""
 
     name: str
     bounds: tuple[float, float, float, float]

@@ -22,11 +22,11 @@ LAMP_M = 25.0
 MEDIAN_TREE_M = 14.5
 # Trees on the quays that are farther from every bridge are simple ones.
 SEEN_FROM_BRIDGE_M = 34.0
-# How far lamps go on along a street out of town.
+# Length of a street out of town along which there are lamps.
 OUTSIDE_M = 80.0
 FROM_KERB_M = 0.65
 LAMP_SHIFTS_M = (0.0, 0.8, -0.8)
-# On faster streets one has priority where lights fail.
+# Faster streets have priority signs, for the case that traffic lights fail.
 PRIORITY_MPS = 12.0
 FAR_M = 236.0
 TREES = (
@@ -85,7 +85,7 @@ class Furnisher:
         signage.chevrons(self, street)
 
     def node(self, name: str) -> None:
-        """Signals or signs on every arm of a junction, seen by those who arrive on it."""
+        """Signals or signs on every arm of a junction, facing arriving traffic."""
         node = self.network.nodes[name]
         east_west_green = bool(self.rng.random() < 0.5)
         for arm, starts, away in self.network.arms(name):
@@ -285,10 +285,10 @@ class Furnisher:
     def at_mouth(
         self, street: Street, starts: bool, back: float, from_kerb: float, *, left: bool = False
     ) -> tuple[float, float]:
-        """A point at the right kerb of those who arrive at an end of a street, so far before its junction's middle."""
+        """A point at the right kerb of arriving traffic, at a distance before the middle of the junction."""
         line = self.network.lines[street.name]
         station = back if starts else paths.length(line) - back
-        # Who arrives at the street's start drives against it and has his right kerb on the street's left.
+        # Traffic that arrives at the street's start drives against its direction, so its right kerb is on the left.
         side = 1 if starts != left else -1
         x, y, _ = self.beside(street, side, station, from_kerb)
         return x, y
@@ -296,7 +296,7 @@ class Furnisher:
     def stand(
         self, kind: str, parts: list[Part], x: float, y: float, yaw: float, radius: float, *, high: float
     ) -> bool:
-        """Put something on the sidewalk, if there is room; whether there was."""
+        """Put an object on the sidewalk if there is room; returns whether there was room."""
         has_room = self.ground.takes(x, y) and self.props.is_free(x, y, radius)
         if has_room:
             self.props.put(kind, parts, x, y, KERB_M, yaw, radius_m=radius, high_m=high)

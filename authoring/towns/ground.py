@@ -31,7 +31,7 @@ YARD_M = KERB_M - 0.01
 
 
 def lay_ground(sink: Sink, regions: Regions, sites: BaseGeometry) -> None:
-    """Lay everything level but the sites, which are somebody else's."""
+    """Build all level ground except the sites, which `authoring.towns.sites` builds."""
     worn = unary_union(
         [
             regions.band(s.name, -s.profile.half_width_m, s.profile.half_width_m)

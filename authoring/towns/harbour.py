@@ -1,7 +1,7 @@
 """The plan of harbour: a motorway through an industrial estate, with a container terminal south of it.
 
 The motorway runs along y = 0. Its two slips on either side lead to roads at y = -140 and y = 140, which a long
-overbridge joins; a loop at every corner sends back those who came too far, so that no lane is a dead end.
+overbridge joins; a loop at every corner leads traffic back, so that no lane is a dead end.
 """
 
 from __future__ import annotations

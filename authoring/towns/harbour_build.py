@@ -32,7 +32,7 @@ CELL_M = 110.0
 SEED = 12
 # How far out sidewalks are solid: beyond the bounds, for the roads that leave.
 SOLID_M = 290.0
-# What stands along the estate's sidewalks now and then.
+# Objects along the estate's sidewalks.
 EXTRAS = ("bin", "bench", "cable_box") + ("none",) * 17
 
 

@@ -48,7 +48,7 @@ PYLONS = ((250.0, 60.0), (236.0, 190.0), (172.0, 236.0), (40.0, 300.0), (-90.0, 
 
 
 def build_surroundings(sink: Sink, *, rng: np.random.Generator) -> None:
-    """Everything beyond the bounds that nobody drives to."""
+    """Everything outside the bounds of the town."""
     beyond = box(-FAR_M, -FAR_M, FAR_M, FAR_M).difference(box(-OUTER_M, -OUTER_M, OUTER_M, OUTER_M))
     solids.flat(sink, beyond.difference(WATER), FIELD_Z_M, "grass", "terrain", cell_m=FAR_M)
     for side in (1, -1):
@@ -112,7 +112,7 @@ def _quay(sink: Sink, *, rng: np.random.Generator) -> None:
 
 
 def _sheds(sink: Sink, *, rng: np.random.Generator) -> None:
-    """Industry that goes on along the motorway."""
+    """More industry along the motorway."""
     for x, y, yaw in (
         (-320, -74, np.pi),
         (-330, 84, 0.0),

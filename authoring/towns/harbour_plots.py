@@ -126,7 +126,7 @@ class Yards:
         return unary_union([plot.outline for plot in PLOTS]).intersection(self.land)
 
     def build(self) -> None:
-        """Lay the plots and put on them what belongs there."""
+        """Build the ground of all plots and the objects on them."""
         for plot in PLOTS:
             ground = plot.outline.intersection(self.land)
             solids.flat(self.sink, ground, KERB_M, plot.material, plot.label)

@@ -61,7 +61,7 @@ def lane_graph(network: Network) -> dict[str, Lane]:
 
 
 def problems(lanes: Mapping[str, Lane], *, max_turn_deg: float = 25.0, max_gap_m: float = 0.01) -> list[str]:
-    """What is wrong with a lane graph, one line each: dead ends, gaps, kinks, lanes that cannot be reached."""
+    """Returns the faults of a lane graph, one line each: dead ends, gaps, kinks, lanes that cannot be reached."""
     found = []
     for lane in lanes.values():
         headings = _headings(lane.points)
@@ -139,7 +139,7 @@ def _approaches(network: Network, node: str) -> list[Approach]:
 
 
 def _pairs(source: Approach, target: Approach) -> list[tuple[str, str]]:
-    """Which lane leads to which: inner lanes turn left, outer ones right, all go straight on."""
+    """Pairs of connected lanes: inner lanes turn left, outer lanes turn right, all lanes lead straight ahead."""
     if not source.coming or not target.leaving:
         return []
     turn = _signed_turn(-source.away, target.away)

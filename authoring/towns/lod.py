@@ -1,4 +1,4 @@
-"""Takes out of a building what nobody sees from the street: the thin edges of frames and sills high up."""
+"""Removes parts of a building that are not visible from the street: thin edges of frames and sills high up."""
 
 from __future__ import annotations
 

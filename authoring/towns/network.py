@@ -30,7 +30,7 @@ class Profile:
         lane_m: width of a lane.
         median_m: width of a raised strip between the directions, 0 for paint.
         sidewalk_m: width of the sidewalk on either side.
-        speed_mps: how fast one drives there.
+        speed_mps: speed limit.
     """
 
     forward: int = 1
@@ -76,7 +76,7 @@ class Street:
     """A street between two junctions, or from a junction out of town.
 
     Attributes:
-        start, end: names of junctions; `end` is None for a street that only goes on for the eye.
+        start, end: names of junctions; `end` is None for a street out of the town, which has no lanes.
         corners: inner corners of its line with the radius of each curve.
         leaves_to: where a street without an end junction ends.
         bays_left, bays_right: whether there are parking bays along it.

@@ -38,7 +38,7 @@ class BayGroup:
 
 @dataclass(frozen=True)
 class Regions:
-    """Polygons of a town, all in the plane; heights are decided by who uses them."""
+    """Polygons of a town in the plane; the modules that use them choose the heights."""
 
     network: Network
     canal: Polygon

@@ -1,4 +1,4 @@
-"""What tells drivers how to go along a street: signs, arrows in bends, lights at crossings, railings at corners."""
+"""Signs along streets, arrows in bends, traffic lights at crossings, and railings at corners."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 FROM_KERB_M = 0.6
 FIRST_M, PITCH_M = 22.0, 40.0
-# A sign that finds its place taken stands a little farther on, or before.
+# If the place of a sign is taken, the sign stands this far before or behind it.
 SHIFTS_M = (0.0, 2.4, -2.4, 4.8, -4.8)
 FAST_MPS = 10.0
 # Bends of at most this radius that turn at least so much have arrows on their outside.
 BEND_M, BEND_RAD = 90.0, np.radians(50)
 CHEVRON_M = 11.0
-# From where along the street an arrow is to be read.
+# Distance at which an arrow must be legible.
 READ_FROM_M = 9.0
 # No tree stands so far before a crossing's light.
 CLEAR_M = 22.0
 RAIL_M = (2.6, 8.4)
 RAIL_HALF_M = 0.06
-# Who goes on by less than this to another arm has none ahead.
+# An arm has no continuation ahead if no other arm lies within this angle of its direction.
 HEAD_COS = np.cos(np.radians(50))
 
 
 def signs_along(furnisher: Furnisher, street: Street, *, last_m: float, slow: bool = False) -> None:
-    """Speed limits and who may park, for both directions; `last_m` is where the street ends for those who drive.
+    """Signs for speed limits and parking, in both directions.
 
     Args:
         furnisher: puts them down.
         street: which one.
         last_m: up to where along its line.
-        slow: whether children are warned of in place of every other sign.
+        slow: whether signs that warn of children replace every other sign.
     """
     start, _ = furnisher.network.span(street.name)
     limit = "speed_50" if street.profile.speed_mps > FAST_MPS else "speed_30"
@@ -59,7 +59,7 @@ def signs_along(furnisher: Furnisher, street: Street, *, last_m: float, slow: bo
 
 
 def chevrons(furnisher: Furnisher, street: Street) -> None:
-    """Arrows on the outside of tight bends, for those who turn right in them: the arrows point to the right."""
+    """Arrows on the outside of tight bends, for traffic that turns right; the arrows point to the right."""
     line = furnisher.network.lines[street.name]
     for x, y, radius_m in street.corners:
         middle = float(paths.stations(line)[np.hypot(line[:, 0] - x, line[:, 1] - y).argmin()])
@@ -80,7 +80,7 @@ def chevrons(furnisher: Furnisher, street: Street) -> None:
 
 
 def crossing_lights(furnisher: Furnisher, street: Street) -> None:
-    """A light at the right kerb on either side of each crossing between junctions, red for those who drive."""
+    """A traffic light, red for cars, at the right kerb before each crossing between junctions, in both directions."""
     for middle in furnisher.network.crossings_m(street.name):
         for forward in (True, False):
             sign = 1.0 if forward else -1.0
@@ -90,7 +90,7 @@ def crossing_lights(furnisher: Furnisher, street: Street) -> None:
 
 
 def hides_lights(network: Network, street: str, side: int, station: float) -> bool:
-    """Whether a tree on a side of a street would hide a crossing's light from those who come."""
+    """Whether a tree on a side of a street would hide a crossing's light from approaching drivers."""
     return any(0 < (station - middle) * side < CLEAR_M for middle in network.crossings_m(street))
 
 
@@ -101,7 +101,7 @@ def light(furnisher: Furnisher, street: Street, station: float, *, forward: bool
 
 
 def heads(furnisher: Furnisher, name: str) -> None:
-    """Names of streets before those who come to the head of a T, a little to their right."""
+    """Street names at the head of a T junction, a little to the right of the arriving drivers."""
     arms, node = furnisher.network.arms(name), np.asarray(furnisher.network.nodes[name].position)
     for arm, _, away in arms:
         others = [(other, way) for other, _, way in arms if other != arm]
@@ -147,8 +147,8 @@ def _sign(furnisher: Furnisher, street: Street, name: str, station: float, *, fo
 
 
 def _at_kerb(furnisher: Furnisher, street: Street, station: float, *, forward: bool) -> tuple[float, float, float]:
-    """A point behind the right kerb of those who drive, and the yaw of what faces them there."""
+    """A point behind the right kerb of a driving direction, and the yaw of a sign that faces the drivers."""
     x, y, toward = furnisher.beside(street, -1 if forward else 1, station, FROM_KERB_M)
-    # The road is to the left of the sign's back: who drives there has the sign on the right.
+    # The road is to the left of the sign's back, so drivers have the sign on their right.
     heading = np.array([toward[1], -toward[0]])
     return x, y, float(np.arctan2(heading[1], heading[0]) - np.pi / 2)

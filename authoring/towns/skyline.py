@@ -1,4 +1,4 @@
-"""What closes the horizon: far blocks beyond the streets, fields, and hills out to a kilometre."""
+"""The horizon: distant blocks beyond the streets, fields, and hills out to a kilometre."""
 
 from __future__ import annotations
 

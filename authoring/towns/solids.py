@@ -1,4 +1,4 @@
-"""Shapes out of plans: flat polygons, walls along lines, strips along streets, boxes; all into a kit `Sink`."""
+"""Shapes from plans, added to a kit `Sink`: flat polygons, walls along lines, strips along streets, boxes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CELL_M = 110.0
 
 
 def tile_m_of(material: str) -> float:
-    """Metres that UV 0..1 covers; a metre for what has no texture or an atlas."""
+    """Returns the metres that UV 0..1 covers; 1 for materials without a tiling texture."""
     return (MATERIALS[material].tile_m if material in MATERIALS else 0.0) or 1.0
 
 

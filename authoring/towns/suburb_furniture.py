@@ -1,4 +1,4 @@
-"""Street furniture of the suburb: as in town, but sparser, signs only for those who give way."""
+"""Street furniture of the suburb: less of it than in town10, and priority signs only on arms that give way."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class SuburbFurnisher(Furnisher):
         signage.chevrons(self, street)
 
     def node(self, name: str) -> None:
-        """Signals, or signs for those who give way, and lights on the way to the circus."""
+        """Signals, or signs on arms that give way, and lights before the roundabout."""
         node = self.network.nodes[name]
         for arm, starts, _ in self.network.arms(name):
             if (name, arm) in suburb.LIGHTS:

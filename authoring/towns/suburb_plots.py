@@ -124,7 +124,7 @@ def _along(
 
 
 def _wishes(terraced: bool, rng: np.random.Generator) -> list[dict[str, object]]:
-    """What would be liked on a plot, the most liked first."""
+    """Kinds of houses for a plot in order of preference."""
     garage = str(rng.choice(["left", "right"]))
     body, deep = float(rng.uniform(8.6, 11.4)), float(rng.uniform(8.0, 9.2))
     setback, floors = float(rng.uniform(6.0, 7.6)), int(rng.choice([1, 2, 2, 2, 2, 3]))

@@ -1,4 +1,4 @@
-"""What closes the suburb's horizon: meadows rising into hills, houses on the slopes, hedgerows and woods."""
+"""The suburb's horizon: meadows that rise into hills, houses on the slopes, hedgerows and woods."""
 
 from __future__ import annotations
 

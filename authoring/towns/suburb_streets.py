@@ -15,12 +15,12 @@ from authoring.towns.network import CROSSING_M, STOP_LINE_GAP_M, Network, Street
 from authoring.towns.regions import KERB_M, Regions
 
 VERGE_M = (0.18, 1.38)
-# An arm has right of way at a T junction if another goes on within this angle of straight ahead.
+# An arm has right of way at a T junction if another arm lies within this angle of straight ahead.
 STRAIGHT_RAD = np.radians(42)
 
 
 def gives_way(network: Network, node: str, arm: str) -> bool:
-    """Whether who comes along an arm has a line and a sign there: everybody but on the through road of a T."""
+    """Whether an arm of a junction has a give-way line and sign: every arm except the through road of a T junction."""
     arms = network.arms(node)
     if len(arms) > 3 or network.nodes[node].control == "signals":
         return True
@@ -56,7 +56,7 @@ def lay_streets(sink: Sink, regions: Regions, crossovers: BaseGeometry, paved: B
         sink: takes the faces.
         regions: the plan.
         crossovers: where drives cross verge and footway.
-        paved: what of the gardens and sites somebody else lays.
+        paved: ground of gardens and sites that other modules build.
     """
     area = box(-suburb.FLAT_M, -suburb.FLAT_M, suburb.FLAT_M, suburb.FLAT_M)
     worn = unary_union([regions.band(s, -9, 9) for s in ("oak", "west", "ring_w1")])

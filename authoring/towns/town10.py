@@ -74,7 +74,7 @@ _STREETS = (
     Street(name="quay_1", start="w3", end="c3", corners=((-120, -50, 90), (-60, -66, 90)), trees_m=14),
     Street(name="quay_2", start="c3", end="d3", bays_left=True),
     Street(name="quay_3", start="d3", end="e3", trees_m=14),
-    # streets that go on for the eye
+    # streets out of the town, without lanes
     Street(name="out_nc", start="nc", leaves_to=(6, 420), profile=AVENUE, trees_m=14),
     Street(name="out_nb", start="nb", leaves_to=(-92, 400)),
     Street(name="out_w1", start="w1", leaves_to=(-420, 116)),

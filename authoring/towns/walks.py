@@ -55,7 +55,7 @@ def sidewalks(regions: Regions, bounds: tuple[float, float, float, float]) -> It
 
 
 def crosswalks(regions: Regions) -> Iterator[Walk]:
-    """Every zebra crossing from kerb to kerb, but on streets that lead out of the town, where nobody drives."""
+    """Every zebra crossing from kerb to kerb, except on streets out of the town, which have no traffic."""
     network = regions.network
     for street in network.streets.values():
         if not street.end:

@@ -1,7 +1,7 @@
-"""What traffic, frost and fitters leave on asphalt: wheel tracks and oil, patches, trenches, cracks and their seals.
+"""Traces of use on asphalt: wheel tracks, oil, patches, trenches, and cracks with their seals.
 
 Everything lies on the carriageway in sheets of its own height, all lower than the paint, so that no two of them meet.
-The asphalt that lanes cover stays: cut out of the road, it made frames no faster that could be measured.
+The asphalt below the tracks is kept: cutting it out of the road did not make rendering measurably faster.
 """
 
 from __future__ import annotations

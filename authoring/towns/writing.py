@@ -1,4 +1,4 @@
-"""A town becomes files: its meshes in a folder of its name, its MJCF beside it."""
+"""Writes a town: its meshes into a folder with its name, and its MJCF file next to this folder."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ __all__ = ["write_document", "write_meshes"]
 def write_meshes(
     folder: Path, name: str, bounds: tuple[float, float, float, float], sink: Sink, props: Props, *, cell_m: float
 ) -> Document:
-    """Writes what a town was built of, in place of what was there; gives its document, which knows all geoms and bodies
-    and no solids, lanes or other places yet.
+    """Writes the meshes of a town, in place of existing ones; returns its document with all visible geoms and bodies.
+
+    The caller adds solids, lanes and other places to the document.
 
     Args:
-        folder: of all towns.
-        name: of this one.
-        bounds: as the document's.
-        sink: what is seen and stands nowhere else.
-        props: what stands in many places.
+        folder: folder of all towns.
+        name: name of the town.
+        bounds: bounds of the town, as in the document.
+        sink: visible parts that occur only once.
+        props: objects that occur in many places.
         cell_m: side of the squares in which the sink's parts are cut.
     """
     document = Document(name, bounds)

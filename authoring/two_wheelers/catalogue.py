@@ -1,4 +1,4 @@
-"""Which two-wheelers there are, who rides them and in what colours."""
+"""The list of two-wheelers with their riders and colours."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _pedals(crank_deg: float) -> dict[str, tuple[float, float, float]]:
 
 
 def two_wheelers() -> tuple[TwoWheeler, ...]:
-    """All of them, ready to be meshed."""
+    """Returns all two-wheelers."""
     return (
         TwoWheeler(
             name="motorcycle_a",

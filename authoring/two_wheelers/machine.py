@@ -44,7 +44,7 @@ class TwoWheeler:
         name: of the files.
         kind: `motorcycle` or `bicycle`.
         hard, soft: its parts with edges, and its moulded ones.
-        rider, seat: who rides it, and how.
+        rider, seat: the person on it, and the position of hands, feet and hips.
         palette: (r, g, b, weight) rows of what a sample may colour.
         painted: which geom has that colour: the machine's `paint`, or the rider's.
         colour: linear albedo of the other of the two.

@@ -110,7 +110,7 @@ def carve(mesh: Mesh, lines: Mapping[str, Sequence[Line]], shade: Floats) -> Mes
         untouched = np.ones(len(mesh.faces), dtype=bool)
         untouched[[cut.face for cut in cuts]] = False
         is_groove = np.concatenate([is_groove[untouched], *(cut.is_groove for cut in cuts)])
-        # Not `part`, which would number the vertices anew: what nobody uses is left out when the mesh is written.
+        # Not `part`, which would renumber the vertices. Unused vertices are left out in the file.
         rest = Mesh(mesh.vertices, mesh.faces[untouched], mesh.uvs, mesh.normals)
         mesh = merge([rest, *(cut.pieces for cut in cuts)])
     return mesh

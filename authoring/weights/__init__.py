@@ -1,1 +1,1 @@
-"""What the reference weights are trained on and measured with. Run `python -m authoring.weights --help`."""
+"""Training data, evaluation data and release of the reference weights. See `python -m authoring.weights --help`."""

@@ -1,6 +1,6 @@
-"""The checksums of the shipped weights, which change only together with the version of their package.
+"""Writes the checksums of the shipped weights, which change only together with the version of their package.
 
-Every version of a weights file stays in the history for ever, so that weights are committed for releases alone.
+Every committed version of a weights file stays in git's history, so weights are committed only for releases.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ LOCK = PACKAGE / "checksums.txt"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The command takes none."""
+    """Adds nothing: the command has no arguments."""
 
 
 def run(args: argparse.Namespace) -> int:
-    """Writes the checksums of the weights as they are.
+    """Writes the checksums of the current weights files.
 
     Raises:
-        GearError: weights changed and the version of their package did not.
+        GearError: weights have changed, but the version of their package has not.
     """
     refuse_without_version(LOCK, PACKAGE)
     LOCK.write_text(text(PACKAGE), encoding="utf-8")
@@ -34,17 +34,25 @@ def run(args: argparse.Namespace) -> int:
 
 
 def refuse_without_version(lock: Path, package: Path) -> None:
-    """Refuses to replace the checksums of a version by others of the same version."""
+    """Checks that changed weights have a new version.
+
+    Args:
+        lock: file of checksums; it may be absent.
+        package: folder of the weights package.
+
+    Raises:
+        GearError: the checksums differ from those in the file, but the version is the same.
+    """
     written = lock.read_text(encoding="utf-8") if lock.exists() else ""
     if written and written != text(package) and written.splitlines()[0] == text(package).splitlines()[0]:
         raise GearError(
-            f"{lock}: weights changed and the version did not; raise it in {package / 'pyproject.toml'}, or keep the "
-            "weights outside of the repository until the next release"
+            f"{lock}: weights have changed, but the version has not; raise it in {package / 'pyproject.toml'}, or keep "
+            "the weights outside the repository until the next release"
         )
 
 
 def text(package: Path) -> str:
-    """The version of the weights package, then the sha256 and the name of every weights file."""
+    """Returns the content of the file: the version of the weights package, then SHA-256 and name of each file."""
     version = tomllib.loads((package / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     files = sorted((package / "gear_weights/models").glob("*.safetensors"))
     return "".join([f"version {version}\n", *(f"{sha256(path.read_bytes())}  {path.name}\n" for path in files)])

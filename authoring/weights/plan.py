@@ -1,8 +1,8 @@
-"""The data of the reference weights: which scenes, weathers, patches and seeds, and which are never trained on.
+"""The data of the reference weights: scenes, weathers, patches and seeds for training, and those that are held out.
 
-Two scenes (town10's billboard07, suburb's billboard05) and one weather (CloudyNoon) are held out: nothing is trained
-on them, and no checkpoint is chosen by them. Training seeds are 20000 to 20999, those of the held-out collections 30000
-to 30999; the seeds of the paper's splits (123, 131, 363, 0, 60) occur in neither.
+Two scenes (town10's billboard07, suburb's billboard05) and one weather (CloudyNoon) are held out: no network is trained
+on them, and no checkpoint is chosen by them. Training has the seeds 20000 to 20999, held-out collections have 30000
+to 30999. The seeds of the paper's splits (123, 131, 363, 0, 60) are not used.
 """
 
 from __future__ import annotations
@@ -22,28 +22,31 @@ WEATHERS = (
     "ClearNoon", "CloudySunset", "SoftRainNoon", "ClearNoon", "WetNoon", "ClearSunset", "ClearNoon", "MidRainyNoon",
     "CloudySunset", "HardRainNoon",
 )  # fmt: skip
-"""Dealt out in turn; the default weather comes more often."""
+"""Weathers of the training collections, used in turn; the default weather occurs more often."""
 
 DRIVES_A_TOWN = 3
-"""Collections without a board in each town: the ego car is anywhere in it."""
+"""Number of collections without a board in each town; the ego car starts anywhere in the town."""
 
 SHARES = {"no_billboard": 0.45, "board": 0.45, "truck": 0.1}
-"""Of the training samples, by kind of scene."""
+"""Share of the training samples by kind of scene."""
 
 CROWDS = {"board": 2 / 3, "truck": 2 / 3}
-"""Road users of the training streets, times those that the scenes have."""
+"""Factor on the number of road users of the scenes, by kind of scene."""
 
 CROWDED = ("semseg", "detect2d", "stereo3d")
-"""Tasks whose training streets these are, and whose shipped networks learnt from them; depth has the scenes' own."""
+"""Tasks for which `CROWDS` applies; pictures for depth have the scenes' own number of road users."""
 
 FIRST_TRAINING_SEED, FIRST_HELD_OUT_SEED = 20_000, 30_000
 HELD_OUT_SAMPLES = 300
 
 FILM_EVERY = 3
-"""Every third collection of a task whose samples cost much (large pictures, or two of them) is rendered as `film`, the
-others as `fast`: more pictures in the same time, and networks that know both."""
+"""One collection in this many is rendered as `film`, the others as `fast`, for tasks with expensive samples.
+
+This gives more pictures in the same time, and networks that are trained on both qualities.
+"""
 
 COSTLY = ("semseg", "stereo3d")
+"""Tasks with expensive samples: large pictures, or two pictures per sample."""
 
 TRAINING_OPTIONS: dict[str, tuple[str, ...]] = {
     "semseg": ("options.width_px=1536", "options.height_px=768", "options.polygons=false"),
@@ -57,8 +60,11 @@ TRAINING_OPTIONS: dict[str, tuple[str, ...]] = {
     "stereo3d": ("options.visibility.preset=carla_gear",),
     "depth": ("options.width_px=1224", "options.height_px=370"),
 }
-"""The options that the shipped networks' training data had. Segmentation has pictures of three quarters of the task's
-size, detection of three fifths, with limits of visibility to match."""
+"""Options of the training data of the shipped networks, by task.
+
+The width of pictures is three quarters of the task's default for segmentation, and three fifths for detection, with
+limits of visibility that fit this size.
+"""
 
 HELD_OUT_OPTIONS: dict[str, tuple[str, ...]] = {
     "semseg": (),
@@ -66,19 +72,19 @@ HELD_OUT_OPTIONS: dict[str, tuple[str, ...]] = {
     "stereo3d": ("options.visibility.preset=carla_gear",),
     "depth": ("options.width_px=1224", "options.height_px=370"),
 }
-"""The options of the data that the cards' figures were measured on."""
+"""Options of the data on which the metrics in the networks' cards are measured, by task."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Collection:
-    """One `gear collect`.
+    """The arguments of one `gear collect`.
 
     Attributes:
-        task, town, scene, weather, split: as its flags.
+        task, town, scene, weather, split: values of the flags with these names.
         patch: `none` or `random`.
-        seed: of the split, and of the random patch.
-        samples: how many.
-        settings: its `--set` texts.
+        seed: seed of the split, and of the random patch.
+        samples: number of samples.
+        settings: values of `--set`.
     """
 
     task: str
@@ -93,11 +99,11 @@ class Collection:
 
     @property
     def name(self) -> str:
-        """Of its folder."""
+        """Name of the folder of the collection."""
         return f"{self.town}-{self.scene}-{self.weather}-{self.patch}"
 
     def arguments(self) -> list[str]:
-        """Of `gear collect`, without `--out`."""
+        """Returns the arguments of `gear collect`, without `--out`."""
         flags = {
             "task": self.task, "town": self.town, "scene": self.scene, "weather": self.weather, "split": self.split,
             "patch": self.patch, "seed": self.seed, "samples": self.samples,
@@ -109,7 +115,7 @@ class Collection:
 
 
 def training(task: str, samples: int) -> list[Collection]:
-    """The training collections of a task, with about so many samples in all."""
+    """Returns the training collections of a task, with about `samples` samples in total."""
     places = [(town, scene) for town in TOWNS for scene in scenes_of(town) if (town, scene) not in HELD_OUT_SCENES]
     drives = [place for place in places if place[1] == "no_billboard" for _ in range(DRIVES_A_TOWN)]
     boards = [place for place in places if place[1].startswith("billboard")]
@@ -140,7 +146,14 @@ def training(task: str, samples: int) -> list[Collection]:
 
 
 def held_out(task: str, samples: int = HELD_OUT_SAMPLES, *, first_seed: int = FIRST_HELD_OUT_SEED) -> list[Collection]:
-    """The collections that weights are measured on: both held-out scenes in a known and in the held-out weather."""
+    """Returns the collections on which weights are measured: both held-out scenes, in ClearNoon and in the held-out
+    weather.
+
+    Args:
+        task: name of the task.
+        samples: approximate number of samples in total.
+        first_seed: seed of the first collection.
+    """
     pairs = [(place, weather) for place in HELD_OUT_SCENES for weather in ("ClearNoon", HELD_OUT_WEATHER)]
     return [
         Collection(
@@ -159,6 +172,6 @@ def held_out(task: str, samples: int = HELD_OUT_SAMPLES, *, first_seed: int = FI
 
 
 def scenes_of(town: str) -> list[str]:
-    """Names of a town's scenes, in the order of its library."""
+    """Returns the names of a town's scenes, in the order of its file."""
     library = read_node(SceneLibrary, parse_file(find_config("scenes", town)))
     return list(library.scenes)

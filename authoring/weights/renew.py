@@ -1,4 +1,4 @@
-"""Shipped weights measured again, after the look has changed in a way that they bear."""
+"""Updates the metrics of shipped weights after the towns' appearance has changed, without training them again."""
 
 from __future__ import annotations
 
@@ -14,31 +14,38 @@ from gear.values.errors import GearError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Of the command."""
-    parser.add_argument("model", help="whose shipped weights")
+    """Adds the arguments of `python -m authoring.weights renew`."""
+    parser.add_argument("model", help="network whose shipped weights are measured again")
     parser.add_argument(
-        "--evaluation", type=Path, required=True, help="gear evaluate --report reference, held-out data of today"
+        "--evaluation", type=Path, required=True, help="folder of gear evaluate --report reference, on current towns"
     )
-    parser.add_argument("--note", required=True, help="what has changed since they were trained")
+    parser.add_argument("--note", required=True, help="what has changed since the training")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Renews one network's file and card."""
+    """Updates the weights file and the card of one network."""
     print(renew(args.model, args.evaluation, args.note))
     return 0
 
 
 def renew(model: str, evaluation: Path, note: str, models: Path = MODELS) -> Path:
-    """Writes today's figures, and of which look they are, into `<model>.safetensors` and `<model>.md`.
+    """Writes the metrics of an evaluation, and the hash of the current appearance, into `<model>.safetensors` and
+    `<model>.md`.
 
-    The numbers stay as they are, and so does the look that they were trained on: `gear models` goes on saying what has
-    changed since. The card's words on how they were made stay, too; the note comes after them.
+    The weights do not change. The files still name the appearance on which they were trained, so `gear models` still
+    lists what has changed since. The card keeps its section on the training; the note is added to it.
+
+    Args:
+        model: name of the network.
+        evaluation: folder of `gear evaluate --report reference` with the shipped weights.
+        note: what has changed since the training.
+        models: folder of the weights package.
 
     Returns:
-        The former file.
+        Path of the weights file.
 
     Raises:
-        GearError: the evaluation is of other weights, or the files do not say what is to be renewed.
+        GearError: the evaluation is of other weights, or the weights file or its card is incomplete.
     """
     target = models / f"{model}.safetensors"
     state, metadata = read(target)

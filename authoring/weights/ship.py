@@ -1,4 +1,4 @@
-"""Trained weights into the weights package, with the metrics of the held-out data and a card."""
+"""Copies trained weights into the weights package, with metrics on held-out data and a card."""
 
 from __future__ import annotations
 
@@ -28,28 +28,33 @@ FACTS = ("scene", "weather", "split", "seed", "patch", "samples")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Of the command."""
+    """Adds the arguments of `python -m authoring.weights ship`."""
     parser.add_argument(
-        "runs", nargs="+", type=Path, help="folders of gear train, in order; the last one's are shipped"
+        "runs", nargs="+", type=Path, help="folders of gear train, in order; the weights of the last one are shipped"
     )
     parser.add_argument(
-        "--evaluation", type=Path, required=True, help="gear evaluate --report reference, held-out data"
+        "--evaluation", type=Path, required=True, help="folder of gear evaluate --report reference, held-out data"
     )
     parser.add_argument(
-        "--base", type=Path, default=Path(), help="folder of data and runs, to leave out of what is said"
+        "--base", type=Path, default=Path(), help="folder of data and runs; paths in the card are relative to it"
     )
     parser.add_argument(
-        "--averaged", type=Path, help="ship these: gear weights average of what the runs began with and their end"
+        "--averaged", type=Path, help="file of gear weights average, shipped in place of the last weights"
     )
-    parser.add_argument("--note", default="", help="what else there is to say of how they were made")
-    parser.add_argument("--samples", type=int, help="value of `--samples` at the collection of the training data")
+    parser.add_argument("--note", default="", help="text about the training, for the card")
+    parser.add_argument("--samples", type=int, help="value of `--samples` in the collection of the training data")
     parser.add_argument(
-        "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="likewise; repeatable"
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="settings",
+        help="another setting of this collection; repeatable",
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Ships one network."""
+    """Ships the weights of one network."""
     target = ship(
         args.runs, args.evaluation, args.base,
         samples=args.samples, settings=args.settings, averaged=args.averaged, note=args.note,
@@ -72,14 +77,14 @@ def ship(
     """Writes `<model>.safetensors` and `<model>.md`; returns the path of the first.
 
     Args:
-        runs: folders of `gear train`; each but the first began with the one before.
+        runs: folders of `gear train`, in order; each run starts with the weights of the previous one.
         evaluation: folder of `gear evaluate --report reference` with the weights that are shipped.
-        base: commands name files below it by what follows it.
-        models: the package's folder.
-        samples: value of `--samples` at the collection of the training data, if any.
-        settings: likewise; `KEY=VALUE` texts.
+        base: folder; commands in the card name files below it by their relative path.
+        models: folder of the weights package.
+        samples: value of `--samples` in the collection of the training data, if it had one.
+        settings: values of `--set` in the collection of the training data.
         averaged: a file of `gear weights average` that is shipped in place of the last run's weights.
-        note: what else there is to say of how they were made.
+        note: text about the training, for the card.
 
     Raises:
         GearError: the evaluation is of another network or other weights, or lacks the report.
@@ -93,9 +98,9 @@ def ship(
     commands = [_without(base, history["command"]).replace("--out DIR", f"--out {_without(base, str(one))}")
                 for history, one in zip(histories, runs, strict=True)]  # fmt: skip
     collected = ["python", "-m", "authoring.weights", "training", "--task", metadata["task"], "--out", "."]
-    told = ["--samples", str(samples)] if samples else []
-    told += [part for text in settings for part in ("--set", text)]
-    commands.insert(0, shlex.join(collected + told))
+    options = ["--samples", str(samples)] if samples else []
+    options += [part for text in settings for part in ("--set", text)]
+    commands.insert(0, shlex.join(collected + options))
     if averaged is not None:
         commands.append(_without(base, metadata["command"]))
     metadata["command"] = " && ".join(commands)
@@ -109,12 +114,12 @@ def ship(
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """An evaluation with its report.
+    """An evaluation on held-out data.
 
     Attributes:
-        results: all of `results.json`.
-        samples: how many pictures.
-        metrics: of the report over all of them: `value`, `low` and `high` by name.
+        results: content of `results.json`.
+        samples: number of pictures.
+        metrics: metrics of the report over all pictures; each is a mapping with `value`, `low` and `high`.
     """
 
     results: Any
@@ -123,7 +128,12 @@ class Measured:
 
     @staticmethod
     def read(evaluation: Path, name: str, weights: Path) -> Measured:
-        """Of a network's weights.
+        """Reads an evaluation of a network's weights.
+
+        Args:
+            evaluation: folder of `gear evaluate`.
+            name: name of the network.
+            weights: the weights file that must have been evaluated.
 
         Raises:
             GearError: the evaluation is of another network or other weights, or lacks the report.
@@ -138,7 +148,7 @@ class Measured:
         return Measured(results, together["samples"], metrics)
 
     def texts(self) -> dict[str, str]:
-        """As a weights file has them."""
+        """Returns the metrics as metadata of a weights file."""
         known = {key: one for key, one in self.metrics.items() if one["value"] is not None}
         return {
             "metrics": json.dumps({key: one["value"] for key, one in known.items()}),
@@ -147,7 +157,7 @@ class Measured:
 
 
 def head(target: Path, metadata: Mapping[str, str], measured: Measured) -> list[str]:
-    """Lines of a card: what the file is, and what was measured with it."""
+    """Returns the first lines of a card: facts of the file, and the metrics."""
     data, metrics = target.read_bytes(), measured.metrics
     absent = [key for key, one in metrics.items() if one["value"] is None]
     measured_on = metadata.get("measured_look_hash", metadata["look_hash"])
@@ -211,12 +221,12 @@ def _card(
 
 
 def wrapped(note: str) -> list[str]:
-    """Lines of a note, and an empty one; nothing for no note."""
+    """Returns the lines of a note and an empty line; no lines without a note."""
     return [*textwrap.wrap(note, 110), ""] if note else []
 
 
 def _rows(results: Any) -> list[str]:
-    """The first metric of every dataset."""
+    """A table of the report's first metric, with one line per dataset."""
     first = next(iter(results["rows"][0]["metrics"][REPORT]))
     lines = [f"| collection | samples | {first} |", "|---|---|---|"]
     for row in results["rows"]:
@@ -234,7 +244,7 @@ def _without(base: Path, text: str) -> str:
 
 
 def _digest(name: str, weights: Path) -> str | None:
-    """Of the numbers in the file, as evaluations name them."""
+    """The hash of the weights in a file, as in evaluations."""
     chosen = chosen_model(name, [f"weights={weights}"])
     return weights_digest(build(chosen.found, chosen.options))
 

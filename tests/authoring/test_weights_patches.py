@@ -54,7 +54,7 @@ def of(task: str, **changes: Any) -> list[PatchPlan]:
     return plans(task, MODELS[task], weights="none", **changes)
 
 
-def test_seeds_are_nobody_elses() -> None:
+def test_seeds_are_not_used_elsewhere() -> None:
     simulation = read_node(SimulationConfig, parse_file(find_config("simulation", "default")))
     others = {split.seed for split in simulation.splits.values()}
     others |= {one.seed for one in (*training("semseg", 1000), *held_out("semseg"))}
@@ -306,12 +306,14 @@ def test_a_patch_is_made_measured_taken_up_again_and_installed(
     assert json.loads((target / "effect.json").read_text()) == again
 
 
-def test_figures_that_are_none_are_told_before_anything_is_measured(tmp_path: Path) -> None:
+def test_a_damaged_effect_is_an_error_before_anything_is_measured(tmp_path: Path) -> None:
     plan = PatchPlan(task="semseg", model="tiny_segmenter", town=str(TINY_TOWN), scene="board", number=3, steps=3)
     path = tmp_path / "patches" / plan.name / EFFECT
     path.parent.mkdir(parents=True)
     path.write_text("[]")
     ran: list[Any] = []
-    with pytest.raises(GearError, match=r"effect\.json: does not hold the figures of a patch; make the patch again"):
+    with pytest.raises(
+        GearError, match=r"effect\.json: does not hold the measured effect of a patch; make the patch again"
+    ):
         measure_again(plan, tmp_path / "run", in_this_process(ran), ran.append, tmp_path / "patches")
     assert not ran

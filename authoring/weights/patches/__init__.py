@@ -1,1 +1,1 @@
-"""The pre-computed patches: made scene by scene, measured in the world, installed into the weights package."""
+"""The pre-computed patches: made for each scene, measured in renders, and installed into the weights package."""

@@ -1,4 +1,4 @@
-"""`python -m authoring.weights patches`."""
+"""The command `python -m authoring.weights patches`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from authoring.weights.patches.install import install
 from authoring.weights.patches.plan import PRECISION, SAMPLES, STEPS, STEPS_OF, PatchPlan, plans
-from authoring.weights.patches.run import Gear, Told, gear_process, make_patch, measure_again
+from authoring.weights.patches.run import Gear, OnStep, gear_process, make_patch, measure_again
 from authoring.weights.patches.summary import table
 from authoring.weights.plan import TOWNS, TRAINING_OPTIONS
 from gear.dataset.files import write_alone
@@ -23,51 +23,49 @@ from gear.values.serial import Json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags."""
+    """Adds the arguments of the command."""
     others = "".join(f"; {task} {steps}" for task, steps in STEPS_OF.items())
     parser.add_argument("--task", required=True, choices=tuple(TRAINING_OPTIONS))
     parser.add_argument("--model", required=True, metavar="NAME", help="model plugin")
-    parser.add_argument("--out", type=Path, required=True, help="folder; <model>/<town>-<scene>/ lies in it")
+    parser.add_argument("--out", type=Path, required=True, help="folder; a scene's files go to <model>/<town>-<scene>/")
     parser.add_argument("--town", nargs="+", default=list(TOWNS), metavar="NAME", help=f"({' '.join(TOWNS)})")
-    parser.add_argument("--scenes", nargs="+", default=[], metavar="NAME", help="of those towns (all with a surface)")
+    parser.add_argument("--scenes", nargs="+", default=[], metavar="NAME", help="scenes (all with a surface)")
     parser.add_argument(
-        "--samples", type=int, metavar="N", help=f"a scene, to make the patch on and to measure it ({SAMPLES['train']})"
+        "--samples", type=int, metavar="N", help=f"samples per scene, to attack and to measure ({SAMPLES['train']})"
     )
-    parser.add_argument("--steps", type=int, metavar="N", help=f"of each attack ({STEPS}{others})")
+    parser.add_argument("--steps", type=int, metavar="N", help=f"steps of each attack ({STEPS}{others})")
     parser.add_argument(
         "--precision",
         choices=("float32", "bfloat16"),
         default=PRECISION,
-        help="of the network's passes in the attack, not in what measures it (float32); half of it is quicker where the"
-        " processor can",
+        help="precision of the network in the attack, but not in the evaluation (float32); bfloat16 is faster on"
+        " processors with instructions for it",
     )
-    parser.add_argument("--weights", default=SHIPPED, metavar="FILE", help="the network's, while none are shipped")
+    parser.add_argument("--weights", default=SHIPPED, metavar="FILE", help="the network's weights (the shipped ones)")
     parser.add_argument(
-        "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="a key of the collections"
+        "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="a setting of the collections"
     )
     parser.add_argument(
         "--attack-set", metavar="KEY=VALUE", action="append", default=[], help="an option of the attack"
     )
-    parser.add_argument("--jobs", type=int, default=1, metavar="J", help="scenes at a time (1)")
-    parser.add_argument("--install", action="store_true", help="put what is whole into weights/gear_weights/patches")
+    parser.add_argument("--jobs", type=int, default=1, metavar="J", help="number of scenes at the same time (1)")
+    parser.add_argument("--install", action="store_true", help="copy complete patches to weights/gear_weights/patches")
     parser.add_argument(
-        "--again", action="store_true", help="make none: measure what is installed against the weights of today"
+        "--again", action="store_true", help="make no patches; measure installed ones against the shipped weights"
     )
     parser.add_argument("--list", action="store_true", help="print the commands and do nothing")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Makes the patches, some scenes at a time; a scene that fails does not stop the others.
+    """Makes the patches, several scenes at the same time; a scene that fails does not stop the others.
 
     Raises:
-        GearError: something is not known, or patches of weights that are not shipped are to be installed.
+        GearError: a name is unknown, or `--install` is combined with weights or settings that are not the shipped ones.
     """
     if args.install and args.weights != SHIPPED:
         raise GearError("--install is for patches against the shipped weights; leave --weights out")
     if args.install and (args.settings or args.attack_set):
-        raise GearError(
-            "--install is for patches made as they are made for everybody; leave --set and --attack-set out"
-        )
+        raise GearError("--install is for patches with the default settings; leave --set and --attack-set out")
     if args.again and (args.install or args.weights != SHIPPED):
         raise GearError(
             "--again measures installed patches against the shipped weights; leave --install and --weights out"
@@ -107,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _made(
-    chosen: list[PatchPlan], root: Path, jobs: int, work: Callable[[PatchPlan, Path, Gear, Told], Json]
+    chosen: list[PatchPlan], root: Path, jobs: int, work: Callable[[PatchPlan, Path, Gear, OnStep], Json]
 ) -> tuple[list[Json], int]:
     begin = time.monotonic()
 

@@ -1,4 +1,4 @@
-"""What a patch does, gathered from the files of the evaluation, the gap and the attack."""
+"""Collects the measured effect of a patch from the files of `gear evaluate`, `gear gap` and `gear attack`."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from gear.values.serial import Json
 
 
 def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
-    """The figures of one scene's patch, and how it was made.
+    """Returns the measured effect of one scene's patch, and facts of the attack.
 
     Args:
-        plan: of the scene.
-        root: where its commands wrote.
-        minutes: spent on it.
+        plan: plan of the patch.
+        root: folder to which the commands of the plan wrote.
+        minutes: time of all commands.
 
     Raises:
         DatasetError: a file cannot be read.
@@ -36,7 +36,7 @@ def read_effect(plan: PatchPlan, root: Path, minutes: float) -> Json:
 
 
 def read_again(plan: PatchPlan, root: Path) -> Json:
-    """The figures of the same patch with the network of today, by `PatchPlan.commands_again`.
+    """Returns the effect of an installed patch on the shipped network, from the files of `PatchPlan.commands_again`.
 
     Raises:
         DatasetError: a file cannot be read.
@@ -50,20 +50,19 @@ def read_again(plan: PatchPlan, root: Path) -> Json:
 
 
 def _figures(plan: PatchPlan, root: Path) -> Json:
-    """What was measured.
+    """The measured values; values without any data are None.
 
-    `metric` holds the task's own figure without a patch, with a random one and with this one; `outside` the mean change
-    of a sample's figure outside the patch against the random one, with its p; `effect` what the patch changes of a
-    figure of the task's own evaluator (the same one, or that of `EFFECT`), digitally and rendered, and the share of the
-    first that the second is (None where there is no effect or no such figure). Figures that have nothing to be measured
-    on are None.
+    - `metric`: the task's metric without a patch, with a random patch and with this patch.
+    - `outside`: mean change of a sample's metric outside the patch, compared with the random patch, and its p.
+    - `effect`: change of a metric of the task's evaluator (the task's metric, or that in `EFFECT`) by the composed and
+      by the rendered patch, and the second divided by the first (None without an effect or without the metric).
     """
     evaluation, gap = load_json(root / "evaluation/results.json"), load_json(root / "gap/gap.json")
     return {
         "pictures_with_patch": len(gap["samples"]),
         "metric": _metric(plan, evaluation),
         "outside": _outside(plan, evaluation),
-        "effect": _effect(gap, EFFECT.get(plan.task, plan.figure[1])),
+        "effect": _effect(gap, EFFECT.get(plan.task, plan.metric[1])),
         "psnr_db": gap["median_psnr_db"].get("transport"),
     }
 
@@ -73,14 +72,14 @@ def _rows(evaluation: Json) -> dict[str, Json]:
 
 
 def _change(evaluation: Json) -> Json:
-    """From the random patch to this one."""
+    """The comparison of this patch with the random patch, from the evaluation."""
     names = tuple(_rows(evaluation)[kind]["name"] for kind in ("patched", "random"))
     return next(one for one in evaluation["differences"] if (one["row"], one["against"]) == names)
 
 
 def _metric(plan: PatchPlan, evaluation: Json) -> Json:
-    """The task's own figure in each row, and its change from the random patch to this one."""
-    report, figure = plan.figure
+    """The task's metric for each kind of patch, and its change from the random patch to this patch."""
+    report, figure = plan.metric
     return {
         "figure": f"{report}.{figure}".removeprefix(f"{TASK}."),
         **{kind: row["metrics"][report].get(figure, {}).get("value") for kind, row in _rows(evaluation).items()},

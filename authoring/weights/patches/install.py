@@ -1,4 +1,4 @@
-"""Patches into the weights package."""
+"""Installs patches into the weights package."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ PATCHES = CHECKOUT / "patches"
 
 
 def install(folder: Path, effect: Json, patches: Path = PATCHES) -> Path:
-    """Puts a patch folder's pictures and `attack.json` beside `effect.json`; returns where.
+    """Copies the pictures and `attack.json` of a patch into the package, adds `effect.json`, and returns the folder.
 
-    The exact values stay behind: pictures are what is printed, and the package is to be small. A patch of this name
-    that was there goes.
+    The patch's exact values are not copied, so that the package stays small; printed patches are pictures as well. An
+    installed patch with the same name is replaced.
     """
     target = patches / folder.name
     target.mkdir(parents=True, exist_ok=True)

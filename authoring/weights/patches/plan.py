@@ -1,7 +1,7 @@
 """How a scene's patch is made and measured: pictures, seeds, and the gear commands in their order.
 
-Training pictures, those that choose among steps, and those that the effect is measured on have seeds of their own, from
-40000, 41000 and 42000 on: nobody else's, neither the paper's nor those of the reference weights.
+The seeds of the pictures for the attack, for choosing among its steps, and for measuring start at 40000, 41000 and
+42000. Neither the paper nor the training of the reference weights uses these seeds.
 """
 
 from __future__ import annotations
@@ -26,37 +26,40 @@ from gear.values.errors import GearError, UnknownNameError
 from gear.world.scene_spec import SceneLibrary
 
 FIRST_SEEDS = {"train": 40_000, "val": 41_000, "test": 42_000}
-"""Of the first scene's splits; every further scene has the next ones."""
+"""Seeds of the splits of the first scene; they increase by 1 per scene."""
 
 SAMPLES = {"train": 24, "val": 4, "test": 24}
 SAMPLES_OF = {"stereo3d": {"train": 24, "val": 4, "test": 40}}
-"""Of tasks whose pictures say less each: in many pictures a patch can reach few cars."""
+"""Samples for tasks that need more of them: in many pictures of `stereo3d`, a patch can influence few cars."""
 
 STEPS = 120
 STEPS_OF = {"detect2d": 150, "stereo3d": 150}
-"""Of tasks whose networks need more to give in."""
+"""Steps of attacks on tasks that need more of them."""
 
 PRECISION = "float32"
-"""Of an attack's passes, where nothing else is said."""
+"""Default precision of the network in an attack."""
 
 EVERY = 25
-"""Steps between two looks at the validation pictures."""
+"""Steps between two validations."""
 
 PICTURES: dict[str, tuple[str, ...]] = {
     "semseg": ("quality=fast",),
     "depth": ("quality=fast",),
     "stereo3d": ("quality=fast", f"crowd={5 / 3:g}"),
 }
-"""Settings of a task's pictures beside those of training: what costs most is rendered as `fast`, which networks know,
-and a test of which cars are found wants cars within a patch's reach."""
+"""Settings of a task's pictures, in addition to those of its training data.
+
+Expensive pictures are rendered as `fast`, a quality on which the networks were trained. More road users for `stereo3d`
+give more cars that a patch can influence.
+"""
 
 _LEFT_OUT = tuple(f"losses.{name}=0" for name in ("sides", "centre", "size", "hidden", "surface", "disparity_bins"))
 
 ATTACK: dict[str, tuple[str, ...]] = {"stereo_centre": _LEFT_OUT, "stereo_centre_lite0": _LEFT_OUT}
-"""Options of the attack on a network: every loss is a backward pass of its own, and three of nine say what matters."""
+"""Options of the attack, by network. Each loss costs one backward pass, so six of nine losses are left out."""
 
 TASK = "task"
-"""Report of the task's own evaluator."""
+"""Name of the report with the metrics of the task's evaluator."""
 
 OUTSIDE = {
     "semseg": ("outside_patch", "miou"),
@@ -64,13 +67,17 @@ OUTSIDE = {
     "detect2d": (TASK, "found_share"),
     "stereo3d": (TASK, "found_share"),
 }
-"""Report and figure of single samples by which a patch's harm outside itself is tested. A board has no labelled objects
-on it, so the share of objects that are found is such a figure as it is."""
+"""Report and per-sample metric by which the effect outside the patch is tested, by task.
+
+A board shows no labelled objects, so the share of detected objects is a metric outside the patch.
+"""
 
 
 EFFECT = {"stereo3d": "car_2d_moderate_r40"}
-"""Figure of a task's own evaluator by which digital harm is compared with rendered, where it is not the task's figure:
-the reference report's counts near cars alone, of which a scene's pictures have few."""
+"""Metric of the task's evaluator by which composed and rendered patches are compared, if it is not the task's metric.
+
+The task's metric of `stereo3d` counts only near cars, and the pictures of one scene show few of them.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,8 +85,8 @@ class Step:
     """One gear command.
 
     Attributes:
-        name: of what it makes.
-        arguments: of `gear`.
+        name: name of the step, for messages and times.
+        arguments: arguments of `gear`.
     """
 
     name: str
@@ -88,18 +95,18 @@ class Step:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PatchPlan:
-    """One scene's patch.
+    """How the patch of one scene is made.
 
     Attributes:
-        task, model: whom it is made against.
-        town, scene: where.
-        number: of the scene among all of them; decides the seeds.
-        samples: pictures by split.
-        steps: of the attack.
-        settings: `--set` texts of the collections.
+        task, model: task and name of the attacked network.
+        town, scene: place of the patch.
+        number: number of the scene among all scenes; decides the seeds.
+        samples: number of pictures by split.
+        steps: steps of the attack.
+        settings: values of `--set` for the collections.
         model_settings: `KEY=VALUE` texts of the model's options.
-        attack_settings: of the attack's.
-        precision: of the network's passes in the attack; figures are taken in float32.
+        attack_settings: `KEY=VALUE` texts of the attack's options.
+        precision: precision of the network in the attack; evaluations use float32.
     """
 
     task: str
@@ -116,28 +123,28 @@ class PatchPlan:
 
     @property
     def place(self) -> str:
-        """Town and scene; a town that is given as a file has the file's name."""
+        """Town and scene, `<town>-<scene>`; a town from a file is named by the file."""
         return f"{Path(self.town).stem}-{self.scene}"
 
     @property
     def name(self) -> str:
-        """Of the patch: what `gear collect --patch` takes once it is installed."""
+        """Name of the patch, for `gear collect --patch` after it is installed."""
         return f"{self.model}-{self.place}"
 
     @property
-    def figure(self) -> tuple[str, str]:
-        """The task's own figure: the report that it is of, and its name."""
+    def metric(self) -> tuple[str, str]:
+        """The task's metric: name of its report, and name of the metric."""
         spec = find("task", self.task).spec
         assert isinstance(spec, TaskSpec)
         report, _, name = spec.metric.rpartition(".")
         return report or TASK, name
 
     def seed(self, split: str) -> int:
-        """Of a split."""
+        """Returns the seed of a split."""
         return FIRST_SEEDS[split] + self.number
 
     def commands(self, root: Path) -> list[Step]:
-        """What makes the patch in `root/<name>` and measures it on pictures that it was not made on."""
+        """Returns the steps that make the patch in `root/<name>` and measure it on other pictures."""
         patch = str(root / self.name)
         passes = () if self.precision == PRECISION else (f"precision={self.precision}",)
         return [
@@ -152,7 +159,7 @@ class PatchPlan:
         ]  # fmt: skip
 
     def commands_again(self, root: Path) -> list[Step]:
-        """What measures the installed patch on pictures that it was not made on."""
+        """Returns the steps that measure the installed patch on pictures that the attack did not use."""
         return self._measurement(root, self.name)
 
     def _measurement(self, root: Path, patch: str) -> list[Step]:
@@ -195,22 +202,22 @@ def plans(
     attack_settings: Iterable[str] = (),
     precision: str = PRECISION,
 ) -> list[PatchPlan]:
-    """The patches of a network, at the size that it was trained at.
+    """Returns the plans of a network's patches, with pictures of the size of its training data.
 
     Args:
         task: name of the task.
-        model: of the network.
-        towns: to make them in.
-        scenes: the names of those that are wanted; all with a board or the truck unless given.
-        samples: pictures that each patch is made on, and as many that it is measured on.
-        steps: of each attack; the task's usual number unless given.
-        weights: as the networks' option of that name.
+        model: name of the network.
+        towns: names of the towns.
+        scenes: names of the scenes; by default all scenes with a surface for a patch.
+        samples: number of pictures for each attack, and as many for measuring; None for the task's default.
+        steps: steps of each attack; None for the task's default.
+        weights: value of the network's option `weights`.
         settings: further `KEY=VALUE` texts of the collections.
-        attack_settings: of the attack.
-        precision: of the network's passes in it.
+        attack_settings: `KEY=VALUE` texts of the attack's options.
+        precision: precision of the network in the attack.
 
     Raises:
-        GearError: there is no such task, model, town, scene or weights file, or the model does another task.
+        GearError: an unknown task, model, town, scene or weights file, or a model of another task.
     """
     found = find("model", model).spec
     assert isinstance(found, ModelSpec)
@@ -248,33 +255,39 @@ def plans(
 
 
 def patched_scenes(town: str) -> list[str]:
-    """Names of a town's scenes that have a surface for a patch."""
+    """Returns the names of a town's scenes that have a surface for a patch."""
     library = read_node(SceneLibrary, parse_file(find_config("scenes", town)))
     return [name for name, scene in library.scenes.items() if scene.boards or scene.truck is not None]
 
 
 def model_settings(task: str, model: str, weights: str, settings: Iterable[str]) -> tuple[str, ...]:
-    """What the network must be told: which weights, and at which share of these pictures' size it runs.
+    """Returns the options of the network: its weights, and the factor by which it scales pictures of this size.
 
-    Weights say at which share of the task's own pictures they are used. Smaller pictures are to be seen at a larger
-    share, or the network would see them smaller than it ever did.
+    A weights file names the factor for pictures of the task's default size. Smaller pictures need a larger factor, so
+    that objects have the size that they had in the training.
+
+    Args:
+        task: name of the task.
+        model: name of the network.
+        weights: value of the network's option `weights`.
+        settings: `KEY=VALUE` texts of the collections, which decide the size of pictures.
 
     Raises:
-        GearError: there are no such weights.
+        GearError: the weights do not exist.
     """
     options = find("model", model).spec.config()
     if not hasattr(options, "weights"):
         return ()
-    said = trained_option(weights, model, "input_scale")
-    told = () if weights == SHIPPED else (f"weights={weights}",)
+    trained_scale = trained_option(weights, model, "input_scale")
+    texts = () if weights == SHIPPED else (f"weights={weights}",)
     share = picture_share(task, settings)
-    if not isinstance(said, (int, float)) or share == 1 or getattr(options, "input_scale", 1.0) is not None:
-        return told
-    return (*told, f"input_scale={said / share:.6g}")
+    if not isinstance(trained_scale, (int, float)) or share == 1 or getattr(options, "input_scale", 1.0) is not None:
+        return texts
+    return (*texts, f"input_scale={trained_scale / share:.6g}")
 
 
 def picture_share(task: str, settings: Iterable[str]) -> float:
-    """Width of pictures collected with these settings, as a share of the width that the task has by itself."""
+    """Returns the width of pictures with these settings, divided by the task's default width."""
     spec = find("task", task).spec
     assert isinstance(spec, TaskSpec)
     own = [text.removeprefix("options.") for text in settings if text.startswith("options.")]

@@ -1,4 +1,4 @@
-"""Makes patches: each step is a gear command, so that the same call goes on where it was stopped."""
+"""Makes patches. Each step is a gear command, so an interrupted call continues when it is made again."""
 
 from __future__ import annotations
 
@@ -24,14 +24,18 @@ from gear.values.serial import Json, to_json
 EFFECT, MINUTES = "effect.json", "minutes.json"
 
 Gear = Callable[[Sequence[str]], None]
-"""Runs one gear command; raises `GearError` with what went wrong."""
+"""Runs one gear command; raises `GearError` with the command's error message."""
 
-Told = Callable[[str], None]
-"""Called with the name of each step that is done."""
+OnStep = Callable[[str], None]
+"""Called with the name of each completed step."""
 
 
 def gear_process(jobs: int = 1) -> Gear:
-    """Runs commands in processes of their own, each with its share of the cores."""
+    """Returns a function that runs gear commands in separate processes.
+
+    Args:
+        jobs: number of commands that run at the same time; each process gets its share of the cores.
+    """
     threads = max(1, cores() // jobs)
     environment = {"OMP_NUM_THREADS": str(threads), **os.environ}
 
@@ -39,16 +43,25 @@ def gear_process(jobs: int = 1) -> Gear:
         command = [sys.executable, "-m", "gear.cli.main", *arguments]
         done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
         if done.returncode:
-            said = done.stderr.strip().splitlines() or [f"ended with {done.returncode}"]
-            raise GearError(f"gear {arguments[0]}: {said[-1].removeprefix('gear: ')}")
+            lines = done.stderr.strip().splitlines() or [f"ended with {done.returncode}"]
+            raise GearError(f"gear {arguments[0]}: {lines[-1].removeprefix('gear: ')}")
 
     return run
 
 
-def make_patch(plan: PatchPlan, root: Path, gear: Gear, told: Told) -> Json:
-    """One scene's patch with its figures; what is whole already is only read.
+def make_patch(plan: PatchPlan, root: Path, gear: Gear, on_step: OnStep) -> Json:
+    """Makes and measures the patch of one scene; a completed patch is only read.
 
-    Under `root` lie the pictures, the patch folder, `evaluation`, `gap` and, written last, `effect.json`.
+    `root` gets the pictures, the folder of the patch, `evaluation`, `gap` and, at the end, `effect.json`.
+
+    Args:
+        plan: plan of the patch.
+        root: folder of the scene.
+        gear: runs a gear command.
+        on_step: called after each step.
+
+    Returns:
+        The measured effect, see `read_effect`.
 
     Raises:
         GearError: a command failed.
@@ -65,40 +78,40 @@ def make_patch(plan: PatchPlan, root: Path, gear: Gear, told: Told) -> Json:
         finally:
             spent = _minutes(root) | {step.name: _minutes(root).get(step.name, 0.0) + (time.monotonic() - begun) / 60}
             write_alone(root / MINUTES, dump_json(spent))
-        told(step.name)
+        on_step(step.name)
     effect = read_effect(plan, root, sum(_minutes(root).values()))
     write_alone(root / EFFECT, dump_json({"recipe": recipe, "effect": effect}))
     return effect
 
 
-def measure_again(plan: PatchPlan, root: Path, gear: Gear, told: Told, patches: Path = PATCHES) -> Json:
-    """Measures an installed patch against the weights that are shipped now; its `effect.json` says so as `again`.
+def measure_again(plan: PatchPlan, root: Path, gear: Gear, on_step: OnStep, patches: Path = PATCHES) -> Json:
+    """Measures an installed patch against the shipped weights, and adds the result to its `effect.json` as `again`.
 
     Raises:
-        GearError: a command failed, or the patch is not installed or its figures are damaged.
+        GearError: a command failed, the patch is not installed, or its `effect.json` is damaged.
     """
     path = patches / plan.name / EFFECT
     effect = load_json(path)
-    if not isinstance(effect, dict):  # told now, not after minutes of measuring
-        raise DatasetError(path, "does not hold the figures of a patch; make the patch again with --install")
+    if not isinstance(effect, dict):  # checked at the start, not after minutes of measuring
+        raise DatasetError(path, "does not hold the measured effect of a patch; make the patch again with --install")
     for step in plan.commands_again(root):
         gear(step.arguments)
-        told(step.name)
+        on_step(step.name)
     effect |= {"again": read_again(plan, root)}
     write_alone(path, dump_json(effect))
     return effect
 
 
 def weights_hash(plan: PatchPlan) -> str | None:
-    """sha256 of the weights file that the network is used with; None for random weights.
+    """Returns the SHA-256 of the network's weights file; None for random weights.
 
     Raises:
-        GearError: there is no such file.
+        GearError: the file does not exist.
     """
     if not hasattr(find("model", plan.model).spec.config(), "weights"):
         return None
-    said = dict(text.split("=", 1) for text in plan.model_settings)
-    path = resolve(said.get("weights", SHIPPED), plan.model)
+    options = dict(text.split("=", 1) for text in plan.model_settings)
+    path = resolve(options.get("weights", SHIPPED), plan.model)
     return None if path is None else sha256(path.read_bytes())
 
 

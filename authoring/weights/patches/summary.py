@@ -1,4 +1,4 @@
-"""All scenes' patches in one table."""
+"""A table of the measured effects of patches."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from gear.values.serial import Json
 
 SURE = 0.01
-"""A p below this is taken for more than chance."""
+"""Limit of p for a clear effect."""
 
 HEAD = ("scene", "none", "random", "patched", "outside patch", "p", "digital", "rendered", "share", "PSNR dB", "min")
 
 
 def table(effects: Sequence[Json]) -> str:
-    """One line a scene, and a last one that counts."""
+    """Returns one line per scene, and a last line with the number of clear effects."""
     if not effects:
-        return "no patch is whole\n"
+        return "no patch is complete\n"
     first = effects[0]
     lines = [HEAD, *(_line(one) for one in effects)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(HEAD))]
@@ -30,7 +30,7 @@ def table(effects: Sequence[Json]) -> str:
 
 
 def is_clearly_worse(effect: Json) -> bool:
-    """Whether samples lose outside the patch, against a random one, by more than chance."""
+    """Whether samples have a clearly lower metric outside the patch than with a random patch."""
     outside = effect["outside"]
     return outside["p"] is not None and outside["p"] < SURE and outside["mean"] < 0
 
