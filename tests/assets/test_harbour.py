@@ -95,7 +95,7 @@ def test_lanes_go_on_for_ever_and_every_one_is_reached(model: mujoco.MjModel) ->
         assert seen == set(graph)
 
 
-def test_lanes_lie_on_the_road_seen_and_felt(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+def test_lanes_lie_on_the_road_for_rendering_and_collision(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     for name, (_, points, _) in lanes(model).items():
         for point in (points[:-1] + points[1:])[:: max(1, len(points) // 4)] / 2:
             start = point + np.array([0.0, 0.0, 2.0])
@@ -117,7 +117,9 @@ def test_lorries_pass_under_the_bridge(model: mujoco.MjModel, data: mujoco.MjDat
     assert lanes(model)["lane.bridge_f0"][1][:, 2].max() == pytest.approx(5.9, abs=0.01)
 
 
-def test_sidewalks_are_a_kerb_high_seen_and_felt(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+def test_sidewalks_are_as_high_as_a_kerb_for_rendering_and_collision(
+    model: mujoco.MjModel, data: mujoco.MjData
+) -> None:
     walks = numerics(model, "sidewalk.")
     assert len(walks) > 15 and len(numerics(model, "crosswalk.")) > 15
     for name, values in walks.items():

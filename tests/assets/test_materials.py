@@ -43,13 +43,13 @@ def worn_by_buildings() -> set[str]:
     }
 
 
-def test_everything_that_facades_wear_has_normal_roughness_and_occlusion_maps() -> None:
+def test_all_materials_of_facades_have_normal_roughness_and_occlusion_maps() -> None:
     worn = worn_by_buildings() - FLAT
     assert {"brick_red", "ashlar", "windows", "shop_fronts", "curtain_wall"} <= worn
     assert not [name for name in worn if MATERIALS[name].normal is None or MATERIALS[name].orm is None]
 
 
-def test_walls_and_roofs_have_them_whoever_wears_them() -> None:
+def test_all_walls_and_roofs_have_these_maps() -> None:
     walls = ("brick", "plaster", "ashlar", "concrete", "metal_panel", "cladding", "wood", "slate", "tile", "containers")
     names = [name for name in MATERIALS if name.startswith(walls)]
     assert len(names) > 15

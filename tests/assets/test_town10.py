@@ -82,7 +82,7 @@ def headings(points: Array) -> Array:
     return np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
 
 
-def test_what_is_seen_is_labelled_and_felt_by_nobody(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+def test_visible_geoms_have_labels_and_no_collision(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
     visible = [geom for geom in spec.geoms if geom.classname.name != "collision"]
     labels = {geom.classname.name.split(".")[0] for geom in visible}
     assert labels == LABELS
@@ -169,7 +169,7 @@ def test_traffic_keeps_to_the_right(model: mujoco.MjModel) -> None:
     assert along[0] * offset[1] - along[1] * offset[0] > 2.0
 
 
-def test_lanes_lie_on_the_road_seen_and_felt(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+def test_lanes_lie_on_the_road_for_rendering_and_collision(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     down = np.array([0.0, 0.0, -1.0])
     for name, (_, points, _) in lanes(model).items():
         for point in points[:: max(1, len(points) // 4)]:
@@ -203,7 +203,9 @@ def test_bridges_rise_gently(model: mujoco.MjModel) -> None:
     assert 0.03 < np.abs(slope).max() < 0.09
 
 
-def test_sidewalks_are_a_kerb_high_seen_and_felt(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+def test_sidewalks_are_as_high_as_a_kerb_for_rendering_and_collision(
+    model: mujoco.MjModel, data: mujoco.MjData
+) -> None:
     walks = numerics(model, "sidewalk.")
     assert len(walks) > 40
     down = np.array([0.0, 0.0, -1.0])

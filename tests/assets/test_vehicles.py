@@ -120,7 +120,7 @@ def test_budgets(name: str, model: mujoco.MjModel) -> None:
     assert model.ntexdata < 4_000_000
 
 
-def test_every_visible_geom_has_a_known_label_and_is_never_felt(name: str) -> None:
+def test_every_visible_geom_has_a_known_label_and_no_collision(name: str) -> None:
     spec = mujoco.MjSpec.from_file(str(VEHICLES / f"{name}.xml"))
     kind = next(text.data for text in spec.texts if text.name == "actor.kind")
     assert kind == name.split("_", 1)[0]

@@ -102,7 +102,7 @@ def test_both_views_of_a_pair_get_the_same_colours() -> None:
     assert not np.array_equal(changed["left"], sample.images["left"])
 
 
-def test_colours_without_any_reach_are_the_picture_itself() -> None:
+def test_colours_with_ranges_of_zero_return_the_same_picture() -> None:
     picture = sample_of("semseg").images["left"]
     still = Colours(brightness=0, contrast=0, saturation=0, balance=0, gamma=0, noise=0, blur=0, jpeg=0, erase=0)
     assert np.array_equal(recolour({"left": picture}, still, derive_rng(0, "c"))["left"], picture)

@@ -308,7 +308,7 @@ def test_a_centred_window_has_the_nearest_size_that_can_share_the_middle(size_px
             assert abs(found - wanted) == pytest.approx(np.abs(candidates - wanted).min())
 
 
-def test_a_whole_window_is_the_picture_at_a_share_of_its_size_and_never_less_than_a_pixel() -> None:
+def test_a_window_of_the_whole_picture_is_the_scaled_picture_of_at_least_one_pixel() -> None:
     half = whole_window((97, 192), 0.5)
     assert (half.left_px, half.top_px, half.width_px, half.height_px) == (0, 0, 192, 97)
     assert (half.out_width_px, half.out_height_px) == (96, 48)

@@ -43,7 +43,7 @@ def test_nothing_held_out_is_trained_on(task: str) -> None:
     assert HELD_OUT_WEATHER in {one.weather for one in held_out(task)}
 
 
-def test_seeds_are_nobody_elses() -> None:
+def test_seeds_are_not_used_elsewhere() -> None:
     simulation = read_node(SimulationConfig, parse_file(find_config("simulation", "default")))
     paper = {split.seed for split in simulation.splits.values()}
     learnt = [one.seed for one in training("semseg", 1000)]
@@ -90,7 +90,7 @@ def test_training_and_patched_streets_have_just_so_many_road_users() -> None:
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_a_list_that_nobody_reads_to_its_end_is_no_error(unbuffered: str) -> None:
+def test_a_closed_output_pipe_is_no_error(unbuffered: str) -> None:
     """Whether it comes up at the first line or at the end, when the rest is printed."""
     reading, writing = os.pipe()
     os.close(reading)

@@ -53,7 +53,7 @@ def test_a_wall_dims_with_the_length_of_the_ray_and_from_where_the_fog_begins() 
     assert (air(fog_from_m=90.0).transmittance(wall(30.0), camera()) == 1).all()
 
 
-def test_clear_air_takes_each_channel_by_itself_and_leaves_the_sky() -> None:
+def test_clear_air_attenuates_each_channel_and_not_the_sky() -> None:
     clear = air(fog_per_m=0.0, clear_per_m=np.array([0.001, 0.002, 0.004]))
     depth = wall(100.0)
     depth[:5] = np.nan

@@ -133,7 +133,7 @@ def test_a_wall_takes_the_light_of_what_lies_behind_it_and_of_nothing_before_it(
     assert (np.diff(edge) >= -1e-6).all() and ((edge > 0.1) & (edge < 0.9)).any(), "soft, and never back"
 
 
-def test_a_lit_wall_throws_nothing_on_itself() -> None:
+def test_a_lit_wall_casts_no_shadow_on_itself() -> None:
     town = LampShadows(casters=Casters.of(box((3.0, 0.0, 6.0), (0.4, 60.0, 12.0))), shapes={})
     one = shadow(town, record())
     y, z = (grid.reshape(-1) for grid in np.meshgrid(np.linspace(-24, 24, 97), np.linspace(0.1, 7.5, 23)))
@@ -142,7 +142,7 @@ def test_a_lit_wall_throws_nothing_on_itself() -> None:
     assert lit.min() == 1
 
 
-def test_road_users_throw_shadows_that_begin_at_their_soles_and_none_on_themselves() -> None:
+def test_shadows_of_road_users_start_at_their_feet_and_do_not_fall_on_themselves() -> None:
     town = LampShadows(casters=NOTHING, shapes=WALKER)
     one = shadow(town, record(walker(6.0)))
     # 1.8 m high, 6 m from below a lamp of 8 m: to 6.15 + 6.15 * 1.8 / 6.2 = 7.94 m.
@@ -169,7 +169,7 @@ def test_what_stands_is_looked_at_once_and_road_users_leave_no_trace() -> None:
     np.testing.assert_array_equal(again, empty)
 
 
-def test_headlamps_throw_the_shadows_of_road_users_but_not_of_houses_nor_of_their_own_car() -> None:
+def test_headlamps_cast_shadows_of_other_road_users_only() -> None:
     head_m = np.array([0.0, 0.0, 0.65])
     head = one_lamp(head_m, np.array([1.0, 0.0, 0.0]))
     own_car = ActorRecord(

@@ -195,7 +195,7 @@ def test_frames_stay_linear_and_the_same() -> None:
     np.testing.assert_array_equal(light.apply(mixed), light.apply(mixed))
 
 
-def test_what_stands_in_a_lamps_light_darkens_what_lies_behind_it_and_nothing_else() -> None:
+def test_an_object_in_the_light_of_a_lamp_casts_a_shadow_only_behind_it() -> None:
     place = (6.0, 0.0, 8.0)
     # A board across the road, with its middle 3 m above the ground.
     board = np.array([[(8, -4, 1), (8, -4, 5), (8, 4, 5)], [(8, -4, 1), (8, 4, 5), (8, 4, 1)]], np.float32)
@@ -280,7 +280,7 @@ def test_only_those_that_drive_have_their_lamps_on() -> None:
     assert ahead > 0.9 and below > 0.8 and above < 0.05, "the beam is cut off at the height of the lamp"
 
 
-def test_vehicles_show_white_ahead_and_red_behind_and_nothing_on_the_roof_or_where_they_are_parked() -> None:
+def test_driving_vehicles_have_white_front_and_red_rear_lights_and_parked_ones_none() -> None:
     vehicles = {"van": Headlamps(front_m=2.0, half_gauge_m=0.6)}
     _, geom_id = street()
     table = geoms(object_id=np.array([-1, 2], np.int32))

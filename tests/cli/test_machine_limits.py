@@ -32,7 +32,7 @@ from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
         (FileNotFoundError(errno.ENOENT, "No such file or directory"), None),
     ],
 )
-def test_limits_are_told_from_bugs(error: Exception, line: str | None) -> None:
+def test_machine_limits_are_distinguished_from_bugs(error: Exception, line: str | None) -> None:
     assert limit_reached(error) == line
     outer = ValueError("at the end")
     outer.__cause__ = error

@@ -110,7 +110,7 @@ def test_printing_to_a_full_disk_is_one_line(count: str) -> None:
         assert printing(count, full) == (2, "gear: No space left on device\n")
 
 
-def test_nobody_who_reads_any_more_is_no_error() -> None:
+def test_a_closed_output_pipe_is_no_error() -> None:
     reading, writing = os.pipe()
     os.close(reading)
     with os.fdopen(writing, "wb") as closed:

@@ -45,7 +45,7 @@ def test_each_worker_of_mixed_devices_is_named() -> None:
 
 
 @pytest.mark.parametrize(("info", "versions"), [(GPU, X86), (CPU, ARM)])
-def test_another_device_is_refused_and_told_of_mixed_devices(info: RendererInfo, versions: dict[str, str]) -> None:
+def test_another_device_is_refused_with_advice_on_mixed_devices(info: RendererInfo, versions: dict[str, str]) -> None:
     with pytest.raises(BackendError, match=re.escape("or with --set mixed_devices=true")):
         refuse_other_renderer(content(mixed=False), info, versions)
 

@@ -36,7 +36,7 @@ TRUCK = "town: tiny\nscenes:\n  behind:\n    truck: {asset: truck_bix}\n"
         (ASSETS.replace("tiny", "tony"), r"my.yml:1:7: town: its boards stand in tony, not in tiny"),
     ],
 )
-def test_what_a_scene_library_names_is_told_with_its_place(text: str, message: str, tmp_path: Path) -> None:
+def test_errors_in_a_scene_library_name_file_and_line(text: str, message: str, tmp_path: Path) -> None:
     file = tmp_path / "my.yml"
     file.write_text(text)
     flags = {"task": "depth", "town": str(TINY_TOWN), "scene": str(file)}
@@ -70,7 +70,7 @@ def test_a_scene_without_a_name_is_refused(tmp_path: Path) -> None:
         look_up(load_collection(None, {"task": "depth", "town": str(TINY_TOWN), "scene": str(file)}))
 
 
-def test_a_lens_that_folds_is_told_where_the_file_gives_it(tmp_path: Path) -> None:
+def test_a_folding_lens_is_an_error_with_its_place_in_the_file(tmp_path: Path) -> None:
     file = tmp_path / "c.yml"
     file.write_text("task: semseg\ncamera: {lens: {k1: -0.5, k2: -0.5}}\noptions: {hfov_deg: 150}\n")
     flags = {"town": str(TINY_TOWN), "scene": f"{TINY_SCENES}:board", "renderer": "classic"}

@@ -143,7 +143,7 @@ def test_when_all_fails_the_run_ends_and_says_what_was_not_tried(tmp_path: Path,
     assert tried == 2 * MOST_FAILURES, "five here, and five in fresh processes"
 
 
-def test_an_error_that_is_not_of_a_sample_ends_the_run_and_notes_what_failed_before(
+def test_an_error_that_belongs_to_no_sample_ends_the_run_and_records_failed_samples(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def breaks(job: Any, indices: Iterator[int], report: Report) -> None:

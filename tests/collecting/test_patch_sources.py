@@ -147,9 +147,7 @@ def test_a_patch_that_would_not_be_shown_is_refused(tmp_path: Path, picture: np.
             resolve(CollectionConfig(task="semseg", scene=scene, patch=str(one), root=str(tmp_path / "out")))
 
 
-def test_a_patch_that_nobody_can_look_at_is_one_line(
-    tmp_path: Path, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_unreadable_patch_is_one_line(tmp_path: Path, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(PatchError, match="cannot be read: File name too long"):
         resolve_patch("a" * 300, surfaces=1, seed=0)
 

@@ -63,7 +63,7 @@ def test_without_probes_nothing_speaks_of_them(tmp_path: Path, copy_small: Copy)
 
 
 @pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_probes_are_the_same_whoever_makes_them(tmp_path: Path, collect_small: Collect, workers: int) -> None:
+def test_probes_do_not_depend_on_the_worker(tmp_path: Path, collect_small: Collect, workers: int) -> None:
     collect_small("stereo3d", tmp_path / "straight", samples=3, probes=True)
     collect_small("stereo3d", tmp_path / "taken_up", samples=1, probes=True)
     collect_small("stereo3d", tmp_path / "taken_up", samples=3, probes=True, workers=workers)

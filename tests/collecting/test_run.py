@@ -33,7 +33,7 @@ def test_a_disk_without_locks_is_named_once(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there processes are interrupted otherwise")
-def test_workers_that_are_interrupted_alone_are_told_at_once(
+def test_interrupted_workers_are_reported_at_once(
     tmp_path: Path, collect_small: Callable[..., CollectReport], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Somebody's `kill -INT`: it took ten minutes of silence, and then the driver was blamed."""

@@ -76,7 +76,7 @@ def test_edges_mix_the_patch_and_the_picture_by_what_each_covers() -> None:
     assert float(share.sum()) == pytest.approx((x1 - x0) * (y1 - y0), rel=0.01)
 
 
-def test_what_stands_before_a_board_is_pasted_over() -> None:
+def test_objects_in_front_of_a_board_are_pasted_over() -> None:
     car = Thing(parts=CAR, position_m=(9.0, 0.0, 0.0), object_id=2, role="npc")
     sample = sample_of(board(18.0), car)
     u, v = places(sample)

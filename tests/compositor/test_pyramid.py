@@ -52,7 +52,7 @@ def test_areas_count_every_texel_alike_and_middles_leave_some_out() -> None:
     assert halving_matrix(75, "middles").mean(axis=0).std() > 0.2 / 75
 
 
-def test_opengl_halves_as_its_driver_does_and_filament_as_itself() -> None:
+def test_mip_levels_are_halved_by_the_rule_of_the_driver_or_of_filament() -> None:
     nvidia, mesa = "4.6.0 NVIDIA 580.159.04", "4.5 (Compatibility Profile) Mesa 22.3.6"
     assert [halving_of(name, nvidia) for name in ("classic", "raster")] == ["areas", "areas"]
     assert [halving_of("classic", mesa), halving_of("filament", nvidia)] == ["middles", "middles"]

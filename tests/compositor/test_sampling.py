@@ -206,7 +206,7 @@ def test_the_border_of_the_picture_is_no_edge() -> None:
     assert corner.weight[0] == pytest.approx([0, 0, 0, 0, 1, 0, 0, 0, 0])
 
 
-def test_a_pixel_without_the_surface_around_it_is_read_itself() -> None:
+def test_a_pixel_without_neighbours_on_the_surface_reads_only_itself() -> None:
     found = taken(FAST, [(40, 45)], np.zeros((80, 80), bool))
     assert found.weight[0] == pytest.approx([0, 0, 0, 0, 1, 0, 0, 0, 0]) and found.u[0, 4] == pytest.approx(0.5)
     assert found.coverage == pytest.approx(1)

@@ -141,14 +141,14 @@ def test_mistakes_in_a_carla_gear_config_say_where(tmp_path: Path, text: str, me
         load_collection(str(tmp_path / "c.yml"), {})
 
 
-def test_a_seed_without_a_count_is_told(tmp_path: Path) -> None:
+def test_a_seed_without_a_number_of_samples_is_an_error(tmp_path: Path) -> None:
     file = tmp_path / "sim.py"
     file.write_text("SEED_VALUES = {\n    'test': 5,\n    'val': 6,\n}\nITERATION_VALUES = {'test': 50}\n")
     with pytest.raises(ConfigError, match=r"sim.py:3:5: SEED_VALUES.val: has no count in ITERATION_VALUES; add one"):
         load_simulation(str(file))
 
 
-def test_a_config_that_nobody_can_look_at_is_one_line() -> None:
+def test_an_unreadable_config_is_one_line() -> None:
     for name in ("a" * 300, f"{'a' * 300}.yml"):
         with pytest.raises(ConfigError, match=f"^{name}: cannot read it: File name too long"):
             load_simulation(name)

@@ -51,7 +51,7 @@ def test_a_sidecar_that_another_program_has_rewritten_is_not_collected_over(tmp_
         Store(tmp_path, plan()).open({})
 
 
-def test_a_damaged_sidecar_is_told_before_more_is_collected(tmp_path: Path) -> None:
+def test_a_damaged_sidecar_is_reported_before_samples_are_collected(tmp_path: Path) -> None:
     fill(tmp_path, plan())
     sidecar = json.loads((tmp_path / SIDECAR).read_text(encoding="utf-8"))
     sidecar["record"]["seed"] = "five"

@@ -51,7 +51,7 @@ def test_twins_differ_in_their_patch_alone_and_equals_in_how_many_they_are(
     assert (other.content_key == PLAN.content_key) is is_same
 
 
-def test_kinds_of_auxiliary_files_are_told_apart() -> None:
+def test_kinds_of_auxiliary_files_are_distinguished() -> None:
     assert replace(PLAN, auxiliary=("probes",)).content_key != replace(PLAN, auxiliary=("others",)).content_key
 
 

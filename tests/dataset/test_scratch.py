@@ -32,7 +32,7 @@ def finished_process() -> int:
     return process.pid
 
 
-def test_files_that_nobody_holds_are_cleared_and_those_being_written_stay(tmp_path: Path) -> None:
+def test_files_without_a_lock_are_deleted_and_files_being_written_stay(tmp_path: Path) -> None:
     gone = finished_process()
     kept = [left(tmp_path, f"{HERE}-{os.getppid()}-1"), left(tmp_path, f"not-{HERE}-{gone}-1"), left(tmp_path, "odd")]
     for name in (f"{HERE}-{gone}-1", f"{HERE}-{os.getpid()}-1", "123-456", f"other-77-abc{SUFFIX}"):
@@ -42,7 +42,7 @@ def test_files_that_nobody_holds_are_cleared_and_those_being_written_stay(tmp_pa
 
 
 @pytest.mark.parametrize("name", ["oldhost-77-140211", "odd", f"oldhost-77-abc{SUFFIX}"])
-def test_files_of_another_host_are_cleared_when_they_are_old_and_nobody_holds_them(tmp_path: Path, name: str) -> None:
+def test_old_files_of_another_host_without_a_lock_are_deleted(tmp_path: Path, name: str) -> None:
     path = left(tmp_path, name, age_s=OLD_S + 1)
     with path.open("rb") as held:
         fcntl.flock(held, fcntl.LOCK_EX)

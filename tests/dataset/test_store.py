@@ -386,7 +386,7 @@ def test_what_another_run_has_just_begun_is_not_forgotten(tmp_path: Path) -> Non
         assert changed.missing() == [0, 1, 2]
 
 
-def test_runs_that_make_the_same_work_side_by_side_and_one_that_fails_takes_nothing_from_the_other(
+def test_two_runs_in_one_folder_share_the_work_and_a_failure_leaves_the_other_intact(
     tmp_path: Path,
 ) -> None:
     other = begun_elsewhere(tmp_path / "d", plan(), tmp_path / "held")

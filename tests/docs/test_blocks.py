@@ -162,7 +162,7 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
     if shell:
         _passes(["sh", "-eu", "-c", shell], work, env)
     if python:
-        (work / "test_page.py").write_text(python + "\n\ndef test_the_page_itself() -> None:\n    pass\n")
+        (work / "test_page.py").write_text(python + "\n\ndef test_a_page_of_the_site() -> None:\n    pass\n")
         command = [
             sys.executable,
             "-m",

@@ -16,7 +16,7 @@ def test_names_are_folders_with_the_end_where_a_folder_holds_several_files() -> 
     ]
 
 
-def test_files_of_one_name_are_told_apart_by_their_suffix() -> None:
+def test_files_of_one_name_are_distinguished_by_their_suffix() -> None:
     found = parts(["gtFine/val/rgb_0001.png", "gtFine/val/rgb_0001.tiff"], "val")
     assert [(part.name, part.suffix) for part in found] == [("gtfine", "png"), ("gtfine", "tiff")]
     names = {(part.name, part.suffix) for part in found} | {("image", "png")}

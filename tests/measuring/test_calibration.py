@@ -143,7 +143,7 @@ def test_a_patch_is_checked_behind_the_defense_that_it_was_made_through(
     assert len(drawn) == 3 and drawn[0] == drawn[1] != drawn[2] and report.as_json()["seed"] == 0
 
 
-def test_doubtful_calibration_is_told_by_attacks_and_gaps(
+def test_attacks_and_gaps_warn_of_a_doubtful_calibration(
     small: Small, copy_small: Copy, learner: list[Learner], tmp_path: Path
 ) -> None:
     patched, told = tmp_path / "patched", list[str]()
@@ -190,7 +190,7 @@ def test_learning_from_what_is_measured_is_noted(small: Small, learner: list[Lea
     assert not any("learnt" in note for note in other.facts["notes"])
 
 
-def test_calibration_the_wrong_way_round_is_told(
+def test_swapped_calibration_datasets_give_a_warning(
     small: Small, copy_small: Copy, learner: list[Learner], tmp_path: Path
 ) -> None:
     clean, patched = small(split="val"), tmp_path / "patched"

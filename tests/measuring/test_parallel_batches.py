@@ -101,7 +101,7 @@ def test_a_network_that_fails_stops_the_run_and_it_is_taken_up_again(
     assert len(files(tmp_path)) == 5
 
 
-def test_nobody_works_slower_for_a_slow_disk(tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slow_disk_does_not_slow_the_network(tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What the first sample's files wait for is that every lane has answered twice."""
     torch.set_num_threads(2)
     predict, write, answered = Network.predict_many, scoring.write_whole, threading.Semaphore(0)
@@ -192,7 +192,7 @@ def test_what_is_left_runs_on_as_many_threads_as_the_whole(
     assert seen == [1]
 
 
-def test_small_pictures_go_together_unless_somebody_says(
+def test_small_pictures_share_a_batch_by_default(
     tmp_path: Path, pictures: Path, monkeypatch: pytest.MonkeyPatch, sizes: list[int]
 ) -> None:
     torch.set_num_threads(1)

@@ -78,7 +78,7 @@ def test_networks_run_at_the_share_that_their_spec_names(name: str) -> None:
     assert isinstance(found.spec, ModelSpec) and found.spec.input_scale == scale
 
 
-def test_a_driver_whose_camera_has_another_focal_length_is_told(install: Callable[..., None]) -> None:
+def test_a_controller_with_another_focal_length_gives_a_warning(install: Callable[..., None]) -> None:
     install(replace(tiny_segmenter, config=ScaledConfig, build=lambda _: TinySegmenter(TinyConfig())))
 
     def note(options: list[str], *settings: str) -> str | None:

@@ -34,7 +34,7 @@ def test_turned_boxes_overlap_as_polygons_do(seed: int) -> None:
             assert (ground[i, j], space[i, j]) == pytest.approx(by_shapely(a[i], b[j]), abs=1e-9)
 
 
-def test_a_box_overlaps_itself_wholly() -> None:
+def test_the_iou_of_a_box_with_itself_is_one() -> None:
     same = boxes(4, 50)
     ground, space = iou_ground_and_space(same, same)
     np.testing.assert_allclose(np.diag(ground), 1.0, atol=1e-9)

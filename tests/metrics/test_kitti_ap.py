@@ -240,7 +240,7 @@ def test_ground_truth_is_perfect_once_there_are_forty() -> None:
 
 @pytest.mark.parametrize("cars", [1, 2, 3, 17, 40, 41])
 @pytest.mark.parametrize("kind", [KittiEvaluator, NearCars])
-def test_the_ceiling_is_what_ground_truth_itself_comes_to(cars: int, kind: type[KittiEvaluator[Any]]) -> None:
+def test_the_ceiling_is_the_metric_of_the_ground_truth(cars: int, kind: type[KittiEvaluator[Any]]) -> None:
     evaluator = kind(lambda labels: labels)
     for number in range(cars):
         evaluator.update([CAR], [replace(CAR, score=1 - number / 100)])
@@ -269,7 +269,7 @@ def test_a_van_counts_neither_way_and_a_truck_counts_against() -> None:
     assert evaluate([*good, *[([truck], found)] * 60])["car_2d_moderate_r40"] == pytest.approx(0.5)
 
 
-def test_a_label_that_only_a_detection_below_the_least_height_finds_counts_neither_way() -> None:
+def test_a_label_matched_only_by_a_detection_below_the_minimum_height_is_ignored() -> None:
     """The label is 26 px high and looked for; a detection of 24.9 px is ignored, and so is its label: no hit, no miss,
     no false alarm. A higher one beside it is the match, whatever their scores.
     """
@@ -343,7 +343,7 @@ def test_every_metric_is_a_share() -> None:
     assert KittiEvaluator(lambda labels: labels).range_of("car_3d_moderate_r40") == (0.0, 1.0)
 
 
-def test_draws_are_evaluated_at_moderate_difficulty_each_for_itself() -> None:
+def test_each_draw_is_evaluated_separately_at_moderate_difficulty() -> None:
     """Picture 0 has no labels, so a draw of it alone is not known; picture 1 has a car that only `moderate` wants."""
     evaluator: KittiEvaluator[list[KittiLabel]] = KittiEvaluator(lambda labels: labels)
     evaluator.update([], [])

@@ -107,7 +107,7 @@ def test_a_least_overlap_of_its_own_takes_the_place_of_the_benchmarks() -> None:
 
 @pytest.mark.parametrize(("overlap", "excuses"), [("2d", True), ("bev", False), ("3d", False)])
 @pytest.mark.parametrize(("right", "is_inside"), [(170.0, False), (170.1, True)])
-def test_a_region_excuses_in_the_picture_what_lies_in_it_by_more_than_the_least_overlap(
+def test_a_detection_that_overlaps_an_ignored_region_enough_is_no_false_alarm(
     overlap: Overlap, excuses: bool, right: float, is_inside: bool
 ) -> None:
     """Of the detection's own area; two regions that share it do not add up."""

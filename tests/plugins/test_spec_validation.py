@@ -126,7 +126,7 @@ def test_a_name_that_is_none_is_one_printable_line(name: Any) -> None:
     assert "is not a plugin's name" in problem or "no repr" in problem
 
 
-def test_another_kind_of_spec_is_told_apart() -> None:
+def test_a_spec_of_another_kind_is_refused() -> None:
     wanted = "gear_models returns ModelSpec objects, got DefenseSpec"
     assert spec_problem("model", DefenseSpec(**PLAIN)) == wanted
     assert spec_problem("task", 3) == "gear_tasks returns TaskSpec objects, got int"

@@ -67,7 +67,7 @@ def test_what_waits_is_bounded() -> None:
         assert sum(numbers.reads) <= 2 * 2 + 3, "the next block, or one sample a thread"
 
 
-def test_a_sample_that_cannot_be_read_is_told_in_its_turn_and_threads_end() -> None:
+def test_an_unreadable_sample_raises_in_its_order_and_threads_end() -> None:
     before = threading.active_count()
     reading = read_ahead(Numbers(10, broken=7), BLOCKS, workers=2)
     assert [sample.number for sample in next(reading)] == [0, 1, 2]

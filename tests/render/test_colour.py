@@ -136,7 +136,7 @@ def test_a_face_is_the_right_way_round(renderer: Renderer, stage: Stage) -> None
         assert pixel[shown].min() > 1.5 * (pixel[hidden].max() if hidden else 20)
 
 
-def test_paint_is_worn_and_taken_off(renderer: Renderer, stage: Stage) -> None:
+def test_paint_is_applied_and_removed(renderer: Renderer, stage: Stage) -> None:
     plain = colour(renderer, stage)
     (view,) = renderer.render(stage, (camera(),), colour=False)
     car = view.geom_id == geom(stage.model, "car")

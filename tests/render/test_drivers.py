@@ -15,7 +15,7 @@ from gear.render.native_output import native_output
 from gear.values.errors import UnknownNameError
 
 
-def test_a_machine_without_vulkan_is_told_what_to_install() -> None:
+def test_without_vulkan_the_error_names_the_packages() -> None:
     code = "from gear.render import probe; probe('filament')"
     environment = {**os.environ, "VK_ICD_FILENAMES": "/nowhere.json", "VK_DRIVER_FILES": "/nowhere.json"}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
@@ -66,7 +66,7 @@ def test_only_known_chatter_is_kept_back(capfd: pytest.CaptureFixture[str]) -> N
     assert chatter == ["FEngine (64 bits) created at 0x1 (threading is enabled)"]
 
 
-def test_a_stack_trace_of_a_full_arena_is_chatter_whoever_called(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_stack_trace_of_a_full_arena_is_filtered_for_every_caller(capfd: pytest.CaptureFixture[str]) -> None:
     lines = (
         "HandleAllocator arena is full, using slower system heap.",
         "#0\t_render_filament.so  0x7f0 operator() + 1",

@@ -37,7 +37,7 @@ def test_osmesa_is_taken_where_egl_does_not_work(monkeypatch: pytest.MonkeyPatch
     assert glcontext.choose_backend("classic") == "osmesa"
 
 
-def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_opengl_the_error_names_the_packages(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(glcontext, "_loads", lambda library: False)
     with pytest.raises(BackendError, match=r"libEGL.so.1 is not installed.*apt-get install libegl1 libopengl0"):
         glcontext.choose_backend("classic")

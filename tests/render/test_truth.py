@@ -100,7 +100,7 @@ def test_nothing_is_minus_one_and_nan(renderer: Renderer, stage: Stage) -> None:
     assert 0.1 < (view.geom_id < 0).mean() < 0.6
 
 
-def test_what_is_only_felt_is_not_seen(renderer: Renderer, stage: Stage) -> None:
+def test_collision_geoms_are_not_rendered(renderer: Renderer, stage: Stage) -> None:
     (view,) = renderer.render(stage, (camera(),))
     assert geom(stage.model, "felt") not in view.geom_id
     assert set(np.unique(view.geom_id)) == {-1} | {

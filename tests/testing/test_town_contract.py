@@ -312,7 +312,7 @@ def test_broken_scenes_fail_their_check(
         run(contract, check)
 
 
-def test_a_board_behind_a_wall_that_nobody_feels_is_noticed(broken: Callable[..., TownContract]) -> None:
+def test_a_board_behind_a_wall_without_collision_is_noticed(broken: Callable[..., TownContract]) -> None:
     """Placement knows collision geoms alone; the contract checks visible geoms as well."""
     wall = '<geom name="sheet" class="building.plaster" material="plaster" pos="53 -8.5 3" size="0.1 6 3"/>'
     contract = broken(add_geom(wall))
@@ -367,7 +367,7 @@ def test_what_a_town_needs_not_can_be_left_out(broken: Callable[..., TownContrac
         ("expected", frozenset({"rode"}), "test_every_class_of_a_street_is_there", "`expected` are no labels:\n  rode"),
     ],
 )  # fmt: skip
-def test_what_a_contract_names_and_is_not_there_is_told(
+def test_missing_names_of_a_contract_are_reported(
     broken: Callable[..., TownContract], attribute: str, value: object, check: str, message: str
 ) -> None:
     town = broken()

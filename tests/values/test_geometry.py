@@ -63,7 +63,7 @@ def test_a_symmetric_pinhole_has_its_axis_between_the_middle_pixels() -> None:
     assert np.allclose(camera.project([0.0, 0.0, 3.0]), [611.5, 184.5])
 
 
-def test_the_matrix_is_the_projection_and_fields_of_view_end_at_the_pictures_edges() -> None:
+def test_the_projection_matrix_maps_the_fields_of_view_to_the_edges_of_the_picture() -> None:
     camera = Intrinsics(1224, 370, 500.0)
     x, y, w = camera.matrix @ [0.7, -0.4, 5.0]
     assert np.allclose([x / w, y / w], camera.project([0.7, -0.4, 5.0]))

@@ -132,7 +132,7 @@ def test_every_command_with_an_output_folder_is_tested() -> None:
         if verb in FORCES or not force
     ],
 )
-def test_a_link_in_any_place_of_an_output_folder_costs_nobody_a_file(
+def test_links_in_an_output_folder_lead_to_no_deleted_file(
     verb: str,
     force: bool,
     home: Path,

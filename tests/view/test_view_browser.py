@@ -395,7 +395,7 @@ def test_a_task_from_outside_is_shown_like_any_other(browser: Browser, odd: Data
     no_trouble(browser)
 
 
-def test_lists_of_numbers_can_be_told_apart(browser: Browser, odd: Dataset[Any], tmp_path: Path) -> None:
+def test_lists_of_numbers_can_be_distinguished(browser: Browser, odd: Dataset[Any], tmp_path: Path) -> None:
     plan = dataclasses.replace(odd.plan, content={"edges_px": [1145.898, 20.12345, 1e-9], "boards": [], "truck": [{}]})
     write_page(dataclasses.replace(odd, plan=plan), tmp_path / "odd.html")
     browser.open(tmp_path / "odd.html", "#/statistics")

@@ -144,7 +144,7 @@ def test_a_link_in_an_evaluation_leads_nowhere(twins: Any, tmp_path: Path) -> No
     assert len(report.problems) == 4 and "is not a path inside" in report.problems[0][1]
 
 
-def test_an_evaluation_is_told_from_a_dataset(twins: Any) -> None:
+def test_an_evaluation_is_distinguished_from_a_dataset(twins: Any) -> None:
     assert is_evaluation(twins.evaluation) and not is_evaluation(twins.none)
     part = open_evaluation(twins.evaluation)[0]
     dataset = gear.open_dataset(twins.none)

@@ -10,7 +10,7 @@ from gear.world.world import World
 
 
 @pytest.mark.parametrize("name", ["board_0", "car_saloon_0"])
-def test_a_town_that_takes_a_name_of_gears_is_told_so(name: str, tmp_path: Path) -> None:
+def test_a_town_with_a_reserved_name_is_an_error(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "towns"
     folder.mkdir()
     text = TINY_TOWN.read_text().replace("<worldbody>", f'<worldbody><body name="{name}"/>', 1)

@@ -29,7 +29,7 @@ def test_the_ground_is_where_the_town_says() -> None:
     assert SPACE.ground_m(0, 0, 20) is None, "ground far below is another level"
 
 
-def test_overlaps_are_felt_and_near_misses_are_not() -> None:
+def test_overlaps_are_detected_and_near_misses_are_not() -> None:
     assert SPACE.overlaps({"car_saloon_0": flat(0, 0), "van_small_0": flat(4.6, 0)}) == [
         ("van_small_0", "car_saloon_0")
     ]
@@ -43,7 +43,7 @@ def test_overlaps_are_felt_and_near_misses_are_not() -> None:
     "option",
     ['<option><flag contact="disable"/></option>', '<option gravity="0 0 0"><flag constraint="disable"/></option>'],
 )
-def test_a_towns_own_options_change_nothing_of_what_is_felt(tmp_path: Path, option: str) -> None:
+def test_options_of_a_town_do_not_change_collisions(tmp_path: Path, option: str) -> None:
     """A town that stands still for its viewer has contacts and gravity turned off."""
     town = tmp_path / "towns" / "tiny.xml"
     town.parent.mkdir()

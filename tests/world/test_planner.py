@@ -87,7 +87,7 @@ def test_the_seed_changes_the_scene_and_the_name_of_the_split_does_not() -> None
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_nobody_overlaps_anybody(scene: str) -> None:
+def test_no_two_actors_overlap(scene: str) -> None:
     for record in records(scene):
         for distance_m, first, second in distances(record):
             assert distance_m > 0.1, (record.index, first, second)
@@ -183,7 +183,7 @@ def test_a_town_may_lie_far_below_its_origin(tmp_path: Path, depth_m: float) -> 
 
 
 @pytest.mark.parametrize("scene", ["truck", "no_billboard"])
-def test_nobody_stands_with_half_of_the_wheels_over_an_edge(tmp_path: Path, scene: str) -> None:
+def test_no_vehicle_stands_with_half_of_its_wheels_over_an_edge(tmp_path: Path, scene: str) -> None:
     """The lane to the east leads along a drop; four feet on two levels lie in one plane, and that is no ground."""
     town = lowered(tmp_path, 0.0)
     text = town.read_text()
@@ -273,7 +273,7 @@ def test_counts_and_regions_are_kept() -> None:
         assert all(np.linalg.norm(ego - actor.world_from_actor.position_m) < 61.5 for actor in vehicles + people)
 
 
-def test_nobody_cycles_on_a_motorway(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_bicycle_is_on_a_motorway(monkeypatch: pytest.MonkeyPatch) -> None:
     def kinds() -> set[str]:
         types = tiny_world("no_billboard").types
         return {types[a.asset].facts.kind for r in records("no_billboard", 20) for a in r.actors if a.role == "npc"}
@@ -363,7 +363,7 @@ def test_sequences_drive_without_overlaps(scene: str) -> None:
         assert 0 < v < camera.height_px
 
 
-def test_a_busy_sequence_is_driven_until_nobody_overlaps(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_busy_sequence_is_simulated_until_no_actors_overlap(monkeypatch: pytest.MonkeyPatch) -> None:
     """After the eighth who was in the way, it was the ego car that could not drive."""
     rehearse, clashes = SequenceSimulator._simulate_once, 0
 

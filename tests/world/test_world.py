@@ -74,7 +74,7 @@ def test_instances_share_meshes_and_materials() -> None:
     assert world.model.nmesh == 1, "the only mesh is the truck's face"
 
 
-def test_instances_wear_number_plates_by_turns() -> None:
+def test_instances_have_different_number_plates() -> None:
     root = mjcf.RootElement(model="town")
     car = AssetFile(MJCF / "vehicles" / "car_city.xml")
     parts = AssetInstances(root, {car: split_asset(car)})
@@ -211,7 +211,7 @@ def test_rain_wets_ground_that_has_a_colour_of_its_own(tmp_path: Path) -> None:
     assert wet.material("asphalt").rgba[0] == pytest.approx(0.55 * dry.material("asphalt").rgba[0])
 
 
-def test_unknown_names_are_told_with_what_was_meant() -> None:
+def test_errors_about_unknown_names_suggest_the_right_one() -> None:
     scenes = tiny_scenes().scenes
     with pytest.raises(UnknownNameError, match="no town named 'twon10'"):
         World.build(town="twon10", scene_name="board", scene=scenes["board"], weather=CLEAR)
@@ -284,7 +284,7 @@ def test_placing_again_leaves_nothing_behind() -> None:
     assert 2 not in again.geoms.object_id
 
 
-def test_faces_show_what_they_are_told() -> None:
+def test_surfaces_show_the_given_patches() -> None:
     world = tiny_world("double")
     patch = np.zeros((3, 5, 3), np.uint8)
     patch[0, 0] = (255, 0, 0)

@@ -125,7 +125,7 @@ def reach_a_limit(kind: str, indices: Iterator[int], report: Report) -> None:
         ("odd", GearError, "^OddError: it broke$"),
     ],
 )
-def test_an_error_that_is_not_of_an_item_ends_the_run_as_itself(kind: str, error: type[Exception], said: str) -> None:
+def test_an_error_that_belongs_to_no_item_ends_the_run_unchanged(kind: str, error: type[Exception], said: str) -> None:
     with pytest.raises(error, match=said) as caught:
         ran(partial(reach_a_limit, kind), 2)
     if kind == "files":

@@ -167,9 +167,7 @@ def change_files(path: Path, change: dict[str, str]) -> None:
         "croissant.json",
     ],
 )
-def test_a_sidecar_that_names_a_file_of_nobodys_sample_is_refused(
-    halves: list[Path], tmp_path: Path, place: str
-) -> None:
+def test_a_sidecar_that_names_a_file_of_no_sample_is_refused(halves: list[Path], tmp_path: Path, place: str) -> None:
     victim = tmp_path / "victim.png"
     victim.write_bytes(b"mine")
     data = b"mine"

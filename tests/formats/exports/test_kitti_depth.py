@@ -60,7 +60,7 @@ def test_a_driving_split_is_a_drive_a_sequence(tmp_path: Path) -> None:
     assert "val/2022_01_01_drive_0002_sync/proj_depth/groundtruth/image_02/0000000000.png" in names
 
 
-def test_single_pictures_are_one_drive_whatever_their_sequence_and_train_has_a_pool_of_its_own(tmp_path: Path) -> None:
+def test_single_pictures_are_one_drive_and_train_has_its_own_pool(tmp_path: Path) -> None:
     val = written(tmp_path, depth, {"width_px": 408, "height_px": 124})
     a, b = (sidecar.record for sidecar in val.sidecars)
     for folder in ("leftImg8bit", "gtFine"):

@@ -104,7 +104,7 @@ def test_heads_are_weighed() -> None:
 
 @pytest.mark.parametrize("align_corners", [False, True])
 @pytest.mark.parametrize("size_px", [(24, 40), (25, 41)])
-def test_sampled_logits_are_those_of_the_whole_picture_at_the_pixels_of_the_sampled_ids(
+def test_sampled_logits_equal_those_of_the_whole_picture_at_the_sampled_pixels(
     align_corners: bool, size_px: tuple[int, int]
 ) -> None:
     maps = torch.rand(4, 3, 5, 7, generator=torch.Generator().manual_seed(0))

@@ -38,7 +38,7 @@ def test_steering_is_straight_on_a_straight_road_and_that_of_the_circle_on_a_ben
     assert steering(bend(50.0)) == pytest.approx(math.atan(CAR.wheelbase_m / 50.0), rel=0.03)
 
 
-def test_below_the_time_to_collision_the_car_brakes_as_hard_as_it_can_until_it_stands() -> None:
+def test_below_the_limit_of_time_to_collision_the_car_brakes_fully_until_it_stops() -> None:
     driver = Truth(BaselineConfig())
     thing = Thing(parts=CAR_PARTS, position_m=(2.3 + 2.1 + 15.0, 0.0, 0.0), object_id=2, role="npc")
     hard = []

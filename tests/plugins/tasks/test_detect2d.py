@@ -108,7 +108,7 @@ class TestDetect2d(TaskContract):
             evaluation.summarize()
         assert evaluation.stats[0] == pytest.approx(1.0)
 
-    def test_half_an_iou_is_scored_as_by_hand(self) -> None:
+    def test_a_detection_with_iou_half_has_the_value_computed_by_hand(self) -> None:
         # Boxes shrunk to 82 % of their width have IoU 0.82: right at 0.50, .55, …, .80 and wrong at .85, .90, .95.
         task, sample = self.task(), self.sample()
         evaluator = task.evaluator()

@@ -55,7 +55,7 @@ def bad(what: str) -> AttackSpec[Any]:
     return AttackSpec(name="bad", summary="Bad.", config=Nothing, build=lambda config: Bad(what))
 
 
-def test_notes_that_somebody_changed_are_one_line(small: Small, install: Install, tmp_path: Path) -> None:
+def test_a_damaged_attack_file_is_one_line(small: Small, install: Install, tmp_path: Path) -> None:
     data, out = small(), tmp_path / "patches"
     attack(data, model="tiny_segmenter", out=out, steps=2, settings=SMALL)
     path = out / "attack.json"
@@ -452,9 +452,7 @@ class Misnaming(TinySegmenter):
         return {"classes": super().forward(views)["logits"]}
 
 
-def test_a_network_without_the_output_that_attacks_need_is_told_so(
-    small: Small, install: Install, tmp_path: Path
-) -> None:
+def test_a_network_without_the_output_for_attacks_is_an_error(small: Small, install: Install, tmp_path: Path) -> None:
     install(dataclasses.replace(tiny_segmenter, build=Misnaming))
     with pytest.raises(GearError, match=r"works on the output 'logits', and the network gives classes"):
         attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=1, settings=SMALL)
@@ -466,7 +464,7 @@ class Foreign(TinySegmenter):
 
 
 @pytest.mark.parametrize("setting", ["gamma=-1", "gamma=0.5", "target=road"])
-def test_a_network_of_other_classes_is_told_so(small: Small, install: Install, tmp_path: Path, setting: str) -> None:
+def test_a_network_with_other_classes_is_an_error(small: Small, install: Install, tmp_path: Path, setting: str) -> None:
     install(dataclasses.replace(tiny_segmenter, build=Foreign))
     with pytest.raises(GearError, match="19 train ids or 34 label ids, and the network gives 21 classes"):
         attack(small(), model="tiny_segmenter", out=tmp_path / "p", steps=1, settings=[*SMALL, setting])

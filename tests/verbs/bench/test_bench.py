@@ -179,7 +179,7 @@ def test_a_step_that_fails_says_which(tmp_path: Path, written: Callable[..., Pat
     assert not (out / "bench.json").exists()
 
 
-def test_what_lies_in_the_way_is_told_without_a_flag_that_bench_has_not(
+def test_existing_files_are_an_error_without_advice_to_use_force(
     tmp_path: Path, written: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def in_the_way(**arguments: Any) -> None:

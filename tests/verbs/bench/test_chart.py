@@ -32,7 +32,7 @@ def test_bars_without_an_interval_have_no_whisker() -> None:
     assert [whiskers(sure, sure), whiskers(sure, bare), whiskers(bare, bare)] == [2, 1, 0]
 
 
-def test_what_nobody_measured_is_a_chart_without_bars() -> None:
+def test_a_chart_without_results_has_no_bars() -> None:
     missing = Estimate(value=float("nan"))
     assert whiskers(missing, missing) == 0
 

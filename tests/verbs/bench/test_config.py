@@ -192,7 +192,7 @@ def test_towns_scenes_are_those_that_show_patches(tmp_path: Path, written: Writt
     assert "billboard01" in names and "truck" in names and "no_billboard" not in names and len(names) == 10
 
 
-def test_networks_that_reckon_with_another_camera_are_told_before_anything_is_rendered(
+def test_networks_for_another_camera_are_an_error_before_rendering(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.undo()

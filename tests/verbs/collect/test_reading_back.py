@@ -77,7 +77,7 @@ def test_a_picture_of_another_size_or_kind_is_named_with_its_remedy(
 
 @pytest.mark.parametrize("task", ["stereo3d", "detect2d"])
 @pytest.mark.parametrize("objects", [None, 3, "x", [{}], [None], float("nan")])
-def test_facts_that_somebody_changed_are_one_line(task: str, objects: Any, tmp_path: Path, copy_small: Copy) -> None:
+def test_damaged_facts_are_one_line(task: str, objects: Any, tmp_path: Path, copy_small: Copy) -> None:
     copy_small(task, tmp_path)
     path = tmp_path / "gear/debug/samples/000000.json"
     sidecar = json.loads(path.read_text())

@@ -63,7 +63,7 @@ def test_bad_input_gets_one_line_and_leaves_nothing(
         ("patch: nowhere.png", r"c.yml:2:8: patch: patch nowhere.png: is not there"),
     ],
 )
-def test_a_name_in_a_file_is_told_with_its_line(line: str, message: str, tmp_path: Path) -> None:
+def test_an_unknown_name_in_a_file_is_an_error_with_its_line(line: str, message: str, tmp_path: Path) -> None:
     """A flag that gives another one is named as a flag's is: without a place."""
     key = line.partition(":")[0]
     usual = {"task": "depth", "town": str(TINY_TOWN), "scenes": str(TINY_SCENES), "scene": "board"}

@@ -48,7 +48,7 @@ def reach(sample: Any, camera: str, margin_px: int = 2) -> np.ndarray:
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_task_is_collected_read_back_and_scores_itself_perfect(
+def test_ground_truth_of_a_task_is_read_back_and_has_a_perfect_metric(
     task: str, tmp_path: Path, collect_small: Collect
 ) -> None:
     report = collect_small(task, tmp_path / "out")

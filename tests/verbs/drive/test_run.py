@@ -144,7 +144,7 @@ def test_scenarios_without_a_place_are_listed_and_do_not_fail_the_study(config: 
         gear.drive(config, out=tmp_path / "none", settings=[*settings, "scenarios={cut_in: [40]}"])
 
 
-def test_drives_that_no_worker_has_begun_are_told_from_those_of_another_run() -> None:
+def test_drives_without_a_worker_are_distinguished_from_those_of_another_run() -> None:
     assert _problem(None).startswith("not begun")
     assert _problem(Outcome(index=0, kind="elsewhere")).startswith("another run is making it")
     assert _problem(Outcome(index=0, kind="failed", error="broken")) == "broken"

@@ -109,7 +109,7 @@ def test_it_is_taken_up_again_and_predicts_nothing_twice(
 
 
 @pytest.mark.parametrize("damage", ["note", "half", "key", "prediction"])
-def test_a_sample_whose_result_is_damaged_is_predicted_again_and_that_is_told(
+def test_a_damaged_result_is_predicted_again_with_a_warning(
     tmp_path: Path, small: Small, install: Install, capsys: pytest.CaptureFixture[str], damage: str
 ) -> None:
     data = small("depth")
@@ -353,7 +353,7 @@ class CameraConfig(Config):
     baseline_m: float = 0.54
 
 
-def test_a_model_that_reckons_with_another_camera_is_refused(tmp_path: Path, small: Small, install: Install) -> None:
+def test_a_model_for_another_camera_is_refused(tmp_path: Path, small: Small, install: Install) -> None:
     data = small("stereo3d")
     install(replace(model_spec(lambda _: Oracle([data]), "stereo3d"), config=CameraConfig))
     for name, value, taken in (("baseline_m", "0.3", "0.54"), ("hfov_deg", "60", "90")):

@@ -140,7 +140,7 @@ def test_what_does_not_suit_is_said_before_anything_is_rendered(pair: tuple[Path
     assert not (tmp_path / "gap").exists()
 
 
-def test_a_split_without_probes_is_told_before_its_twin_is_rendered(tmp_path: Path, copy_small: Copy) -> None:
+def test_a_split_without_probes_is_an_error_before_its_twin_is_rendered(tmp_path: Path, copy_small: Copy) -> None:
     copy_small("semseg", tmp_path / "clean")
     places: dict[str, Any] = {"town": TINY_TOWN, "scenes": TINY_SCENES, "out": tmp_path / "gap", "patch": "random"}
     with pytest.raises(DatasetError, match="has no probes"):
@@ -202,7 +202,7 @@ def test_the_twin_of_another_gap_stays(pair: tuple[Path, Path], tmp_path: Path) 
         gear.gap(pair[0], patch=tmp_path / "grey.png", **places)
 
 
-def test_the_twin_of_somebodys_own_town_is_rendered_too(pair: tuple[Path, Path], tmp_path: Path) -> None:
+def test_the_twin_of_a_users_town_is_rendered(pair: tuple[Path, Path], tmp_path: Path) -> None:
     """As much of it as is looked at: a later look at more completes it, one at less takes it as it is."""
     clean, twin = pair
     places: dict[str, Any] = {"town": TINY_TOWN, "scenes": TINY_SCENES, "out": tmp_path / "gap"}

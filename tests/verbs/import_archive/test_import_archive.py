@@ -254,7 +254,7 @@ def test_odd_kinds_in_zip_archives(root: Path, tmp_path: Path, mode: int, proble
     assert nothing_left(tmp_path)
 
 
-def test_damaged_headers_are_told_in_words(root: Path, tmp_path: Path) -> None:
+def test_damaged_headers_are_one_line(root: Path, tmp_path: Path) -> None:
     header = tarfile.TarInfo("x")
     header.type, header.size = tarfile.XHDTYPE, 10
     block = header.tobuf(tarfile.USTAR_FORMAT) + b"10 a=bcde\n".ljust(512, b"\0")

@@ -59,7 +59,7 @@ def test_bad_names_get_one_line_and_no_files(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["spec", "build", "hookimpl", "gear_defenses"])
-def test_words_of_the_package_itself_are_refused(name: str, tmp_path: Path) -> None:
+def test_reserved_names_of_the_package_are_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(GearError, match=f"'{name}' is a word of every plugin package's; choose another, such as my_"):
         new_package("defense", name, out=tmp_path)
 

@@ -45,7 +45,7 @@ def test_town10_is_listed_with_its_scenes() -> None:
     assert town.scenes is not None and {f"billboard0{n}" for n in range(1, 10)} < set(town.scenes.scenes)
 
 
-def test_what_is_asked_for_wrongly_is_told(tmp_path: Path) -> None:
+def test_unknown_arguments_are_errors(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="did you mean town10"):
         read_town("town1O")
     with pytest.raises(UnknownNameError, match=r"nowhere\.yml"):

@@ -26,7 +26,7 @@ def test_thumbnails_repeat_and_follow_the_seed(tiny: Town) -> None:
     assert first[20:80, 20:160].std() > 10
 
 
-def test_a_scene_without_a_place_is_told_and_the_others_are_drawn(tiny: Town) -> None:
+def test_a_scene_without_a_place_is_reported_and_the_others_are_drawn(tiny: Town) -> None:
     town = only(tiny, "board", "truck")
     assert town.scenes is not None
     board = town.scenes.scenes["board"]

@@ -46,7 +46,7 @@ def test_a_trunk_with_whole_weights_keeps_its_statistics_and_first_layers(
 
 
 @pytest.mark.parametrize(("name", "is_told"), [("retinanet_r50_fpn", True), ("retinanet_r18_fpn", False)])
-def test_a_part_that_would_stay_random_for_ever_is_told_of(name: str, is_told: bool) -> None:
+def test_a_part_that_would_keep_random_weights_is_reported(name: str, is_told: bool) -> None:
     found = find("model", name)
     assert isinstance(found.spec, ModelSpec)
     model = build_network(found, read_config(found.spec.recipe, {}, ()), precision="float32")

@@ -105,7 +105,7 @@ def test_weights_of_another_training_are_not_taken_for_its_own(
         quick(street, out)
 
 
-def test_that_the_best_weights_are_gone_is_told_before_the_training_goes_on(
+def test_missing_best_weights_are_an_error_before_training_continues(
     street: Street, tmp_path: Path, install: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out, told = tmp_path / "out", list[int]()

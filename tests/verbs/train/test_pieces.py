@@ -173,7 +173,7 @@ class Growing(Numbers):
         return Numbered(images={"left": np.zeros((32, 32 + index, 3), np.uint8)}, number=index)
 
 
-def test_pictures_that_make_no_batch_are_told_with_what_helps() -> None:
+def test_pictures_that_fit_no_batch_are_an_error_with_advice() -> None:
     with pytest.raises(GearError, match=r"'left' of a batch must have one size, got .*; say --set crop_px=\[HEIGHT"):
         next(Feed(Growing(3), plain(), ("left",)).from_position(Position()))
 

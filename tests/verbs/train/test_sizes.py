@@ -117,7 +117,7 @@ def test_validation_and_weights_know_of_smaller_pictures(street: Street, scaled:
     assert len(said) == 1 and "0.5 of their size; --set picture_scale=1" in said[0]
 
 
-def test_pictures_of_several_sizes_are_told_of(scaled: None) -> None:
+def test_pictures_of_several_sizes_are_an_error(scaled: None) -> None:
     """Weights of one size say at which share they are to be used; of several, there is no such share."""
 
     def note(name: str, *widths: int, settings: tuple[str, ...] = ()) -> str:

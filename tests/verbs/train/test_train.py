@@ -165,7 +165,7 @@ def test_damaged_work_is_said_in_a_line(street: Street, tmp_path: Path, install:
     assert quick(street, tmp_path / "out").metrics == first.metrics
 
 
-def test_a_checkpoint_that_somebody_changed_is_said_in_a_line(street: Street, tmp_path: Path, install: Any) -> None:
+def test_a_damaged_checkpoint_is_one_line(street: Street, tmp_path: Path, install: Any) -> None:
     quick(street, tmp_path / "out")
     checkpoint = tmp_path / "out" / "checkpoint.safetensors"
     with safe_open(str(checkpoint), framework="pt") as opened:
@@ -286,7 +286,7 @@ def test_what_cannot_be_trained_is_said_in_a_line(street: Street, tmp_path: Path
     assert not out.exists()
 
 
-def test_it_begins_with_what_it_is_told(street: Street, tmp_path: Path, install: Any) -> None:
+def test_training_starts_with_the_given_weights(street: Street, tmp_path: Path, install: Any) -> None:
     first = quick(street, tmp_path / "first", epochs=4, lr=0.02)
     second = quick(street, tmp_path / "second", epochs=1, lr=1e-9, init=first.weights, settings=["ema=0"])
     assert second.metrics["miou"] == pytest.approx(first.metrics["miou"], abs=0.05)
@@ -408,7 +408,7 @@ class CameraConfig(TinyConfig):
     hfov_deg: float = 90.0
 
 
-def test_a_network_that_reckons_with_another_camera_is_refused(street: Street, tmp_path: Path, install: Any) -> None:
+def test_a_network_for_another_camera_is_refused(street: Street, tmp_path: Path, install: Any) -> None:
     install(replace(tiny_segmenter, config=CameraConfig))
     with pytest.raises(GearError, match=r"collected with hfov_deg 90, .* 60; say --set options.hfov_deg=90"):
         quick(street, tmp_path / "out", settings=["options.hfov_deg=60"])

@@ -79,7 +79,7 @@ def test_what_does_not_fit_is_refused_and_nothing_is_written(official: dict[str,
         convert_weights("bisenet_x39", out, out)
 
 
-def test_what_a_file_says_of_itself_is_kept_and_options_are_noted(official: dict[str, Path], tmp_path: Path) -> None:
+def test_metadata_of_a_file_is_kept_and_options_are_recorded(official: dict[str, Path], tmp_path: Path) -> None:
     first, second = tmp_path / "a.safetensors", tmp_path / "b.safetensors"
     state = read(_converted(official, tmp_path))[0]
     state = {key: value for key, value in state.items() if not key.startswith(("heads.0", "heads.1"))}

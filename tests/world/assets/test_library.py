@@ -144,7 +144,7 @@ def test_an_asset_is_asked_for_by_a_plain_name(name: str) -> None:
 
 
 @pytest.mark.parametrize("town", ["~nosuchuser/x.xml", "a" * 300, f"/{'a' * 300}/x.xml"])
-def test_a_town_where_nobody_can_look_is_one_line(town: str) -> None:
+def test_an_unreadable_town_is_one_line(town: str) -> None:
     with pytest.raises(UnknownNameError, match=r"\(cannot look there: (Could not determine home|File name too long)"):
         AssetLibrary.for_town(town)
 

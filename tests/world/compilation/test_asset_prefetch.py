@@ -95,7 +95,7 @@ def test_a_broken_mesh_is_named_as_without(town: Path) -> None:
     assert kept_bytes() == 0
 
 
-def test_what_nobody_waits_for_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_assets_that_are_not_requested_are_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(prefetch_module, "_BATCH_BYTES", 1)
     first_ends, read = threading.Event(), []
 

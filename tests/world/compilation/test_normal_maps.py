@@ -223,7 +223,7 @@ def test_a_picture_that_is_colour_too_keeps_its_channels(is_colour_too: bool) ->
     np.testing.assert_array_equal(after[size:], before[size:])
 
 
-def test_bodies_that_are_one_mesh_and_meshes_that_others_wear_too_stay_where_they_are() -> None:
+def test_bodies_of_one_mesh_and_shared_meshes_do_not_move() -> None:
     model = small(
         RELIEF + '<material name="plain" rgba="0.5 0.5 0.5 1"/>',
         '<body mocap="true" pos="1 2 3" quat="0.6 0 0.8 0"><geom type="mesh" mesh="a" material="m" contype="0" '

@@ -54,7 +54,7 @@ def test_a_driver_stops_behind_what_stands() -> None:
     assert 0.5 < gap_m < 5
 
 
-def test_what_stands_beside_the_lane_stops_nobody() -> None:
+def test_objects_beside_the_lane_stop_no_vehicle() -> None:
     parked = vehicle_discs(np.array([0.0, 1.75, 0.0]), 0.0, 2.25, 2.25, 0.9)
     traffic = TrafficSimulation([vehicle(EAST, 5.0, 10.0)], [], parked, Junctions(GRAPH))
     drive(traffic, 10)

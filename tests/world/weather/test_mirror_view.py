@@ -96,7 +96,7 @@ def test_what_is_mirrored_does_not_know_the_patch() -> None:
     assert touched.any() and not (changed & ~touched).any()
 
 
-def test_nobody_looks_from_below_where_it_is_dry_or_night() -> None:
+def test_there_is_no_mirror_view_on_dry_ground_or_at_night() -> None:
     world = build_tiny_world("no_billboard")
     shot = record(world)
     dry = camera_pipeline(PRESETS["ClearNoon"], "classic", "tiny")

@@ -67,7 +67,7 @@ def test_heritage_lamps_shine_to_all_sides() -> None:
     assert np.linalg.norm(globes.position_m[None, :, :2] - posts[:, None], axis=2).min(axis=1).max() < 0.5
 
 
-def test_some_windows_are_lit_the_same_every_night_and_face_away_from_their_houses() -> None:
+def test_the_same_windows_are_lit_every_night_and_face_away_from_their_houses() -> None:
     model, data = compiled("suburb")
     first, again = (find_windows(model, data, derive_rng(0, "windows", "suburb")) for _ in range(2))
     np.testing.assert_array_equal(first.corners_m, again.corners_m)
@@ -122,7 +122,7 @@ def test_lamp_glass_without_a_surface_is_one_line(tmp_path: Path) -> None:
         night_of(world, NIGHT, "classic")
 
 
-def test_what_stands_throws_shadows_and_neither_the_ground_nor_what_drives_or_is_only_felt() -> None:
+def test_static_objects_cast_lamp_shadows_and_ground_actors_and_collision_geoms_do_not() -> None:
     world = tiny_world()
     model, codes = world.model, world.classes.label_code
     data = mujoco.MjData(model)

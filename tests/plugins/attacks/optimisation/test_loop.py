@@ -94,7 +94,7 @@ def test_what_was_cut_off_goes_on_as_if_it_had_not_been() -> None:
     assert {"wrong", "gradient", "smoothness"} <= set(whole.values[0])
 
 
-def test_what_was_felt_before_it_was_cut_off_counts() -> None:
+def test_gradients_before_clipping_count() -> None:
     """One sample in three shows the patch: steps that feel nothing may be all that are left."""
 
     def ascend_at(steps_with_gradient: set[int]) -> Direction:
@@ -249,7 +249,7 @@ def test_a_state_of_an_older_gear_is_refused() -> None:
         run(RecordingMonitor(start=state))
 
 
-def test_a_model_that_passes_no_gradient_is_told_of() -> None:
+def test_a_model_without_gradients_is_an_error() -> None:
     contract = Contract()
     dataset = contract.dataset()
 

@@ -192,7 +192,7 @@ def test_labels_are_train_ids_or_label_ids_as_the_network_has_them() -> None:
 
 
 @pytest.mark.parametrize("objective", [SemsegObjective(), SemsegObjective(gamma=0.5), DepthObjective()])
-def test_what_is_smaller_than_the_picture_is_told_so(objective: Any) -> None:
+def test_outputs_smaller_than_the_picture_are_an_error(objective: Any) -> None:
     class Coarse:
         def forward(self, views: Mapping[str, Tensor], targets: Any = None) -> Mapping[str, Tensor]:
             return {"logits": torch.zeros(1, 19, 2, 4), "depth_m": torch.ones(1, 2, 4)}
