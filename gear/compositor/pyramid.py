@@ -209,11 +209,10 @@ def pyramid_of(height_px: int, width_px: int, halving: Halving = "middles") -> P
     """
     rows = list(axis_matrices(height_px, FACE_SIZE_PX[1], halving))
     columns = list(axis_matrices(width_px, FACE_SIZE_PX[0], halving))
-    # The shorter axis keeps one texel while the longer one is halved further.
-    while len(rows) < len(columns):
-        rows.append(rows[-1])
-    while len(columns) < len(rows):
-        columns.append(columns[-1])
+    levels = max(len(rows), len(columns))
+    for matrices in (rows, columns):
+        # The shorter axis keeps one texel while the longer one is halved further.
+        matrices.extend(matrices[-1:] * (levels - len(matrices)))
     sizes = [(r.shape[0], c.shape[0]) for r, c in zip(rows, columns, strict=True)]
     folded = sum(r >= height_px and c >= width_px for r, c in sizes)
     starts, size = [], height_px * width_px

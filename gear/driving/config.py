@@ -1,4 +1,4 @@
-"""The config of `gear drive`: who drives, where, through which scenarios, and against which patches."""
+"""The config of `gear drive`: controllers, places, scenarios and patches."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Driver:
         if self.defense and not self.model:
             raise FieldError("defense", "protects a network, and the driver has none; name one with `model`")
         if self.patch and not (self.model or self.task):
-            raise FieldError("patch", "is seen by nobody: the driver has no network and no cameras (`model`, `task`)")
+            raise FieldError("patch", "has no effect: the driver has no network and no cameras (`model`, `task`)")
         if set("{}") & set(NAMES.sub("", self.patch)):
             raise FieldError("patch", f"may contain {{town}}, {{scene}} and {{model}}, no other braces: {self.patch!r}")
 

@@ -52,7 +52,7 @@ PASSED_M = 10.0
 
 Ending = Literal["", "crash", "time", "stood", "passed", "off_road"]
 """Why a drive ended: contact, end of its time, a standing car, a person or a red light that was passed, or a car that
-left the road; "" while it goes on.
+left the road; "" while it continues.
 """
 
 
@@ -76,7 +76,7 @@ class Situation:
             after the car has passed the line.
         ran_red_light: whether the car has passed the stop line of a red light.
         crash: the first contact; None without one.
-        ending: why the drive has ended: `crash`, `time`, `stood`, `passed` or `off_road`; "" while it goes on.
+        ending: why the drive has ended: `crash`, `time`, `stood`, `passed` or `off_road`; "" before the end.
     """
 
     frame: int

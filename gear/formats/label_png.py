@@ -49,7 +49,7 @@ def encode_painted(labels: npt.NDArray[np.uint8], rgba: UInt8Image) -> bytes:
     if len(places) > _BUSY_SHARE * labels.size:
         return encode_labels(rgba[labels])
     colours = rgba[own] - rgba[before]
-    # Before the first pixel there is none: black that nobody sees, whatever colour label 0 has.
+    # There is no colour before the first pixel. Black is assumed, so the first change is the whole colour.
     colours[0] = rgba[own[0]]
     return _png(labels.shape, places, colours, _RGBA)
 

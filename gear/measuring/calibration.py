@@ -98,7 +98,7 @@ class Calibration:
         """
         clean, patched, lines = self.clean, self.patched, []
         if clean is not None and self.shows_patch:
-            lines.append(f"{clean.root}: shows the patch {_label(clean)}, which the defense takes for clean")
+            lines.append(f"{clean.root}: shows the patch {_label(clean)}, but the defense uses its pictures as clean")
         if clean is not None and patched is not None and clean.plan.twin_key != patched.plan.twin_key:
             lines.append(f"{patched.root}: is no twin of {clean.root}, so more than a patch differs in what was learnt")
         return lines

@@ -11,7 +11,7 @@ from gear.contracts.tasks import Task
 UP, DOWN = "up is better", "down is better"
 
 FOR_THE_ATTACK = "for the attack"
-"""Addition to a direction in the figures of attacks, whose success is the network's failure."""
+"""Addition to the direction of an attack's metrics; an attack succeeds where the network fails."""
 
 
 def with_direction(name: str, *, lower_is_better: bool | None, whose: str = "") -> str:
@@ -21,7 +21,7 @@ def with_direction(name: str, *, lower_is_better: bool | None, whose: str = "") 
         name: name of the curve.
         lower_is_better: whether lower values are better; None leaves the name as it is, for curves without a better
             direction, such as a learning rate.
-        whose: for whom the direction is better, such as `for the attack`; "" for nobody in particular.
+        whose: addition that names the side for which the direction is better, such as `for the attack`; "" for none.
     """
     if lower_is_better is None:
         return name

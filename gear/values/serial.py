@@ -75,7 +75,7 @@ def from_json(kind: type[T], value: Json, where: str = "") -> T:
 
 
 def _read(kind: Any, value: Json, where: str) -> Any:
-    if type(value) is kind:  # most of what there is: numbers and words
+    if type(value) is kind:  # most values are numbers and texts
         return value
     origin = get_origin(kind)
     if kind is Any:

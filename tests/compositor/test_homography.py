@@ -129,3 +129,13 @@ def test_a_lens_bends_what_is_pasted_as_it_bends_the_board(twins: MakeTwins) -> 
     u, v, w = np.einsum("ij,jhw->ihw", np.linalg.inv(truth), np.stack([x, y, np.ones_like(x)]))
     unbent = (w > 0) & (abs(u / w - 0.5) <= 0.5) & (abs(v / w - 0.5) <= 0.5)
     assert (unbent & seen).sum() < 0.8 * (unbent | seen).sum()
+
+
+def test_the_memory_of_a_prepared_sample_is_that_of_its_tensors() -> None:
+    compositor = HomographyCompositor([sample_of(board(14.0))])  # type: ignore[arg-type]
+    prepared = compositor._load(0, "left", ((4, 8),))
+    inner = prepared.inner
+    tensors = [prepared.picture, prepared.where, inner.background, *inner.covers]
+    parts = [tensor.numel() * tensor.element_size() for tensor in tensors]
+    assert prepared.nbytes == sum(parts) + inner.matrices[0].nbytes
+    assert all(parts)

@@ -87,6 +87,26 @@ def test_a_sample_reads_what_the_face_would_show(size: tuple[int, int], level: f
         assert found[0] == pytest.approx(wanted, abs=2e-5)
 
 
+def test_patches_of_a_batch_are_spread_like_single_patches() -> None:
+    patches = torch.rand((2, 3, 37, 75), generator=torch.Generator().manual_seed(0))
+    pyramid = pyramid_of(37, 75)
+    together = pyramid.spread(patches)
+    assert together.shape == (2, pyramid.size, 3)
+    for patch, texels in zip(patches, together, strict=True):
+        assert torch.equal(texels, pyramid.spread(patch))
+
+
+@pytest.mark.parametrize(("size", "stored"), [((150, 300), 3), ((149, 300), 3), ((150, 299), 3), ((4, 4), 8)])
+def test_levels_at_least_as_fine_as_the_patch_are_not_stored(size: tuple[int, int], stored: int) -> None:
+    """The levels have (600, 1200), (300, 600), (150, 300), (75, 150), ... texels."""
+    shapes = [(max(1, 600 >> level), 1200 >> level) for level in range(11)]
+    pyramid = pyramid_of(*size)
+    assert [pyramid.shape(level) for level in range(pyramid.levels)] == shapes
+    assert pyramid.size == size[0] * size[1] + sum(h * w for h, w in shapes[stored:])
+    assert pyramid.starts[:stored] == (0,) * stored
+    assert pyramid.starts[stored] == size[0] * size[1]
+
+
 def test_products_carry_gradients_back() -> None:
     from scipy import sparse
 

@@ -153,9 +153,9 @@ def test_attacks_and_gaps_warn_of_a_doubtful_calibration(
         small(), model="tiny_segmenter", out=tmp_path / "p", attack="square", queries=4,
         settings=["height_px=12", "width_px=24"], **behind,
     )  # fmt: skip
-    assert len(told) == 1 and "shows the patch random, which the defense takes for clean" in told.pop()
+    assert len(told) == 1 and "shows the patch random, but the defense uses its pictures as clean" in told.pop()
     gear.gap(small(split="val"), twin=patched, model="tiny_segmenter", compositors=("transport",), **behind)
-    assert len(told) == 2 and "takes for clean" in told[0] and "learnt from scenes that it is measured on" in told[1]
+    assert len(told) == 2 and "pictures as clean" in told[0] and "learnt from scenes that it is measured on" in told[1]
 
 
 def test_what_learnt_from_more_samples_is_another_defense(small: Small, learner: list[Learner], tmp_path: Path) -> None:
@@ -200,9 +200,9 @@ def test_swapped_calibration_datasets_give_a_warning(
         evaluate(small(), calibration=patched, calibration_patched=clean, out=tmp_path / "out", **asked)
     assert not learner and not (tmp_path / "out").exists()
     right = evaluate(small(), calibration=clean, calibration_patched=patched, out=tmp_path / "right", **asked)
-    assert not any("takes for clean" in note or "no twin" in note for note in right.facts["notes"])
+    assert not any("uses its pictures as clean" in note or "no twin" in note for note in right.facts["notes"])
     bold = evaluate(small(), calibration=patched, calibration_patched=patched, out=tmp_path / "bold", **asked)
-    assert any("shows the patch random, which the defense takes for clean" in one for one in bold.facts["notes"])
+    assert any("shows the patch random, but the defense" in one for one in bold.facts["notes"])
     other = tmp_path / "other"
     copy_small("semseg", other, split="val", patch="random", seed=5)
     mixed = evaluate(small(), calibration=clean, calibration_patched=other, out=tmp_path / "mixed", **asked)

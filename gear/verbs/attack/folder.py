@@ -41,7 +41,7 @@ NAME = re.compile(r"patch_\d+")
 
 BROKEN = "is gone, damaged or of other patches"
 
-TOLD: Any = {
+READ_BACK: Any = {
     "steps_done": int, "steps_per_s": float | None, "stopped": str, "gradient_check": dict[str, float] | None,
     "patches": dict[str, str],
 }  # fmt: skip
@@ -158,7 +158,7 @@ def _check_whole(root: Path, notes: Json) -> None:
         ReplaceableError: a field or a picture is missing, or a picture was changed.
     """
     try:
-        for key, kind in TOLD.items():
+        for key, kind in READ_BACK.items():
             from_json(kind, notes[key], key)
         if notes["gradient_check"] is not None:
             for key in ("predicted_change", "measured_change"):

@@ -36,18 +36,18 @@ def metric_records(report: BenchReport) -> Iterator[dict[str, Json]]:
     scenes = scenes_of(report)
     for task in report.tasks:
         for one in task.results:
-            who = {"task": task.name, "model": one.model, "defense": one.defense or ""}
+            keys = {"task": task.name, "model": one.model, "defense": one.defense or ""}
             for pool in one.evaluation.pools:
-                yield from _of(who, ALL, pool.name, pool, pool.differences, {})
+                yield from _of(keys, ALL, pool.name, pool, pool.differences, {})
                 yield from _detections(
-                    {**who, "scene": ALL, "patch": pool.name}, pool.samples, detection_rates(one, pool)
+                    {**keys, "scene": ALL, "patch": pool.name}, pool.samples, detection_rates(one, pool)
                 )
                 for place, (name, scene) in enumerate(zip(pool.rows, scenes, strict=True)):
                     row = next(each for each in one.evaluation.rows if each.name == name)
                     found = tuple(each for each in one.evaluation.differences if each.row == name)
-                    yield from _of(who, scene, pool.name, row, found, _patches(one))
+                    yield from _of(keys, scene, pool.name, row, found, _patches(one))
                     rates = detection_rates(one, pool, place)
-                    yield from _detections({**who, "scene": scene, "patch": pool.name}, row.samples, rates)
+                    yield from _detections({**keys, "scene": scene, "patch": pool.name}, row.samples, rates)
 
 
 def _patches(one: Result) -> dict[str, str]:
@@ -56,14 +56,14 @@ def _patches(one: Result) -> dict[str, str]:
 
 
 def _of(
-    who: Mapping[str, Json],
+    keys: Mapping[str, Json],
     scene: str,
     patch: str,
     found: RowReport | Pool,
     differences: tuple[Difference, ...],
     kinds: Mapping[str, str],
 ) -> Iterator[dict[str, Json]]:
-    at = {**who, "scene": scene, "patch": patch, "samples": found.samples}
+    at = {**keys, "scene": scene, "patch": patch, "samples": found.samples}
     yield from _estimates({**at, "quantity": "value"}, found.metrics)
     for name, mean in known_json(found.defense).items():
         yield {**at, "quantity": "mask", "metric": name, "value": mean}
@@ -82,10 +82,10 @@ def _of(
 
 def _detections(at: Mapping[str, Json], samples: int, rates: tuple[DetectionRate, ...]) -> Iterator[dict[str, Json]]:
     for one in rates:
-        who = {**at, "samples": samples, "metric": one.title}
+        keys = {**at, "samples": samples, "metric": one.title}
         test = {} if one.p is None else {"against": RANDOM, **known_json({"p": one.p})}
-        yield {**who, "quantity": "detection", **_estimate(one.found), **test}
-        yield {**who, "quantity": "false alarms", **_estimate(one.false_alarms)}
+        yield {**keys, "quantity": "detection", **_estimate(one.found), **test}
+        yield {**keys, "quantity": "false alarms", **_estimate(one.false_alarms)}
 
 
 def _estimates(at: Mapping[str, Json], metrics: Metrics) -> Iterator[dict[str, Json]]:

@@ -93,10 +93,10 @@ def _table(task: TaskResult) -> str:
     rows, before = [], ("", "")
     titles, *every = columns(task)
     for cells in every:
-        who = (cells[0], cells[1])
-        shown = cells if who != before else ["", "", *cells[2:]]
-        rows.append((who != before, shown))
-        before = who
+        network = (cells[0], cells[1])
+        shown = cells if network != before else ["", "", *cells[2:]]
+        rows.append((network != before, shown))
+        before = network
     return html_table(titles, rows)
 
 

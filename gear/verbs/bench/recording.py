@@ -138,8 +138,8 @@ def guard_of(plan: Plan, planned: PlannedEvaluation) -> Guard | None:
 def reduced(plan: Plan, planned: PlannedEvaluation) -> Json:
     """The bench config with only one network and its defense, as JSON without folders of this machine.
 
-    Paths keep only their last part: a town's file becomes its name, a scene of a file the bare name of the scene. Who
-    checks the record says where such files are on his machine.
+    Paths keep only their last part: a town's file becomes its name, a scene of a file the bare name of the scene. A
+    check of the record gets the places of these files as arguments.
 
     Args:
         plan: plan of the benchmark.

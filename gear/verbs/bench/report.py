@@ -225,17 +225,17 @@ class BenchReport:
         """
         for task in self.tasks:
             for one in task.results:
-                who = {"task": task.name, "model": one.model, "defense": one.defense or ""}
+                keys = {"task": task.name, "model": one.model, "defense": one.defense or ""}
                 metric = "" if task.metric is None else task.metric.title
                 for pool in one.evaluation.pools:
                     where = {"scene": "all", "weather": "all", "patch": pool.name, "samples": pool.samples}
                     value, against = task.value(pool), one.against(pool)
                     if value is not None:
-                        yield {**who, **where, "metric": metric, **value.as_json()}
+                        yield {**keys, **where, "metric": metric, **value.as_json()}
                     if against is not None and against.objects is not None:
                         for name, count in against.objects.counts.items():
                             title = metric_title(OBJECTS, name)
-                            yield {**who, **where, "metric": title, **count.rate.as_json(), "against": against.against}
+                            yield {**keys, **where, "metric": title, **count.rate.as_json(), "against": against.against}
                 for at in one.scenes:
                     where = {"scene": at.scene, "weather": at.weather, "patch": at.patch, "samples": at.samples}
-                    yield {**who, **where, "metric": metric, **at.value.as_json()}
+                    yield {**keys, **where, "metric": metric, **at.value.as_json()}

@@ -68,8 +68,8 @@ class Point:
         """Returns the point as a flat record: task, metric, network, defense, kind of patch and value, and over the
         seeds their number (`seeds`), `mean` and `std`.
         """
-        who = {name: getattr(self, name) for name in COLUMNS[:6]}
-        return {**who, "seeds": len(self.metrics), "mean": self.mean, "std": self.std}
+        keys = {name: getattr(self, name) for name in COLUMNS[:6]}
+        return {**keys, "seeds": len(self.metrics), "mean": self.mean, "std": self.std}
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -84,7 +84,7 @@ def auroc(losses: Sequence[MetricLoss]) -> float | None:
         losses: drives of one driver.
 
     Returns:
-        The share (the area under the ROC curve); None if all drives ended alike.
+        The share (the area under the ROC curve); None if all drives ended in the same way.
     """
     crashed = [one.lost for one in losses if one.is_crash]
     others = [one.lost for one in losses if not one.is_crash]

@@ -84,7 +84,7 @@ def foretold(report: DriveReport) -> list[str]:
     lines = []
     for driver, losses in report.losses().items():
         found = auroc(losses)
-        value = "no figure, because all drives ended alike" if found is None else f"{found:.2f}"
+        value = "no value, because all drives ended in the same way" if found is None else f"{found:.2f}"
         crashed = sum(one.is_crash for one in losses)
         lines.append(
             f"{driver}: {losses[0].metric} lost by the patch predicts crashes: {value} ({len(losses)} drives with a"

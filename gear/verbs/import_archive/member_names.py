@@ -24,7 +24,7 @@ class MemberNames:
     """The paths of an archive's members, of which no two may be the same file on any file system."""
 
     def __init__(self, archive: Path) -> None:
-        """Begins with an archive without members.
+        """Starts without members.
 
         Args:
             archive: path of the archive, for messages.

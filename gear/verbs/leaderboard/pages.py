@@ -182,11 +182,11 @@ def _notes(table: Table) -> str:
 
 def _row_notes(row: Row) -> Iterable[str]:
     entry = row.first.record.entry
-    who = f"{named(entry.network)} with {named(entry.defense)}"
-    yield from (f"{who}: not ranked, because {line}" for line in row.faults)
-    yield from (f"{who}: flag: {line}" for line in row.warnings)
+    pair = f"{named(entry.network)} with {named(entry.defense)}"
+    yield from (f"{pair}: not ranked, because {line}" for line in row.faults)
+    yield from (f"{pair}: flag: {line}" for line in row.warnings)
     if row.waiting:
-        yield f"{who}: {len(row.waiting)} attack(s) of others wait for a check"
+        yield f"{pair}: {len(row.waiting)} attack(s) of others wait for a check"
 
 
 def _titled(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -96,7 +96,7 @@ def _lighting_in_process(weather: Weather) -> Callable[[], Lighting] | None:
 
 
 def _exit_with_parent() -> None:
-    """Ends this process when its parent has ended, for example because it was killed; nobody would use the result."""
+    """Ends this process when its parent has ended, for example because it was killed; the result would not be used."""
     while os.read(0, 1):
         pass
     os._exit(1)

@@ -60,8 +60,8 @@ def test_a_damaged_attack_file_is_one_line(small: Small, install: Install, tmp_p
     attack(data, model="tiny_segmenter", out=out, steps=2, settings=SMALL)
     path = out / "attack.json"
     notes = json.loads(path.read_text())
-    changed: list[Any] = [{key: value for key, value in notes.items() if key != gone} for gone in folder.TOLD]
-    changed += [notes | {key: [None]} for key in folder.TOLD] + [
+    changed: list[Any] = [{key: value for key, value in notes.items() if key != gone} for gone in folder.READ_BACK]
+    changed += [notes | {key: [None]} for key in folder.READ_BACK] + [
         notes | {"gradient_check": {}},
         notes | {"patches": None},
     ]
