@@ -171,10 +171,10 @@ class RenderTarget:
         handle = int(frame[0])
         colour = 0
         if colour_format is not None:
-            colour = _plain_texture(width, height, colour_format)
+            colour = plain_texture(width, height, colour_format)
             GL.glNamedFramebufferTexture(handle, GL.GL_COLOR_ATTACHMENT0, colour, 0)
         if depth is None:
-            depth = _plain_texture(width, height, GL.GL_DEPTH_COMPONENT32F)
+            depth = plain_texture(width, height, GL.GL_DEPTH_COMPONENT32F)
         if depth:
             GL.glNamedFramebufferTexture(handle, GL.GL_DEPTH_ATTACHMENT, depth, 0)
         return RenderTarget(handle, colour, depth, width, height)
@@ -257,30 +257,6 @@ def upload_table(content: npt.NDArray[Any]) -> int:
     return texture
 
 
-class Mask:
-    """A texture with one byte per pixel for a mask that changes from frame to frame; `upload` replaces all of it."""
-
-    def __init__(self, width: int, height: int) -> None:
-        """Makes the texture in the current context; its content is undefined until `upload`.
-
-        Args:
-            width, height: size in pixels.
-        """
-        self._size = (width, height)
-        self.handle = _plain_texture(width, height, GL.GL_R8)
-
-    def upload(self, content: npt.NDArray[np.uint8]) -> None:
-        """Replaces the content of the texture by (height, width) uint8 values; shaders read them as 0..1.
-
-        Args:
-            content: (height, width) uint8, row 0 first.
-        """
-        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
-        GL.glTextureSubImage2D(
-            self.handle, 0, 0, 0, *self._size, GL.GL_RED, GL.GL_UNSIGNED_BYTE, np.ascontiguousarray(content)
-        )
-
-
 def shadow_map(width: int, height: int) -> int:
     """Makes a depth texture with comparison for shadows. Returns its OpenGL name.
 
@@ -313,7 +289,13 @@ def free_textures(textures: list[int]) -> None:
     GL.glDeleteTextures(len(textures), np.array(textures, np.uint32))
 
 
-def _plain_texture(width: int, height: int, kept_as: int) -> int:
+def plain_texture(width: int, height: int, kept_as: int) -> int:
+    """Makes a texture without mip levels, which is read without filtering. Returns its OpenGL name.
+
+    Args:
+        width, height: size in pixels.
+        kept_as: OpenGL's internal format.
+    """
     texture = _texture(GL.GL_TEXTURE_2D)
     GL.glTextureStorage2D(texture, 1, kept_as, width, height)
     for name in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):

@@ -22,6 +22,7 @@ from gear.render.pinhole import FAR_M, NEAR_M, Frustum, depth_from_reversed
 from gear.render.raster import gl
 from gear.render.raster.lights import lights_of
 from gear.render.raster.many_samples import LOD_BIAS, at_contrasts, at_edges_and_faces
+from gear.render.raster.pixel_mask import PixelMask
 from gear.render.raster.scene import Scene, Selection
 from gear.render.raster.sun_shadows import SunShadows
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, IdImage, UInt16Image
@@ -62,10 +63,10 @@ class RasterRenderer:
         self._geom_of_piece = np.append(self._scene.geom_of_piece, -1).astype(np.int32)
         self._ids_program = gl.Program("positions.vert", "ids.frag")
         self._sky_program = gl.Program("fullscreen.vert", "sky.frag")
-        self._downsample_program = gl.Program("fullscreen.vert", "downsample.frag")
-        self._open_program = gl.Program("fullscreen.vert", "open_samples.frag")
+        self._downsample_program = gl.Program("tiles.vert", "downsample.frag")
+        self._open_program = gl.Program("tiles.vert", "open_samples.frag")
         self._shadows: SunShadows | None = None
-        self._masks: dict[tuple[int, int], gl.Mask] = {}
+        self._masks: dict[tuple[int, int], PixelMask] = {}
         self._targets: dict[tuple[str, int, int], gl.RenderTarget] = {}
         GL.glClipControl(GL.GL_UPPER_LEFT, GL.GL_ZERO_TO_ONE)
         GL.glEnable(GL.GL_DEPTH_TEST)
@@ -223,7 +224,8 @@ class RasterRenderer:
         # Only visible samples are shaded. Of two surfaces at equal depth, the shader keeps the piece that the ids name.
         _depth_state(GL.GL_EQUAL, writes=False)
         GL.glBindTextureUnit(_VISIBLE_UNIT, truth.colour)
-        GL.glClearBufferfv(GL.GL_COLOR, 0, np.zeros(4, np.float32))
+        if not self._scene.sky:  # with a sky, every sample that is read is drawn
+            GL.glClearBufferfv(GL.GL_COLOR, 0, np.zeros(4, np.float32))
         self._scene.draw_shaded(pieces, _clip_matrix(frustum), flags)
         self._draw_sky(frustum)
 
@@ -240,17 +242,17 @@ class RasterRenderer:
         """
         width, height = size = target.width, target.height
         if size not in self._masks:
-            self._masks[size] = gl.Mask(*size)
-        self._masks[size].upload(is_supersampled.view(np.uint8) * np.uint8(255))
-        GL.glBindTextureUnit(_MASK_UNIT, self._masks[size].handle)
+            self._masks[size] = PixelMask(*size)
+        mask = self._masks[size]
+        mask.upload(is_supersampled)
+        mask.bind(_MASK_UNIT)
         truth = self._target("truth", (2 * width, 2 * height), GL.GL_R32I)
-        truth.bind()
-        GL.glClearBufferiv(GL.GL_COLOR, 0, np.full(4, -1, np.int32))
+        truth.bind()  # its ids are not cleared: they are read only where the depth is that of a piece, which has its id
         _depth_state(GL.GL_ALWAYS, writes=True)
         GL.glClearBufferfv(GL.GL_DEPTH, 0, np.ones(1, np.float32))
         GL.glColorMask(False, False, False, False)
         self._open_program.use()
-        GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
+        mask.draw_tiles()
         GL.glColorMask(True, True, True, True)
         self._draw_ids(pieces, frustum)
         samples = self._target("colour", (2 * width, 2 * height), GL.GL_RGBA16, truth.depth)
@@ -258,9 +260,9 @@ class RasterRenderer:
         target.bind()
         _depth_state(GL.GL_ALWAYS, writes=False)
         GL.glBindTextureUnit(0, samples.colour)
-        GL.glBindTextureUnit(_MASK_UNIT, self._masks[size].handle)
+        mask.bind(_MASK_UNIT)
         self._downsample_program.use()
-        GL.glDrawArrays(GL.GL_TRIANGLES, 0, 3)
+        mask.draw_tiles()
         GL.glFlush()
 
     def _draw_sky(self, frustum: Frustum) -> None:
