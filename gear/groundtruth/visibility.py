@@ -75,15 +75,18 @@ class VisibilityLimits:
 
 
 PRESETS: dict[Preset, VisibilityLimits] = {
-    "kitti": VisibilityLimits(min_height_px=25.0, min_visible_fraction=0.1),
+    "kitti": VisibilityLimits(min_height_px=24.0, min_visible_fraction=0.1),
     "coco": VisibilityLimits(min_visible_px=100),
     "carla_gear": VisibilityLimits(
         max_distance_m=200.0, min_box_area_px2=900.0, min_visible_fraction=0.1, min_visible_px=100
     ),
 }
-"""Limits by name of the preset. `kitti`: objects that some difficulty of KITTI's evaluation counts. `coco`:
-objects with 100 visible pixels. `carla_gear`: the limits of the CARLA-GeAR paper, 200 m and 900 px², and
-further limits by gear.
+"""Limits by name of the preset.
+
+`kitti`: objects that some difficulty of KITTI's evaluation counts, which are at least 25 px high. The sides of boxes
+are given to a fraction of a pixel, so the box of a silhouette of 25 rows of pixels can be a pixel lower; the limit is
+therefore 24 px. `coco`: objects with 100 visible pixels. `carla_gear`: the limits of the CARLA-GeAR paper, 200 m and
+900 px², and further limits by gear.
 """
 
 
@@ -92,7 +95,7 @@ class Visibility:
     """Option of a task: a preset of visibility limits, and limits that replace those of the preset.
 
     Attributes:
-        preset: `kitti` labels objects from 25 px of height with a tenth of them visible, `coco` objects with 100
+        preset: `kitti` labels objects from 24 px of height with a tenth of them visible, `coco` objects with 100
             visible pixels, `carla_gear` the objects of the CARLA-GeAR paper: within 200 m, with a visible box of 900
             px², a tenth of them and 100 pixels visible.
         max_distance_m: largest distance from the camera to the middle of the object's 3D box.

@@ -6,8 +6,10 @@ import argparse
 import pickle
 import pickletools
 import re
+import sys
 import types
 import warnings
+from collections import OrderedDict
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
@@ -54,6 +56,24 @@ They are NumPy's numbers and arrays (the best metric so far), the parsed command
 paths, which never touch the disk.
 """
 
+PLAIN_MODULES = {"collections", "datetime", "decimal", "enum", "fractions", "typing", "uuid"}
+"""Modules of the standard library whose classes are left out of a checkpoint, like those of other packages."""
+
+PLAIN_BUILTINS = {"bool", "bytearray", "complex", "dict", "float", "frozenset", "int", "list", "range", "set", "slice",
+                  "str", "tuple"}  # fmt: skip
+"""Classes of `builtins` that are left out in the same way."""
+
+REFUSED_PACKAGES = {"torch", "numpy", "__builtin__", "copy_reg"}
+"""Packages besides the standard library that are not left out: a whole network pickled by torch would lack its
+tensors, and the last two are Python 2's names of modules of the standard library.
+"""
+
+MOST_LEFT_OUT = 100
+"""Largest number of classes that are left out of one checkpoint."""
+
+DAMAGE = (RuntimeError, EOFError, ValueError, OSError, KeyError, AttributeError, IndexError, TypeError)
+"""Errors with which torch fails on a damaged file, or on one of another program."""
+
 STATE_DICT_ALONE = "state dict alone (torch.save(model.state_dict(), FILE))"
 
 LOOKED_AT_BYTES = 1 << 20
@@ -98,35 +118,95 @@ def read_entries(path: str | Path) -> list[Candidate]:
     return entries_of(read(file)[0] if file.suffix == ".safetensors" else _load(file), file)
 
 
+class _LeftOut:
+    """Stands for a class that a checkpoint names, so that the class is neither imported nor run.
+
+    Its objects are ordinary dictionaries: torch fills no others, and a state dict of such a class is then readable.
+    """
+
+    def __new__(cls, *args: object, **kwargs: object) -> Any:
+        """A new, empty dictionary.
+
+        Args:
+            args, kwargs: arguments in the file, which are not used.
+        """
+        return OrderedDict()
+
+
+def _is_left_out(name: str) -> bool:
+    """Whether a class that a checkpoint names is left out, instead of the file being refused.
+
+    Nothing in the file is run in either case. A file that names functions of the standard library is refused, because
+    it may have been made to harm programs that read it unsafely.
+
+    Args:
+        name: module and name, such as `omegaconf.dictconfig.DictConfig`.
+    """
+    package, _, rest = name.partition(".")
+    if package == "builtins":
+        return rest in PLAIN_BUILTINS
+    is_foreign = package not in sys.stdlib_module_names and package not in REFUSED_PACKAGES
+    return is_foreign or package in PLAIN_MODULES
+
+
 def _load(path: Path) -> Any:
     """The content of a file, read by `torch.load` with `weights_only`, so that none of it is run.
+
+    Objects of classes of other packages, such as a configuration beside the weights, are left out.
 
     Raises:
         GearError: the file cannot be read in this way.
     """
-    try:
-        with torch.serialization.safe_globals(PLAIN_GLOBALS), warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # torch warns of newer pickle protocols
-            return torch.load(path, map_location="cpu", weights_only=True)
-    except pickle.UnpicklingError as error:
-        found = re.search(r"GLOBAL ([\w.]+)", str(error))
-        wanted = found[1] if found else _foreign_global(path)
+    left_out: dict[str, type] = {}
+    while True:
+        try:
+            allowed = [*PLAIN_GLOBALS, *((stand_in, name) for name, stand_in in left_out.items())]
+            with torch.serialization.safe_globals(allowed), warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # torch warns of newer pickle protocols
+                return torch.load(path, map_location="cpu", weights_only=True)
+        except Exception as error:
+            name = _named_class(error, path)
+            if name is None or name in left_out or len(left_out) >= MOST_LEFT_OUT or not _is_left_out(name):
+                raise _refusal(error, path) from error
+            left_out[name] = type(name, (_LeftOut,), {})
+
+
+def _named_class(error: Exception, path: Path) -> str | None:
+    """The class or function because of which torch did not read a file; None if there was another reason."""
+    if not isinstance(error, pickle.UnpicklingError):
+        return None
+    found = re.search(r"GLOBAL ([\w.]+)", str(error))
+    if found is None:
+        return _foreign_global(path)
+    return found[1] if "." in found[1] else f"builtins.{found[1]}"
+
+
+def _refusal(error: Exception, path: Path) -> GearError:
+    """The error about a checkpoint that cannot be read, as one line.
+
+    Args:
+        error: the error of torch; one that no damaged or foreign file causes is raised again.
+        path: the file.
+    """
+    if isinstance(error, pickle.UnpicklingError):
+        wanted = _named_class(error, path)
         if wanted is None:
             # torch's message suggests reading the file unsafely, so only the reason is taken from it.
             reason = re.search(r"WeightsUnpickler error: *(\S.*)", str(error))
             why = reason[1] if reason else "it is no plain pickle of tensors"
-            raise GearError(f"{path}: not a checkpoint that can be read safely ({why})") from error
-        raise GearError(
+            return GearError(f"{path}: not a checkpoint that can be read safely ({why})")
+        return GearError(
             f"{path}: refused, because reading it would run {wanted}; have somebody who trusts the file save its "
             f"{STATE_DICT_ALONE}, or get it as safetensors"
-        ) from error
-    except (RuntimeError, EOFError, ValueError, OSError, KeyError, AttributeError, IndexError) as error:
-        if "TorchScript" in str(error):
-            raise GearError(
-                f"{path}: refused, because it is a TorchScript archive, which holds code; have somebody who trusts it "
-                f"save its {STATE_DICT_ALONE}"
-            ) from error
-        raise GearError(f"{path}: not a checkpoint of PyTorch's ({_first_line(error)})") from error
+        )
+    if "TorchScript" in str(error):
+        return GearError(
+            f"{path}: refused, because it is a TorchScript archive, which holds code; have somebody who trusts it "
+            f"save its {STATE_DICT_ALONE}"
+        )
+    if not isinstance(error, DAMAGE):
+        raise error
+    return GearError(f"{path}: not a checkpoint of PyTorch's ({_first_line(error)})")
 
 
 def _foreign_global(path: Path) -> str | None:

@@ -21,6 +21,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import EntryPoint
@@ -28,13 +29,26 @@ from pathlib import Path
 from typing import Any
 
 from gear.plugins.text import printable
-from gear.values.machine import cores
+from gear.values.machine import cores, processor_time_s
 from gear.values.user_cache import user_cache_folder
 
 LIMIT_S = 30.0
-"""Time limit in seconds for the import and the hooks of a plugin; importing torch takes far less."""
+"""Limit for the import and the hooks of a plugin: seconds of processor time, and seconds without any processor time.
 
-CHECKS = 2
+On a machine with much other work an import takes a multiple of its processor time; importing torch needs a few seconds
+of it. The result is stored, so that a limit of elapsed time could disable a plugin for good because of other programs.
+"""
+
+LONGEST_S = 20 * LIMIT_S
+"""Largest elapsed time in seconds; it ends plugins that use a little processor time again and again without end."""
+
+IDLE_S = 0.05
+"""Processor time in seconds below which a process counts as idle; the system counts it in steps of 0.01 s."""
+
+LOOK_S = 0.25
+"""Time in seconds between two readings of the processor time."""
+
+CHECKS = 3
 """Version of the checks in the separate process; a new number makes cached results of earlier checks invalid."""
 
 MOST_FILES = 2000
@@ -93,7 +107,8 @@ def probe(entry_point: EntryPoint, limit_s: float = LIMIT_S) -> Verdict | None:
 
     Args:
         entry_point: entry point of the plugin.
-        limit_s: seconds after which the process and its children are ended.
+        limit_s: seconds of processor time, or seconds without processor time, after which the process and its
+            children are ended.
 
     Returns:
         None for a safe plugin: the process ended normally, even if the plugin raised exceptions. Otherwise stage and
@@ -113,7 +128,7 @@ def probe(entry_point: EntryPoint, limit_s: float = LIMIT_S) -> Verdict | None:
             start_new_session=True,
         )
         try:
-            status = process.wait(limit_s)
+            status = _status(process, limit_s)
             ending = f"ended the process with status {status}" if status >= 0 else f"ended by {_signal_name(-status)}"
         except subprocess.TimeoutExpired:
             ending = f"took more than {limit_s:g} s"
@@ -131,6 +146,30 @@ def probe(entry_point: EntryPoint, limit_s: float = LIMIT_S) -> Verdict | None:
     if DONE in said:
         return (stages[-1], "KeyboardInterrupt") if INTERRUPTED in said else None
     return stages[-1], ending
+
+
+def _status(process: subprocess.Popen[bytes], limit_s: float) -> int:
+    """Waits for a process, as long as it and its children use processor time within the limit.
+
+    Where the system does not tell the processor time, the limit is of elapsed time.
+
+    Returns:
+        The exit status; negative for the number of a signal.
+
+    Raises:
+        subprocess.TimeoutExpired: the process reached a limit.
+    """
+    began_s = busy_s = time.monotonic()
+    counted_s = 0.0
+    while True:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return process.wait(min(LOOK_S, limit_s))
+        used_s, now_s = processor_time_s(process.pid), time.monotonic()
+        if used_s > counted_s + IDLE_S:
+            counted_s, busy_s = used_s, now_s
+        elapsed_s = now_s - began_s
+        if used_s > limit_s or now_s - busy_s > limit_s or elapsed_s > LONGEST_S:
+            raise subprocess.TimeoutExpired(process.args, elapsed_s)
 
 
 DONE, INTERRUPTED, REFUSED = "done", "interrupted", "refused: "

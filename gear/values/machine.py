@@ -1,5 +1,5 @@
 """Finds the processor cores and the memory that this process may use, within the limits of containers and batch
-systems.
+systems, and the processor time that processes have used.
 """
 
 from __future__ import annotations
@@ -34,6 +34,24 @@ def free_memory_bytes() -> int | None:
     except (OSError, ValueError, IndexError, StopIteration):
         return None
     return max(0, min([available, *_memory_left()]))
+
+
+def processor_time_s(session: int) -> float:
+    """Processor time in seconds that the processes of a session have used, and the ended children that they waited for.
+
+    Args:
+        session: id of the session, which is the id of the process that began it.
+
+    Returns:
+        The processor time; 0 if the system does not report it.
+    """
+    ticks = 0
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        # The name of the program, in parentheses, may contain blanks and parentheses.
+        fields = " ".join(_lines(path)).rpartition(")")[2].split()
+        if len(fields) > 14 and fields[3] == str(session):
+            ticks += sum(int(field) for field in fields[11:15])
+    return ticks / os.sysconf("SC_CLK_TCK") if ticks else 0.0
 
 
 def _quotas() -> Iterator[float]:

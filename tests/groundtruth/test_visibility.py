@@ -69,10 +69,10 @@ def test_the_share_that_is_too_little_is_of_the_part_in_the_picture() -> None:
 
 
 def test_kitti_labels_by_the_height_of_the_box_and_by_what_is_visible() -> None:
-    """25 px and a tenth of the silhouette, however narrow, far or small: all that a level of its evaluation counts."""
+    """24 px and a tenth of the silhouette, however narrow, far or small: all that a level of its evaluation counts."""
     narrow = truth(visible_px=7, visible_box=(0.0, 0.0, 1.0, 25.0), amodal_in_image_px=70, amodal_px=700)
-    assert PRESETS["kitti"].labels(narrow, (5.0, 10.0, 6.0, 35.0), 900.0)
-    assert not PRESETS["kitti"].labels(narrow, (5.0, 10.0, 60.0, 34.99), 1.0)
+    assert PRESETS["kitti"].labels(narrow, (5.0, 10.0, 6.0, 34.0), 900.0)
+    assert not PRESETS["kitti"].labels(narrow, (5.0, 10.0, 60.0, 33.99), 1.0)
     hidden = truth(visible_px=6, visible_box=(0.0, 0.0, 1.0, 25.0), amodal_in_image_px=70, amodal_px=700)
     assert not PRESETS["kitti"].labels(hidden, (5.0, 10.0, 6.0, 35.0), 1.0)
 
@@ -96,7 +96,7 @@ def test_given_limits_take_the_place_of_the_presets() -> None:
     [
         ("visibility: carla_gear", PAPER),
         ("visibility: {preset: coco, min_visible_px: 7}", VisibilityLimits(min_visible_px=7)),
-        ("visibility: {min_visible_fraction: 0}", VisibilityLimits(min_height_px=25.0)),
+        ("visibility: {min_visible_fraction: 0}", VisibilityLimits(min_height_px=24.0)),
         ("{}", PRESETS["kitti"]),
     ],
 )

@@ -1,6 +1,9 @@
 from __future__ import annotations
 
 import argparse
+import collections
+import datetime
+import enum
 import pickle
 import types
 import warnings
@@ -60,6 +63,31 @@ def test_official_kinds_of_files_are_read(tmp_path: Path, content: Any, zipped: 
 def test_safetensors_are_read_too(tmp_path: Path) -> None:
     write(tmp_path / "a.safetensors", {f"module.{key}": value for key, value in STATE.items()}, {})
     assert same(read_published(tmp_path / "a.safetensors"))
+
+
+class Settings(dict[str, Any]):
+    """A configuration, like those of OmegaConf, EasyDict and yacs."""
+
+
+class Kind(enum.Enum):
+    SMALL = 1
+
+
+class Run:
+    def __init__(self) -> None:
+        self.settings, self.kind = Settings(lr=0.1), Kind.SMALL
+
+
+@pytest.mark.parametrize("zipped", [True, False], ids=["zip", "old"])
+def test_objects_of_other_packages_are_left_out(tmp_path: Path, zipped: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their classes are neither needed nor run."""
+    monkeypatch.setattr(Settings, "__setitem__", lambda *_: pytest.fail("run"))
+    nested = Settings({"a": Settings({"b": 1}), "kinds": [Kind.SMALL, Run()]})
+    plain = {"when": datetime.datetime(2026, 1, 1), "log": collections.defaultdict(list, a=[1]), "x": range(3)}
+    path = tmp_path / "a.pth"
+    for content in ({"model": STATE, "cfg": nested}, {"model": Settings(STATE)}, {"model": STATE, **plain}):
+        torch.save(content, path, _use_new_zipfile_serialization=zipped)
+        assert same(read_published(path))
 
 
 class Evil:

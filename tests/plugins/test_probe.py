@@ -72,6 +72,29 @@ def test_one_that_hangs_is_ended_with_what_it_started(site: Path) -> None:
     assert not state.exists() or state.read_text().rpartition(")")[2].split()[0] == "Z"
 
 
+def test_a_busy_machine_disables_no_plugin(site: Path) -> None:
+    """The plugin takes longer than the limit, as on a busy machine, but uses less processor time than that."""
+    code = "import time\nfor turn in range(14):\n    time.sleep(0.25)\n    end = time.process_time() + 0.06\n"
+    code += "    while time.process_time() < end: pass"
+    assert probe(put(site, "slow", code), limit_s=3.5) is None
+
+
+@pytest.mark.parametrize(
+    ("code", "limit_s", "longest_s"), [("pass", 0.3, 600), ("time.sleep(600)", 0.5, 600), ("time.sleep(0.001)", 60, 1)]
+)
+def test_a_process_ends_at_each_limit(
+    monkeypatch: pytest.MonkeyPatch, code: str, limit_s: float, longest_s: float
+) -> None:
+    monkeypatch.setattr(probing, "LONGEST_S", longest_s)
+    words = [sys.executable, "-c", f"import time\nwhile True: {code}"]
+    with subprocess.Popen(words, start_new_session=True) as process:
+        try:
+            with pytest.raises(subprocess.TimeoutExpired):
+                probing._status(process, limit_s)
+        finally:
+            process.kill()
+
+
 def test_verdicts_are_kept_until_the_files_change(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     entry = put(site, "leaver", "import os; os._exit(3)")
     assert unsafe_plugins([entry]) == {entry: ("import", "ended the process with status 3")}

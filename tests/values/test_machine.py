@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from gear.values import machine
-from gear.values.machine import cores, free_memory_bytes
+from gear.values.machine import cores, free_memory_bytes, processor_time_s
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system has no CPU affinity")
@@ -78,3 +81,20 @@ def test_without_limits_all_that_is_available_is_free(grouped: Callable[[str, di
     assert cores() == 16
     free = free_memory_bytes()
     assert free is None or free > 50_000_000
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="this system does not report processor time")
+def test_the_processor_time_of_a_session_includes_children_and_not_sleep() -> None:
+    busy = "import time\nwhile time.process_time() < 0.3: pass"
+    code = f"import subprocess, sys, time; subprocess.run([sys.executable, '-c', {busy!r}]); print(1, flush=True)"
+    with subprocess.Popen(
+        [sys.executable, "-c", f"{code}; time.sleep(600)"], stdout=subprocess.PIPE, start_new_session=True
+    ) as child:
+        try:
+            assert child.stdout is not None and child.stdout.readline() == b"1\n"
+            used_s = processor_time_s(child.pid)
+            time.sleep(0.5)
+            assert 0.3 <= used_s <= processor_time_s(child.pid) <= used_s + 0.1
+        finally:
+            child.kill()
+    assert processor_time_s(child.pid) == 0
