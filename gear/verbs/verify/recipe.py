@@ -26,6 +26,7 @@ from gear.dataset.plan import differences
 from gear.networks.shipped import shipped_patches
 from gear.values.errors import BackendError, ConfigError, DatasetError, PatchError, UnknownNameError
 from gear.values.serial import Json
+from gear.verbs.verify.salvaged_recipe import salvaged_recipe
 
 HASH = 1 + 8
 """Number of characters at the end of a patch's label: a hyphen and the hash."""
@@ -60,7 +61,54 @@ def job_of(root: Path, check: SplitCheck, sources: Sources) -> Job:
         DatasetError: neither plan nor manifest records how the split was made, or identical files cannot be made on
             this machine.
     """
+    if check.plan is None and not isinstance(check.manifest, dict):
+        return _salvaged_job(root, check, sources)
     known = _known(root, check)
+    job = _resolved(root, check, known, sources)
+    if job.plan.content_key != known["content_key"]:
+        what = ", ".join(differences(check.plan.as_json(), job.plan.as_json())[:2]) if check.plan is not None else ""
+        raise _other_bytes(root, check, what or "other versions, renderer or files")
+    return job
+
+
+def _other_bytes(root: Path, check: SplitCheck, why: str) -> DatasetError:
+    problem = f"split {check.split!r} would differ if it were made on this machine ({why})"
+    return DatasetError(root, f"{problem}; repair it on the machine and with the versions with which it was made")
+
+
+def _salvaged_job(root: Path, check: SplitCheck, sources: Sources) -> Job:
+    """Returns the job of a split of which both plan and manifest are damaged or missing.
+
+    Raises:
+        DatasetError: the two files do not say how the split was made, or identical files cannot be made on this
+            machine.
+    """
+    salvaged = salvaged_recipe(root, check.split, check.samples)
+    refusal = DatasetError(root, _unknown(check))
+    for candidate in salvaged.candidates:
+        try:
+            job = _resolved(root, check, candidate, sources)
+        except DatasetError as error:
+            refusal = DatasetError(root, f"the plan and the manifest are damaged: {error.problem}; or {_REMEDY}")
+            continue
+        if salvaged.is_proven(job.plan):
+            return job
+        refusal = _other_bytes(root, check, "values lost in the damaged plan, other versions, renderer or files")
+    raise refusal
+
+
+def _resolved(root: Path, check: SplitCheck, known: dict[str, Json], sources: Sources) -> Job:
+    """Returns the job of the recorded values, with the recorded recipe in its plan.
+
+    Args:
+        root: root of the dataset.
+        check: result of the check of the split.
+        known: recorded values, with the keys `recipe`, `town`, `seed`, `patch`, `samples` and `frames`.
+        sources: files that the dataset does not name.
+
+    Raises:
+        DatasetError: a value is wrong, or names a file that is not here.
+    """
     with _patch_folder(root, check, known, sources) as patch:
         config: dict[str, Any] = {
             **known["recipe"],
@@ -79,13 +127,14 @@ def job_of(root: Path, check: SplitCheck, sources: Sources) -> Job:
         except (UnknownNameError, ConfigError, PatchError, BackendError) as error:
             advice = "name files of your own with --town, --scenes and --simulation"
             raise DatasetError(root, f"split {check.split!r} cannot be made again ({error}); {advice}") from error
-    plan = dataclasses.replace(job.plan, recipe=known["recipe"])
-    if plan.content_key != known["content_key"]:
-        what = ", ".join(differences(check.plan.as_json(), plan.as_json())[:2]) if check.plan is not None else ""
-        why = what or "other versions, renderer or files"
-        problem = f"split {check.split!r} would differ if it were made on this machine ({why})"
-        raise DatasetError(root, f"{problem}; repair it on the machine and with the versions with which it was made")
-    return dataclasses.replace(job, plan=plan)
+    return dataclasses.replace(job, plan=dataclasses.replace(job.plan, recipe=known["recipe"]))
+
+
+_REMEDY = "delete both files and run the same `gear collect` again, which keeps whole samples"
+
+
+def _unknown(check: SplitCheck) -> str:
+    return f"neither the plan nor the manifest of split {check.split!r} says how it was made; {_REMEDY}"
 
 
 def _known(root: Path, check: SplitCheck) -> dict[str, Json]:
@@ -110,8 +159,7 @@ def _known(root: Path, check: SplitCheck) -> dict[str, Json]:
             "samples": len(manifest["samples"]), "frames": frames, "content_key": manifest["content_key"],
         }  # fmt: skip
     except (KeyError, TypeError) as error:
-        problem = f"neither the plan nor the manifest of split {check.split!r} says how it was made"
-        raise DatasetError(root, f"{problem}; run its `gear collect` again") from error
+        raise DatasetError(root, _unknown(check)) from error
 
 
 @contextmanager

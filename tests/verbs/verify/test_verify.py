@@ -151,6 +151,29 @@ def test_plan_and_manifest_repair_each_other(name: str, place: float | None, tmp
     assert tree(root) == before
 
 
+@pytest.mark.parametrize("seed", [1, 3, None])
+def test_plan_and_manifest_damaged_by_several_bytes(
+    seed: int | None, tmp_path: Path, copy_small: Copy, patch: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Both get their original bytes; if both lost the recipe, one line refuses, without advice to replace anything."""
+    root = copy_small("depth", tmp_path / "data", patch=patch)
+    before, rng = tree(root), np.random.default_rng(seed)
+    for name, recipe in (("plan.json", "recipe"), ("manifest.json", "config")):
+        for place in rng.uniform(0, 1, 2 if seed is None else 2 + seed):
+            flip(root / "gear/debug" / name, place)
+        if seed is None:
+            edited = (root / "gear/debug" / name).read_bytes().replace(f'\n "{recipe}": {{'.encode(), b"\n")
+            (root / "gear/debug" / name).write_bytes(edited)
+    flip(root / "gear/debug/samples/000001.json", 0.5)
+    report = repaired(root)
+    assert report.is_whole == (tree(root) == before) == (seed is not None), report.unrepaired
+    if not report.is_whole:
+        assert main(["verify", str(root), "--repair"]) == 1
+        said = capsys.readouterr()
+        assert "delete both files and run the same `gear collect` again" in said.out + said.err
+        assert "--force" not in said.out + said.err and "replace" not in said.out + said.err
+
+
 def test_a_dataset_without_cards_is_whole_and_a_repair_writes_them(tmp_path: Path, copy_small: Copy) -> None:
     root = copy_small("depth", tmp_path / "data")
     before = tree(root)
