@@ -19,6 +19,7 @@ import closing
 
 import gear
 from gear.config.nodes import parse_text
+from gear.dataset.checks.existing_samples import refuse_damaged
 from gear.dataset.store import Store
 from gear.plugins.build import build_task
 from gear.testing.synthetic import synthetic_frame
@@ -76,7 +77,7 @@ def store(samples: int) -> None:
         with Timed("run the same command again: find missing samples, check all hashes"):
             made.open({})
             assert not made.missing()
-            made.refuse_damaged()
+            refuse_damaged(made)
         with Timed("close again"):
             made.close(task, {"seed": 5})
 

@@ -15,6 +15,7 @@ from gear.cli.machine_limits import limit_reached
 from gear.cli.messages import one_line
 from gear.cli.parser import Parser
 from gear.cli.streams import prepare_streams
+from gear.reporting.advice import fitted
 from gear.values.errors import GearError, UnknownNameError
 from gear.values.mujoco_gl import check_mujoco_gl
 from gear.values.regular_file import NotAFileError
@@ -132,7 +133,7 @@ def main(argv: Sequence[str]) -> int:
             return 2
         if not isinstance(error, GearError):
             raise
-        print(f"gear: {one_line(error)}", file=sys.stderr)
+        print(f"gear: {fitted(_command_of(argv) or '', one_line(error))}", file=sys.stderr)
         return 2
     return code
 
@@ -163,8 +164,12 @@ def full_parser(wanted: str | None = None) -> Parser:
     return parser
 
 
+def _command_of(argv: Sequence[str]) -> str | None:
+    return next((word for word in argv if not word.startswith("-")), None)
+
+
 def _run(argv: Sequence[str]) -> int:
-    wanted = next((word for word in argv if not word.startswith("-")), None)
+    wanted = _command_of(argv)
     if wanted is not None and wanted not in COMMANDS:
         print(f"gear: {one_line(UnknownNameError('command', wanted, COMMANDS))}", file=sys.stderr)
         return 2

@@ -7,17 +7,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from gear.collecting.disk_and_time_forecast import Forecast
 from gear.collecting.job import Job
 from gear.collecting.pipeline import collect_samples
 from gear.collecting.session import open_session
 from gear.contracts.executors import MOST_FAILURES, Executor, Outcome, Report
 from gear.dataset.claims import Claims
+from gear.dataset.disk_and_time_forecast import Forecast
 from gear.dataset.executors.processes import Processes
 from gear.dataset.failures import clear_failures, failures_folder, note_failure, noted_failures
 from gear.dataset.files import inside
 from gear.dataset.layout import sidecar_path
 from gear.dataset.sharding.shards import Shard
+from gear.dataset.sidecar import read_sidecar
 from gear.dataset.store import Store
 from gear.values.counted import counted
 from gear.values.errors import BackendError, DatasetError, SamplesFailedError, WorkerInterruptedError
@@ -95,7 +96,7 @@ class _Making:
         pending = self.store.missing(self.part)
         total = len(self.store.indices(self.part))
         noted = noted_failures(self.store.root, self.store.split)
-        forecast = Forecast(self.store, len(pending), self.callbacks.on_warning)
+        forecast = Forecast(self.store.root, len(pending), self.callbacks.on_warning)
         finished = total - len(pending)
         self.callbacks.on_progress(finished, total)
 
@@ -114,7 +115,7 @@ class _Making:
                     clear_failures(self.store.root, self.store.split, [index])
                 self.callbacks.on_progress(finished, total)
                 if inside(self.store.root, sidecar_path(self.store.split, index)).exists():  # a network disk lags
-                    forecast.sample_done(index)
+                    forecast.item_done(partial(bytes_of, self.store, index))
 
         idle = 0
         while pending:
@@ -259,3 +260,18 @@ def make_samples(job: Job, indices: Iterator[int], report: Report) -> None:
             report(outcome)
 
         collect_samples(session, store, claims.unclaimed(indices, report), report_and_release)
+
+
+def bytes_of(store: Store, index: int) -> int:
+    """The number of bytes of a sample's files and of its sidecar.
+
+    Args:
+        store: the split.
+        index: index of the sample.
+
+    Raises:
+        DatasetError: the sidecar cannot be read.
+    """
+    path = inside(store.root, sidecar_path(store.split, index))
+    sidecar = read_sidecar(path)
+    return path.stat().st_size + sum(inside(store.root, name).stat().st_size for name in sidecar.files)

@@ -8,6 +8,7 @@ from pathlib import Path
 from gear.collecting.job import Job
 from gear.collecting.missing import collect_missing
 from gear.contracts.executors import Executor
+from gear.dataset.checks.existing_samples import refuse_damaged
 from gear.dataset.executors.engines import DEFAULT, open_engine, open_executor
 from gear.dataset.executors.in_process import InThisProcess
 from gear.dataset.locks import SHARED, lock_note
@@ -17,6 +18,9 @@ from gear.dataset.store import Store
 from gear.plugins.build import blamed, build, find
 from gear.values.counted import counted
 from gear.values.progress import Callbacks
+
+CHECKING, CLOSING = "checking existing samples", "writing indexes and manifest"
+"""Titles of the parts of a collection before and after the samples are made."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,13 +104,13 @@ def run_job(
     with store.begun(job.patch.files, force=force):
         if (note := lock_note(job.root, SHARED)) is not None:
             callbacks.on_warning(note)
-        store.refuse_damaged(part)
+        refuse_damaged(store, part, callbacks.part(CHECKING))
         absolute = replace(job, root=job.root.absolute())  # workers of other machines have other current folders
         made = collect_missing(absolute, store, part, executor or InThisProcess(), callbacks)
         if shard is None:
             task = build(plugin, job.config.options)
             with blamed(plugin, "finalise"):
-                store.close(task, manifest_facts(job.plan))
+                store.close(task, manifest_facts(job.plan), callbacks.part(CLOSING))
     return CollectReport(
         root=job.root,
         split=job.plan.info.split,

@@ -39,3 +39,8 @@ def size_text(size: float) -> str:
     while size >= 999.5 and power < len(UNITS) - 1:
         size, power = size / 1000, power + 1
     return f"{size:.0f} {UNITS[power]}" if power == 0 or size >= 99.5 else f"{size:.2g} {UNITS[power]}"
+
+
+def tree_bytes(folder: Path) -> int:
+    """The number of bytes of the files in a folder without links, such as one that a killed run has left."""
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())

@@ -26,7 +26,7 @@ ALONE = "other runs in this folder are not detected, so run one command at a tim
 
 SHARED = (
     "runs that share this split may make a sample twice, a sample of a killed run is free again after 15 minutes, and "
-    "--force does not detect other runs; the files are the same in any case"
+    "a run that replaces the split does not detect them; the files are the same in any case"
 )
 """What the lack of locks means for a split that several runs collect."""
 

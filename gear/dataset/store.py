@@ -15,7 +15,6 @@ from gear.dataset.files import clear_scratch, inside, read_bytes, sha256, sync_f
 from gear.dataset.finishing.cards import write_cards
 from gear.dataset.finishing.closing import ClosedPart, SidecarStream, can_extend, closed_part
 from gear.dataset.guarded_paths import owned, refuse_links, remove_empty_folders, remove_file, remove_files
-from gear.dataset.hashing import file_hash, in_threads
 from gear.dataset.json_text import dump_json, load_json
 from gear.dataset.layout import (
     GEAR,
@@ -35,6 +34,7 @@ from gear.dataset.sealed_json import REPAIR, DamagedError, load_sealed, sealed_j
 from gear.dataset.sharding.shards import WHOLE, Shard
 from gear.dataset.sidecar import no_sidecar, read_sidecar, sidecar_bytes
 from gear.values.errors import DatasetError, FieldError, ReplaceableError, SamplesFailedError
+from gear.values.progress import NO_CALLBACKS, Progress
 from gear.values.serial import Json
 
 
@@ -196,37 +196,6 @@ class Store:
         there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
         return [index for index in self.indices(shard) if f"{index:06d}.json" not in there]
 
-    def refuse_damaged(self, shard: Shard = WHOLE) -> None:
-        """Checks all files of a shard's existing samples against the hashes in their sidecars (JSON files of the
-        samples).
-
-        If a file of a sample is missing, the sidecar is deleted, so the sample is made again. A changed file is not
-        overwritten, because the user may have edited it.
-
-        Raises:
-            DamagedError: a file has other bytes than those that were written.
-        """
-        missing = set(self.missing(shard))
-        indices = [index for index in self.indices(shard) if index not in missing]
-        incomplete: list[str] = []
-        changed: list[str] = []
-        for index, (lacking, different) in zip(indices, in_threads(self._damage_of, indices), strict=True):
-            if lacking:
-                incomplete.append(sidecar_path(self.split, index))
-            changed += different
-        if changed:
-            more = f" (and {len(changed) - 1} more)" if len(changed) > 1 else ""
-            raise DamagedError(inside(self.root, changed[0]), f"is not as it was written{more}; {REPAIR}")
-        remove_files(self.root, incomplete)
-
-    def _damage_of(self, index: int) -> tuple[list[str], list[str]]:
-        """The missing files of a sample, and the files whose hash is not that in its sidecar."""
-        path = inside(self.root, sidecar_path(self.split, index))
-        hashes = read_sidecar(path).files
-        lacking = [relative for relative in hashes if not inside(self.root, relative).is_file()]
-        there = hashes.keys() - set(lacking)
-        return lacking, sorted(name for name in there if file_hash(inside(self.root, name)) != hashes[name])
-
     def write(
         self,
         sample: Sample,
@@ -271,7 +240,9 @@ class Store:
         paths = [path for path in sorted(folder.glob("patch_*.png")) if path.is_file()]
         return {"patches": {_relative(self.root, path): sha256(read_bytes(path)) for path in paths}} if paths else {}
 
-    def close(self, task: Task[Any, Any], facts: Mapping[str, Json]) -> None:
+    def close(
+        self, task: Task[Any, Any], facts: Mapping[str, Json], on_progress: Progress = NO_CALLBACKS.on_progress
+    ) -> None:
         """Writes the index files of the format, the manifest and the dataset card, in this order.
 
         Nothing is written if another run has meanwhile started to extend the split; that run writes these files.
@@ -279,6 +250,7 @@ class Store:
         Args:
             task: the task, which makes the index files.
             facts: metadata for the manifest, such as versions, renderer and configuration.
+            on_progress: called after every sample whose sidecar was read for the first time.
 
         Raises:
             DatasetError: a file cannot be written, or a sample is missing.
@@ -289,7 +261,7 @@ class Store:
         views = {camera.name for camera in task.rig().cameras}
         keys = {"twin_key": self.plan.twin_key, "content_key": self.plan.content_key}
         closed = closed_part(self.root, self.split, self.plan.samples, {**keys, **facts})
-        sidecars = SidecarStream(self.root, self.split, self.plan.samples, views, closed)
+        sidecars = SidecarStream(self.root, self.split, self.plan.samples, views, closed, on_progress)
         indexes: dict[str, str] = {}
         files = sorted(self._indexes(task, sidecars, closed).items())
         begun = begun_path(self.split, "indexes")

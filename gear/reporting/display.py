@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Any, Protocol, TextIO
 
+from gear.reporting.advice import fitted
 from gear.reporting.pace import Pace
 from gear.reporting.progress_text import duration_text, progress_line
 from gear.values.progress import Callbacks
@@ -24,6 +25,9 @@ EVERY_S = 30.0
 
 FIT_UNIT = "picture"
 """Unit that the progress of a defense's calibration counts if the defense reports no phases."""
+
+PART = "part "
+"""Beginning of the channels that show parts of the work which are not counted with the rest; their title follows."""
 
 FIT = "fit"
 """First word of the channels that show the calibration of a defense."""
@@ -66,7 +70,8 @@ class Display:
             on_progress=lambda done, total: self._backend.update("progress", self._unit, done, total),
             on_fit_progress=self._show_fit,
             on_fit_phase=self._show_phase,
-            on_warning=lambda line: self._backend.write(f"gear: note: {line}"),
+            on_part=lambda title, done, total: self._backend.update(f"{PART}{title}", "", done, total),
+            on_warning=lambda line: self._backend.write(f"gear: note: {fitted(verb, line)}"),
         )
 
     def _show_fit(self, done: int, total: int) -> None:
@@ -140,9 +145,20 @@ class _Bars:
 
     def update(self, channel: str, unit: str, done: int, total: int) -> None:
         bar = self._bars.get(channel)
+        if bar is not None and (done < bar.n or (bar.bar_format and total)):  # another count, or the first of a part
+            bar.close()
+            bar = None
         if bar is None:
+            title = channel.removeprefix(PART) if channel.startswith(PART) else None
             self._bars[channel] = self._make()(
-                total=total or None, initial=done, unit=unit, dynamic_ncols=True, smoothing=0.1
+                total=total or None,
+                initial=done,
+                unit=unit or "it",
+                desc=title,
+                bar_format="{desc} …" if title and not total else None,
+                leave=title is None,
+                dynamic_ncols=True,
+                smoothing=0.1,
             )
             return
         bar.total = total or None
@@ -232,6 +248,11 @@ class _Lines:
         if self._pace is None:
             return f"{head}preparing since {duration_text(now_s - self._begun_s)}"
         step = "calibrating the defense, " if self._channel.startswith(FIT) else ""
+        if self._channel.startswith(PART):
+            title = self._channel.removeprefix(PART)
+            if not self._pace.total:
+                return f"{head}{title} since {duration_text(now_s - self._pace.first_s)}"
+            step = f"{title}, "
         return f"{head}{step}{progress_line(self._pace, now_s)}{', ' + self._detail if self._detail else ''}"
 
 

@@ -10,7 +10,7 @@ class Pace:
     """Progress of one job, from which its rate and its remaining time are estimated.
 
     Attributes:
-        unit: counted unit in the singular, such as `sample` or `step`.
+        unit: counted unit in the singular, such as `sample` or `step`; "" if the title of the job names it.
         first_done, first_s: number of items that an earlier run had finished, and the time of the first report in
             seconds.
         done, total: finished items and all items in the last report; a total of 0 means that the total is unknown.
@@ -29,11 +29,16 @@ class Pace:
     def report(self, done: int, total: int, now_s: float) -> None:
         """Records the number of finished items and of all items at the time `now_s` in seconds.
 
+        A smaller number than before begins another count, such as that of a dataset's next split: its rate is measured
+        anew.
+
         Args:
             done: number of finished items.
             total: number of all items; 0 if it is unknown.
             now_s: time in seconds.
         """
+        if done < self.done:
+            self.first_done, self.first_s, self.warm_done, self.warm_s = done, now_s, 0, None
         if self.warm_s is None and done > self.first_done:
             self.warm_done, self.warm_s = done, now_s
         self.done, self.total = done, total

@@ -13,7 +13,7 @@ def progress_line(pace: Pace, now_s: float) -> str:
         now_s: time in seconds.
     """
     count = f"{pace.done} of {pace.total}" if pace.total else str(pace.done)
-    parts = [f"{count} {plural(pace.unit, pace.total or pace.done)}"]
+    parts = [f"{count} {plural(pace.unit, pace.total or pace.done)}" if pace.unit else count]
     rate, left_s = pace.rate(now_s), pace.left_s(now_s)
     parts.append(rate_text(rate) if rate else f"{duration_text(now_s - pace.first_s)} so far")
     if left_s:

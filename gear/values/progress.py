@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 Progress = Callable[[int, int], None]
 """Type of the progress callback, called with (done, total). The first call counts the items that an earlier run
@@ -15,6 +16,11 @@ PhaseProgress = Callable[[str, int, int], None]
 phase counts, in the singular, such as `training step`.
 """
 
+PartProgress = Callable[[str, int, int], None]
+"""Type of the progress callback for a part of a job that `Progress` does not count, called with (title, done, total).
+The title says what is done, such as `checking existing samples`; done and total are 0 if nothing is counted.
+"""
+
 Warn = Callable[[str], None]
 """Type of the warning callback, called with one line about a setting that is allowed but may be unintended."""
 
@@ -23,6 +29,9 @@ def _no_progress(done: int, total: int) -> None: ...
 
 
 def _no_phase(unit: str, done: int, total: int) -> None: ...
+
+
+def _no_part(title: str, done: int, total: int) -> None: ...
 
 
 def _no_warning(line: str) -> None: ...
@@ -37,12 +46,15 @@ class Callbacks:
         on_fit_progress: called after every calibration sample that a defense reads for the first time.
         on_fit_phase: called after every step of a phase, such as a training step, while a defense is calibrated that
             reports its phases (`gear.contracts.defenses.FitsInPhases`).
+        on_part: called when a part of the work begins that `on_progress` does not count, such as a check of existing
+            files, and after every item of it.
         on_warning: called with a warning of one line; equal warnings are passed on once if the object was made by `of`.
     """
 
     on_progress: Progress = _no_progress
     on_fit_progress: Progress = _no_progress
     on_fit_phase: PhaseProgress = _no_phase
+    on_part: PartProgress = _no_part
     on_warning: Warn = _no_warning
 
     @classmethod
@@ -52,6 +64,7 @@ class Callbacks:
         on_progress: Progress | None = None,
         on_fit_progress: Progress | None = None,
         on_fit_phase: PhaseProgress | None = None,
+        on_part: PartProgress | None = None,
         on_warning: Warn | None = None,
     ) -> Callbacks:
         """Makes callbacks from the arguments of a verb; None stands for a callback that does nothing. A repeated
@@ -61,6 +74,7 @@ class Callbacks:
             on_progress: gets the numbers of finished and of all items.
             on_fit_progress: gets the same numbers during the calibration of a defense.
             on_fit_phase: gets the unit and the numbers of a phase of the calibration.
+            on_part: gets the title and the numbers of a part of the work that `on_progress` does not count.
             on_warning: gets one line per warning.
         """
         warned: set[str] = set()
@@ -74,8 +88,18 @@ class Callbacks:
             on_progress=on_progress or _no_progress,
             on_fit_progress=on_fit_progress or _no_progress,
             on_fit_phase=on_fit_phase or _no_phase,
+            on_part=on_part or _no_part,
             on_warning=warn_once,
         )
+
+    def part(self, title: str) -> Progress:
+        """Announces a part of the work that `on_progress` does not count, and returns its progress callback.
+
+        Args:
+            title: what is done, such as `checking existing samples`.
+        """
+        self.on_part(title, 0, 0)
+        return partial(self.on_part, title)
 
     def and_also(self, others: Callbacks) -> Callbacks:
         """Callbacks that call first those of this object, then those of `others`.
@@ -96,6 +120,10 @@ class Callbacks:
             self.on_fit_phase(unit, done, total)
             others.on_fit_phase(unit, done, total)
 
+        def both_parts(title: str, done: int, total: int) -> None:
+            self.on_part(title, done, total)
+            others.on_part(title, done, total)
+
         def both_warnings(line: str) -> None:
             self.on_warning(line)
             others.on_warning(line)
@@ -104,6 +132,7 @@ class Callbacks:
             on_progress=both_progress,
             on_fit_progress=both_fit_progress,
             on_fit_phase=both_phases,
+            on_part=both_parts,
             on_warning=both_warnings,
         )
 

@@ -11,11 +11,12 @@ from pathlib import Path
 
 from gear.collecting.patch_sources import digest_of, read_patch
 from gear.contracts.tasks import NO_PATCH
+from gear.dataset.free_space import check_free_space, tree_bytes
 from gear.dataset.plan import manifest_facts, refuse_other_tasks
 from gear.dataset.remote.folder import RemoteFolder, is_address, local_path
 from gear.dataset.remote.merge import begin_remote_merge, copy_samples_to, finish_remote_merge
 from gear.dataset.sealed_json import REPAIR, DamagedError
-from gear.dataset.sharding.merging import Parts, copy_patches, copy_samples, find_parts, prepare_merge
+from gear.dataset.sharding.merging import Parts, copy_patches, copy_samples, estimated_bytes, find_parts, prepare_merge
 from gear.dataset.store import Store, splits_of
 from gear.dataset.whole_tree import check_target, whole_tree
 from gear.plugins.build import blamed, find, name_of_task
@@ -24,6 +25,9 @@ from gear.reporting.display import displayed
 from gear.values.counted import counted
 from gear.values.errors import DatasetError, GearError
 from gear.values.progress import Callbacks, Progress
+
+CLOSING = "writing indexes and manifest"
+"""Title of the part of a merge after the samples are copied."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +71,7 @@ def merge(
         on_progress: called after every sample with (finished samples, samples of the split).
 
     Raises:
-        GearError: no folder was given.
+        GearError: no folder was given, or the disk is too small.
         DatasetError: the folders were made with different configurations; a sample is in none of them; a file is
             damaged or a path leads outside its folder, `out` is not empty, or a file cannot be written.
         UnknownNameError: the plugin of the task is not installed.
@@ -75,40 +79,44 @@ def merge(
     roots = [Path(root) for root in datasets]
     if not roots:
         raise GearError("merge: no folder was given; name the folders with the shards")
+    with displayed(Callbacks.of(on_progress=on_progress), "merge", progress=progress) as callbacks:
+        return _merged(roots, out, callbacks)
+
+
+def _merged(roots: Sequence[Path], out: str | Path, callbacks: Callbacks) -> MergeReport:
+    """Merges folders into a folder or into an address."""
+    callbacks.part("listing the samples of all folders")
     parts = [find_parts(roots, split) for split in sorted({split for root in roots for split in splits_of(root)})]
     for one in parts:
         _check_versions(one)
         for root in roots:
             refuse_other_tasks(root, one.plan)
-    callbacks = Callbacks.of(on_progress=on_progress)
     report = MergeReport(
         root=out if isinstance(out, str) and is_address(out) else local_path(out),
         samples={one.split: one.plan.samples for one in parts},
         sources=len(roots),
     )
     if isinstance(report.root, str):
-        with displayed(callbacks, "merge", progress=progress) as shown:
-            _merge_to(RemoteFolder(report.root), parts, shown.on_progress)
+        _merge_to(RemoteFolder(report.root), parts, callbacks)
         return report
     target = report.root.resolve()
     check_target(target, "merge")
     for root in roots:
         if target.is_relative_to(root.resolve()):
             raise DatasetError(target, f"lies in {root}, which is merged; use another --out")
-    with (
-        whole_tree(target, "merge", is_kept=True) as unfinished,
-        displayed(callbacks, "merge", progress=progress) as shown,
-    ):
+    with whole_tree(target, "merge", is_kept=True) as unfinished:
         prepare_merge(unfinished, [one.plan for one in parts])
+        needed = sum(map(estimated_bytes, parts)) - tree_bytes(unfinished)
+        check_free_space(target, needed, what="the merged samples need", advice="give --out on another disk")
         for one in parts:
             if one.plan.patch["label"] != NO_PATCH:
                 copy_patches(one, unfinished, partial(_check_patch, one))
-            copy_samples(one, unfinished, shown.on_progress)
-            _close(one, unfinished)
+            copy_samples(one, unfinished, callbacks.on_progress)
+            _close(one, unfinished, callbacks.part(CLOSING))
     return report
 
 
-def _merge_to(folder: RemoteFolder, parts: Sequence[Parts], on_progress: Progress) -> None:
+def _merge_to(folder: RemoteFolder, parts: Sequence[Parts], callbacks: Callbacks) -> None:
     """Merges into a folder at an address."""
     with tempfile.TemporaryDirectory(prefix="gear-merge-") as name:
         staging = Path(name)
@@ -118,15 +126,16 @@ def _merge_to(folder: RemoteFolder, parts: Sequence[Parts], on_progress: Progres
         for one in parts:
             if one.plan.patch["label"] != NO_PATCH:
                 copy_patches(one, staging, partial(_check_patch, one))
-            copy_samples_to(one, folder, staging, on_progress)
-            _close(one, staging)
+            copy_samples_to(one, folder, staging, callbacks.on_progress)
+            _close(one, staging, callbacks.part(CLOSING))
         finish_remote_merge(folder, staging, [one.split for one in parts])
 
 
-def _close(parts: Parts, root: Path) -> None:
+def _close(parts: Parts, root: Path, on_progress: Progress) -> None:
     """Writes the index files and the manifest of a split whose sidecars are all in `root`."""
     with blamed(find("task", name_of_task(parts.plan.task)), "finalise"):
-        Store(root, parts.plan).close(task_of(parts.roots[0], parts.plan), manifest_facts(parts.plan))
+        task = task_of(parts.roots[0], parts.plan)
+        Store(root, parts.plan).close(task, manifest_facts(parts.plan), on_progress)
 
 
 def _check_versions(parts: Parts) -> None:

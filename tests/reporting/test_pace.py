@@ -23,6 +23,16 @@ def test_the_first_items_with_their_preparation_do_not_count() -> None:
     assert pace.rate(104.0) == 0.5 and pace.left_s(104.0) == 14.0
 
 
+def test_a_smaller_number_begins_another_count() -> None:
+    pace = Pace("sample", first_done=0, first_s=0.0, done=0, total=1000)
+    pace.report(500, 1000, 10.0)
+    pace.report(1000, 1000, 20.0)
+    pace.report(0, 40, 20.0)
+    assert (pace.rate(30.0), pace.left_s(30.0)) == (0.0, None)
+    pace.report(10, 40, 40.0)
+    assert (pace.rate(40.0), pace.left_s(40.0)) == (0.5, 60.0)
+
+
 def test_nothing_is_promised_before_there_is_a_rate() -> None:
     pace = Pace("query", first_done=4, first_s=1.0, done=4, total=9)
     assert (pace.rate(1.0), pace.rate(50.0), pace.left_s(50.0)) == (0.0, 0.0, None)

@@ -14,6 +14,7 @@ import pytest
 
 from gear.collecting.run import CollectReport
 from gear.values.errors import DatasetError, GearError
+from gear.verbs import export as run
 from gear.verbs.export import export
 from tests.dataset.splits import fill, plan, tree
 
@@ -39,6 +40,18 @@ def test_an_export_that_does_not_fit_its_disk_is_refused(tmp_path: Path, monkeyp
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
+def test_an_export_with_larger_files_than_the_dataset_ends_after_its_first_samples(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fill(tmp_path / "a", plan(samples=8))
+    seen: list[tuple[int, int]] = []
+    monkeypatch.setattr(run, "_size_of", lambda root, files: 0)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=1000))
+    with pytest.raises(GearError, match=r"the exported files need about .* kB, and 1 kB are free there"):
+        export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b", on_progress=lambda *now: seen.append(now))
+    assert seen[-1] == (3, 8) and [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
 def test_the_files_of_a_killed_export_need_no_room_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fill(tmp_path / "a", plan())
     export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "whole")
@@ -55,8 +68,8 @@ def test_the_files_of_a_killed_export_need_no_room_again(tmp_path: Path, monkeyp
 def test_an_export_that_is_stopped_leaves_nothing_and_can_be_given_again(tmp_path: Path) -> None:
     fill(tmp_path / "a", plan())
 
-    def stop(written: int, _: int) -> None:
-        if written == 4:
+    def stop(done: int, _: int) -> None:
+        if done == 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -71,7 +84,7 @@ def test_an_export_that_is_killed_shows_nothing_and_the_same_command_goes_on(tmp
     script = (
         "import os, sys\nfrom gear.verbs.export import export\n"
         "export(sys.argv[1], layout='kitti-depth', out=sys.argv[2],"
-        " on_progress=lambda written, _: written == 4 and os._exit(9))"
+        " on_progress=lambda done, _: done == 2 and os._exit(9))"
     )
     killed = subprocess.run([sys.executable, "-c", script, str(tmp_path / "a"), str(tmp_path / "b")], check=False)
     assert killed.returncode == 9 and not (tmp_path / "b").exists()

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ import pytest
 import gear
 from gear.cli.main import main
 from gear.collecting.run import CollectReport
+from gear.dataset.sharding.merging import estimated_bytes, find_parts
 from gear.values.errors import DatasetError, GearError
 from tests.dataset.splits import fill, plan, tree
 from tests.verbs.collect.test_run import command
@@ -96,6 +98,18 @@ def test_driving_sequences_stay_together(tmp_path: Path, collect_small: Collect)
     collect_small("depth", tmp_path / "one", **drive)
     gear.merge([tmp_path / "b", tmp_path / "a"], out=tmp_path / "merged")
     assert tree(tmp_path / "merged") == tree(tmp_path / "one")
+
+
+def test_a_merge_that_does_not_fit_its_disk_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parts = halves(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=1000))
+    with pytest.raises(GearError, match=r"the merged samples need about .*B, and .*B are free there; give --out"):
+        gear.merge(parts, out=tmp_path / "merged")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
+    whole = find_parts(parts, "test")
+    for index, root in enumerate(parts):
+        files = [data for path, data in tree(root).items() if path.endswith((".png", ".tiff", f"{index:06d}.json"))]
+        assert sum(map(len, files)) == pytest.approx(estimated_bytes(whole) / 2, rel=0.2)
 
 
 def test_bad_shards_are_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

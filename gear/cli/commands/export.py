@@ -34,16 +34,9 @@ def run(args: argparse.Namespace) -> int:
     Args:
         args: arguments of the command line, as the parser of this command returns them.
     """
-    from gear.reporting.display import Display
+    from gear.values.counted import counted
     from gear.verbs.export import export
 
-    with Display("export", unit="file") as display:
-        count = export(
-            args.dataset,
-            layout=args.layout,
-            out=args.out,
-            settings=args.settings,
-            on_progress=display.callbacks.on_progress,
-        )
-    print(f"{args.out}: {count} samples in the layout {args.layout}")
+    count = export(args.dataset, layout=args.layout, out=args.out, settings=args.settings, progress=True)
+    print(f"{args.out}: {counted(count, 'sample')} in the layout {args.layout}")
     return 0

@@ -24,10 +24,8 @@ def run(args: argparse.Namespace) -> int:
     Args:
         args: arguments of the command line: `archive` and `out`.
     """
-    from gear.reporting.display import Display
     from gear.verbs.import_archive.run import import_archive
 
-    with Display("import", unit="file") as display:
-        report = import_archive(args.archive, out=args.out, on_progress=display.callbacks.on_progress)
+    report = import_archive(args.archive, out=args.out, progress=True)
     print(report.summary())
     return 0

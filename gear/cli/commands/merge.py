@@ -28,10 +28,8 @@ def run(args: argparse.Namespace) -> int:
     Args:
         args: arguments of the command line: `datasets` and `out`.
     """
-    from gear.reporting.display import Display
     from gear.verbs.merge import merge
 
-    with Display("merge") as display:
-        report = merge(args.datasets, out=args.out, on_progress=display.callbacks.on_progress)
+    report = merge(args.datasets, out=args.out, progress=True)
     print(report.summary())
     return 0

@@ -41,20 +41,18 @@ def run(args: argparse.Namespace) -> int:
     """
     import json
 
-    from gear.reporting.display import Display
     from gear.verbs.verify.run import verify
 
-    with Display("verify") as display:
-        report = verify(
-            args.dataset,
-            split=args.split,
-            repair=args.repair,
-            patch=args.patch,
-            town=args.town,
-            scenes=args.scenes,
-            simulation=args.simulation,
-            workers=max(args.workers, 1),
-            on_progress=display.callbacks.on_progress,
-        )
+    report = verify(
+        args.dataset,
+        split=args.split,
+        repair=args.repair,
+        patch=args.patch,
+        town=args.town,
+        scenes=args.scenes,
+        simulation=args.simulation,
+        workers=max(args.workers, 1),
+        progress=True,
+    )
     print(json.dumps(report.as_json(), indent=1) if args.json else "\n".join(report.lines()))
     return 0 if report.is_whole else 1

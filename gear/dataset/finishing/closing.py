@@ -19,6 +19,7 @@ from gear.dataset.layout import manifest_path, sidecar_path
 from gear.dataset.sealed_json import load_sealed
 from gear.dataset.sidecar import no_sidecar, read_sidecar
 from gear.values.errors import DatasetError, FieldError
+from gear.values.progress import NO_CALLBACKS, Progress
 from gear.values.serial import Json
 
 
@@ -89,7 +90,15 @@ class SidecarStream(Sequence[Sidecar]):
     files and hashes.
     """
 
-    def __init__(self, root: Path, split: str, samples: int, views: Set[str], closed: ClosedPart | None = None) -> None:
+    def __init__(
+        self,
+        root: Path,
+        split: str,
+        samples: int,
+        views: Set[str],
+        closed: ClosedPart | None = None,
+        on_progress: Progress = NO_CALLBACKS.on_progress,
+    ) -> None:
         """Prepares the stream; nothing is read.
 
         Args:
@@ -98,13 +107,16 @@ class SidecarStream(Sequence[Sidecar]):
             samples: number of samples.
             views: names of the cameras that each record must have.
             closed: the part of the split that was closed before; None for no such part.
+            on_progress: called after every sidecar that is read for the first time, with the numbers of known and of
+                all sidecars.
         """
-        self._root, self._split, self._views = root, split, views
+        self._root, self._split, self._views, self._on_progress = root, split, views, on_progress
         self._entries: list[Json] = [None] * samples
         self._hashes: list[str] = [""] * samples
         if closed is not None:
             self._entries[: len(closed.entries)] = closed.entries
             self._hashes[: len(closed.hashes)] = closed.hashes
+        self._known = sum(map(bool, self._hashes))
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -143,6 +155,8 @@ class SidecarStream(Sequence[Sidecar]):
                 "frame": record.frame,
                 "files": dict(sidecar.files),
             }
+            self._known += 1
+            self._on_progress(self._known, len(self))
         return sidecar
 
     def facts(self) -> dict[str, Json]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path, PurePosixPath
 
 from gear.dataset.files import sha256, write_whole
@@ -11,7 +11,6 @@ from gear.dataset.json_text import dump_json
 from gear.dataset.remote.folder import RemoteFolder
 from gear.dataset.sealed_json import sealed_json
 from gear.values.errors import DatasetError
-from gear.values.progress import Progress
 from gear.values.serial import Json
 
 WHOLE = "gear-export.json"
@@ -27,7 +26,7 @@ INDEXES = frozenset({".json", ".txt", ".yaml", ".yml", ".csv", ".md"})
 
 
 def write_remote_tree(
-    folder: RemoteFolder, tree: Iterable[tuple[str, bytes]], facts: dict[str, Json], on_progress: Progress
+    folder: RemoteFolder, tree: Iterable[tuple[str, bytes]], facts: dict[str, Json], on_file: Callable[[], None]
 ) -> None:
     """Writes the files of an export: pictures first, text files after them, and `gear-export.json` last.
 
@@ -35,7 +34,7 @@ def write_remote_tree(
         folder: the folder at the address; it must be empty, or hold an interrupted export of the same data.
         tree: paths and bytes of the files.
         facts: layout, options and data of the export.
-        on_progress: called after every file with (number of written files, 0).
+        on_file: called after every file.
 
     Raises:
         DatasetError: the folder holds anything else, two files have the same path, or a file cannot be written.
@@ -59,9 +58,9 @@ def write_remote_tree(
                 late.append(relative)
                 continue
             folder.write(relative, data)
-            on_progress(len(files) - len(late), 0)
+            on_file()
         for number, relative in enumerate(late):
             folder.write(relative, (spool / str(number)).read_bytes())
-            on_progress(len(files) - len(late) + number + 1, 0)
+            on_file()
     folder.write(WHOLE, sealed_json({"format": "gear-export", "version": 1, **facts, "files": files}))
     folder.remove(BEGUN)

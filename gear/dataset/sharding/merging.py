@@ -29,6 +29,8 @@ from gear.values.serial import Json
 SAMPLES_AT_A_TIME = 256
 """Number of samples that are submitted to the copying threads at a time."""
 
+MEASURED = 16
+"""Largest number of samples, evenly spaced, from whose sizes the size of a split is estimated."""
 
 TWICE = "belongs to two samples, or is another one in two of the folders"
 
@@ -155,6 +157,25 @@ def copy_patches(parts: Parts, out: Path, check: Callable[[Mapping[str, Path]], 
             raise DatasetError(folder, f"holds other pictures than {origin}; repair it with `gear verify`")
     for name, data in chosen.items():
         _put(out, patch_path(label, name), data)
+
+
+def estimated_bytes(parts: Parts) -> float:
+    """Estimates the number of bytes of a split's samples from some of them.
+
+    Args:
+        parts: the source folders.
+
+    Raises:
+        DatasetError: a sidecar (JSON file of a sample) cannot be read, or a path leads outside its folder.
+    """
+    total = len(parts.homes)
+    chosen = sorted({round(number * (total - 1) / max(1, MEASURED - 1)) for number in range(MEASURED)}) if total else []
+    sizes = []
+    for index in chosen:
+        root = parts.roots[parts.homes[index][0]]
+        paths = [inside(root, name) for name in (sidecar_path(parts.split, index), *files_of(parts, root, index))]
+        sizes.append(sum(path.stat().st_size for path in paths if path.is_file()))
+    return total * sum(sizes) / max(1, len(sizes))
 
 
 def copy_samples(parts: Parts, out: Path, on_progress: Progress) -> None:

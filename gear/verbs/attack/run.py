@@ -215,6 +215,7 @@ def run_attack(request: AttackRequest, callbacks: Callbacks) -> AttackReport:
         with contextlib.closing(log), traced(_asked(job), "forward"):
             calibration_s, fits = _calibrated(network, callbacks.on_warning)
             made = _optimised(job, product, network, plan, callbacks.on_progress, log)
+            callbacks.part("measuring what the patches achieve")
             facts = _facts(job, network, plan, made) | {
                 "calibration_seconds": round(calibration_s, 3),
                 "defense_fit": fits,

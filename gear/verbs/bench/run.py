@@ -38,6 +38,7 @@ from gear.verbs.bench.all_metrics import metric_records
 from gear.verbs.bench.carry_out import carry_out
 from gear.verbs.bench.chart import chart
 from gear.verbs.bench.config import BenchConfig, settings_of
+from gear.verbs.bench.disk import PictureSpace
 from gear.verbs.bench.drives.results import COLUMNS as DRIVE_COLUMNS
 from gear.verbs.bench.drives.results import DriveSection, drive_section
 from gear.verbs.bench.drives.steps import check_drives, every_step, planned_drives
@@ -177,6 +178,7 @@ def _in_turn(
 ) -> Reports:
     """Carries out all steps in this process, one after the other; returns the reports by their folder."""
     evaluations: Reports = {}
+    space = PictureSpace(steps, root, callbacks.on_warning)
     for number, step in enumerate(steps, 1):
         if on_step is not None:
             on_step(step, number, len(steps))
@@ -184,6 +186,7 @@ def _in_turn(
         done = carry_out(step, root, callbacks, changed=changed)
         if isinstance(done, (EvaluateReport, DriveReport)):
             evaluations[step.arguments["out"]] = done
+        space.step_done(step)
     return evaluations
 
 

@@ -19,6 +19,7 @@ from gear.dataset.executors.jobs import FAILURES, JobNotes, carry_out_jobs, run_
 from gear.values.errors import GearError
 from gear.values.progress import Callbacks
 from gear.verbs.bench.carry_out import carry_out
+from gear.verbs.bench.disk import PictureSpace
 from gear.verbs.bench.plan import Step
 
 INPUTS = ("data", "val", "calibration", "calibration_patched", "patch")
@@ -89,7 +90,8 @@ def run_steps(
     Raises:
         GearError: steps have failed; the message names the first one. All other steps were carried out.
     """
-    running = _Running(steps=steps, root=root, callbacks=callbacks, on_step=on_step)
+    space = PictureSpace(steps, root, callbacks.on_warning)
+    running = _Running(steps=steps, root=root, callbacks=callbacks, on_step=on_step, space=space)
     needed = dependencies(steps)
     callbacks.on_progress(0, len(steps))
     while wave := [
@@ -117,6 +119,7 @@ class _Running:
 
     Attributes:
         steps, root, callbacks, on_step: arguments of `run_steps`.
+        space: checks that the pictures fit on the disk.
         results: results of the finished steps, by position.
         failed: outcomes of the steps that failed, by position.
     """
@@ -125,6 +128,7 @@ class _Running:
     root: Path
     callbacks: Callbacks
     on_step: OnStep | None
+    space: PictureSpace
     results: dict[int, StepResult] = field(default_factory=dict)
     failed: dict[int, Outcome] = field(default_factory=dict)
 
@@ -157,6 +161,7 @@ class _Running:
         self.results[outcome.index] = outcome.value
         for line in outcome.value.warnings:
             self.callbacks.on_warning(line)
+        self.space.step_done(step)
         if self.on_step is not None:
             self.on_step(step, len(self.results), len(self.steps))
         self.callbacks.on_progress(len(self.results), len(self.steps))

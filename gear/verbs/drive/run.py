@@ -17,9 +17,11 @@ from gear.contracts.executors import Executor, Needs, Outcome
 from gear.contracts.specs import TaskSpec
 from gear.contracts.tasks import NO_PATCH
 from gear.dataset.claims import clear_claims
+from gear.dataset.disk_and_time_forecast import Forecast
 from gear.dataset.executors.engines import DEFAULT, open_executor
 from gear.dataset.executors.jobs import JobNotes, try_jobs
-from gear.dataset.files import clear_scratch, write_whole
+from gear.dataset.files import clear_scratch, inside, write_whole
+from gear.dataset.free_space import tree_bytes
 from gear.dataset.guarded_paths import remove_empty_folders
 from gear.dataset.json_text import dump_json
 from gear.dataset.layout import split_folder
@@ -148,6 +150,7 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
     outcomes = _made(drives, executor, callbacks)
     clear_claims(drives.root, CLAIMS)
     remove_empty_folders(drives.root, split_folder(CLAIMS))
+    callbacks.part("writing tables, figures and videos")
     results, failed = _gathered(drives, outcomes)
     if not results:
         raise GearError(f"{drives.root}: no drive could be made ({failed[0][1] if failed else 'there are none'})")
@@ -195,11 +198,14 @@ def _made(drives: Drives, executor: Executor, callbacks: Callbacks) -> dict[int,
     Returns:
         The last outcomes by index of the drive, without those of drives never begun.
     """
+    patches = patches_of(drives, drives.runs)
     missing = [
         index
-        for index, (run, patch) in enumerate(zip(drives.runs, patches_of(drives, drives.runs), strict=True))
+        for index, (run, patch) in enumerate(zip(drives.runs, patches, strict=True))
         if _stored(drives, run, patch, with_video=drives.has_video(run)) is None
     ]
+    advice = "make fewer drives, without `video: true`, or give --out on another disk"
+    forecast = Forecast(drives.root, len(missing), callbacks.on_warning, unit="drive", advice=advice)
     total = len(drives.runs)
     done, outcomes = total - len(missing), dict[int, Outcome]()
     callbacks.on_progress(done, total)
@@ -209,6 +215,9 @@ def _made(drives: Drives, executor: Executor, callbacks: Callbacks) -> dict[int,
         if outcome.kind == "failed":
             callbacks.on_warning(f"{drives.runs[outcome.index].title}: {outcome.error}")
         callbacks.on_progress(done + len(outcomes), total)
+        if outcome.kind == "made":
+            folder = drives.folder(drives.runs[outcome.index], patches[outcome.index])
+            forecast.item_done(lambda: tree_bytes(inside(drives.root, folder)))
 
     notes = JobNotes(root=drives.root, names=[run.title for run in drives.runs])
     try_jobs(executor, partial(drive_all, drives), missing, report, callbacks=callbacks, notes=notes)

@@ -175,6 +175,7 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
     with exclusive_lock(root, callbacks.on_warning):
         _begin(root, facts)
         rows = _measured(request, datasets, names, guarded, callbacks)
+        callbacks.part("computing metrics and intervals")
         learnt_facts = _fit_facts(root, guarded, request, callbacks.on_warning)
         sheets = write_sheets(root, rows, request.pictures, callbacks.on_warning)
         reports = tuple(replace(row_report(row), pictures=sheets.get(row.name)) for row in rows)

@@ -75,12 +75,16 @@ def import_archive(
             missing or has another hash, or `out` is not empty.
         GearError: the disk is too small.
     """
-    path, target = Path(archive), Path(out).resolve()
+    with displayed(Callbacks.of(on_progress=on_progress), "import", progress=progress, unit="file") as shown:
+        return _imported(Path(archive), Path(out), shown)
+
+
+def _imported(path: Path, out: Path, callbacks: Callbacks) -> ImportReport:
+    """Unpacks an archive and checks the files."""
+    target = out.resolve()
     check_target(target, "import")
-    with (
-        Archive(path) as opened,
-        displayed(Callbacks.of(on_progress=on_progress), "import", progress=progress, unit="file") as shown,
-    ):
+    callbacks.part("reading the list of files in the archive")
+    with Archive(path) as opened:
         root = _root_in(path, opened.members)
         wanted = [member for member in opened.members if PurePosixPath(member.path).is_relative_to(root)]
         chosen = {member.path for member in wanted}
@@ -91,15 +95,15 @@ def import_archive(
             for done, (member, data) in enumerate(opened.files(), start=1):
                 if member.path in chosen:
                     write_whole(unfinished, PurePosixPath(member.path).relative_to(root).as_posix(), data)
-                shown.on_progress(done, len(opened.members))
-            known, splits = _checked(path, unfinished)
+                callbacks.on_progress(done, len(opened.members))
+            known, splits = _checked(path, unfinished, callbacks.part("checking samples"))
             inner = [PurePosixPath(member.path).relative_to(root).as_posix() for member in wanted]
             surplus = [one for one in inner if one not in known]
             remove_files(unfinished, surplus)
             for folder in sorted({PurePosixPath(one).parts[0] for one in surplus if "/" in one}):
                 remove_empty_folders(unfinished, folder)
             clear_scratch(unfinished)
-    return ImportReport(root=Path(out), splits=splits, files=len(inner) - len(surplus), left_out=(*surplus, *outside))
+    return ImportReport(root=out, splits=splits, files=len(inner) - len(surplus), left_out=(*surplus, *outside))
 
 
 def _root_in(archive: Path, members: Sequence[Member]) -> PurePosixPath:
@@ -119,7 +123,7 @@ def _root_in(archive: Path, members: Sequence[Member]) -> PurePosixPath:
     return roots[0]
 
 
-def _checked(archive: Path, root: Path) -> tuple[set[str], tuple[str, ...]]:
+def _checked(archive: Path, root: Path, on_progress: Progress) -> tuple[set[str], tuple[str, ...]]:
     """Checks every file of an unpacked dataset.
 
     Returns:
@@ -129,7 +133,7 @@ def _checked(archive: Path, root: Path) -> tuple[set[str], tuple[str, ...]]:
         DatasetError: a file is damaged or missing.
     """
     names = splits_in(root)
-    checks = [check_split(root, name) for name in names]
+    checks = [check_split(root, name, on_progress) for name in names]
     findings = [(one.path, one.problem) for check in checks for one in check.findings]
     findings += [(path, "damaged") for path in damaged_cards(root)]
     if findings:

@@ -87,7 +87,7 @@ def _verified(
             except DatasetError as error:
                 unrepaired.append(str(error))
     write_cards(root, is_repair=True)
-    checks |= {name: check_split(root, name) for name in chosen}
+    checks |= {name: check_split(root, name, callbacks.part("checking repaired samples")) for name in chosen}
     left = _findings(root, checks, chosen)
     paths = {one.path for one in left}
     return VerifyReport(

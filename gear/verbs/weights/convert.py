@@ -74,7 +74,7 @@ class ConvertReport:
         others = f"fits, too, and was not taken (--entry NAME): {', '.join(self.others)}\n" if self.others else ""
         return (
             f"{self.path}: {self.tensors} tensors of {self.model}, {self.size_mb:.1f} MB\nsha256 {self.sha256}\n"
-            f"{taken}{others}use it with: --model {self.model} --set weights={self.path}"
+            f"{taken}{others}use it with: gear evaluate --model {self.model} --set weights={self.path}"
         )
 
 

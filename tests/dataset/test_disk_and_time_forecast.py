@@ -5,12 +5,10 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
-from gear.collecting import disk_and_time_forecast as forecast
-from gear.collecting.disk_and_time_forecast import Forecast
+from gear.dataset.disk_and_time_forecast import Forecast
 from gear.values.errors import GearError
 
 
@@ -19,13 +17,11 @@ def run(
 ) -> list[str]:
     """The lines that a collection of equal samples is announced with."""
     now_s, said = [0.0], list[str]()
-    monkeypatch.setattr(forecast, "_bytes_of", lambda store, index: sample_bytes)
     monkeypatch.setattr(shutil, "disk_usage", lambda root: SimpleNamespace(free=free))
-    store: Any = SimpleNamespace(root=Path("data"))
-    watched = Forecast(store, samples, said.append, lambda: now_s[0])
+    watched = Forecast(Path("data"), samples, said.append, clock_s=lambda: now_s[0])
     for index in range(min(samples, 10)):
         now_s[0] += sample_s if index else 500.0  # the first one waits for the world
-        watched.sample_done(index)
+        watched.item_done(lambda: sample_bytes)
     return said
 
 
