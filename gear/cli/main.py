@@ -12,10 +12,10 @@ from types import FrameType
 
 from gear.cli.closed_output import discard_output
 from gear.cli.machine_limits import limit_reached
-from gear.cli.messages import one_line
 from gear.cli.parser import Parser
 from gear.cli.streams import prepare_streams
 from gear.reporting.advice import fitted
+from gear.reporting.messages import one_line
 from gear.values.errors import GearError, UnknownNameError
 from gear.values.mujoco_gl import check_mujoco_gl
 from gear.values.regular_file import NotAFileError

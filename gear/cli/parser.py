@@ -7,7 +7,7 @@ import difflib
 from collections.abc import Sequence
 from typing import NoReturn
 
-from gear.cli.messages import one_line
+from gear.reporting.messages import one_line
 
 
 class Parser(argparse.ArgumentParser):

@@ -37,3 +37,14 @@ def wrapped(line: str) -> str:
     """
     indent = " " * (len(line) - len(line.lstrip()) + 4)
     return textwrap.fill(line, line_width(), subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+
+
+def folded(text: str) -> str:
+    """Wraps the sentences in a text, such as the notes below a table, at the line width; tables stay as they are.
+
+    Args:
+        text: lines of any length.
+    """
+    return "\n".join(
+        wrapped(line) if len(line) > line_width() and "  " not in line.strip() else line for line in text.split("\n")
+    )

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any, Protocol, TextIO
 
 from gear.reporting.advice import fitted
+from gear.reporting.messages import one_line
 from gear.reporting.pace import Pace
 from gear.reporting.progress_text import duration_text, progress_line
 from gear.values.progress import Callbacks
@@ -71,7 +72,7 @@ class Display:
             on_fit_progress=self._show_fit,
             on_fit_phase=self._show_phase,
             on_part=lambda title, done, total: self._backend.update(f"{PART}{title}", "", done, total),
-            on_warning=lambda line: self._backend.write(f"gear: note: {fitted(verb, line)}"),
+            on_warning=lambda line: self._backend.write(f"gear: note: {one_line(fitted(verb, line))}"),
         )
 
     def _show_fit(self, done: int, total: int) -> None:

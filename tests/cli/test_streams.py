@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from gear.cli.streams import line_width, prepare_streams, wrapped
+from gear.cli.streams import folded, line_width, prepare_streams, wrapped
 
 
 def test_characters_that_the_encoding_lacks_are_escaped(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,3 +32,11 @@ def test_long_lines_are_wrapped_with_an_indent_and_addresses_stay_whole(monkeypa
     lines = wrapped("  source: " + "word " * 20 + address).splitlines()
     assert lines[-1] == "      " + address and len(lines) == 3
     assert all(len(line) <= 70 for line in lines[:-1]) and lines[1].startswith("      word")
+
+
+def test_sentences_fit_the_line_and_tables_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    row = "data/none  0.712 [0.690, 0.734]  " + "0.5  " * 20
+    found = folded(f"{row}\n{'a word ' * 30}and an end\nshort\n").split("\n")
+    assert found[0] == row and found[-2:] == ["short", ""]
+    assert len(found) == 6 and all(len(line) <= 80 for line in found[1:]) and found[2].startswith("    ")

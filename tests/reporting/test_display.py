@@ -160,3 +160,10 @@ def test_a_script_hears_and_sees(capsys: pytest.CaptureFixture[str]) -> None:
     with displayed(callbacks, "gap", progress=False) as alone:
         assert alone is callbacks
     assert heard == [(1, 3)]
+
+
+def test_a_note_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with Display("collect") as shown:
+        shown.callbacks.on_warning(f"sample 3 failed (got '{'x' * 5000}'\nsecond line \x1b[31m)")
+    (said,) = (line for line in capsys.readouterr().err.splitlines() if not line.startswith("gear collect: "))
+    assert said.endswith("second line \\x1b[31m)") and len(said) < 300

@@ -72,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from gear.cli.requests import request_of
+    from gear.cli.streams import folded
     from gear.reporting.display import Display
     from gear.verbs.bench.command import command
     from gear.verbs.bench.drives.steps import every_step
@@ -112,5 +113,5 @@ def run(args: argparse.Namespace) -> int:
         else:
             report = run_sweep(request, display.callbacks, on_step)
             shown = report.text()
-    print(json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n" if args.json else shown, end="")
+    print(json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n" if args.json else folded(shown), end="")
     return 0

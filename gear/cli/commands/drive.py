@@ -51,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     from gear.cli.requests import request_of
+    from gear.cli.streams import folded
     from gear.reporting.display import Display
     from gear.values.serial import to_json
     from gear.verbs.drive.request import DriveRequest
@@ -65,5 +66,5 @@ def run(args: argparse.Namespace) -> int:
         return 0
     with Display("drive", unit="drive") as display:
         report = run_drive(request, display.callbacks)
-    print(json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n" if args.json else text(report), end="")
+    print(json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n" if args.json else folded(text(report)), end="")
     return 0

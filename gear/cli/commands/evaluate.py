@@ -7,7 +7,7 @@ import argparse
 from gear.cli.device import add_device
 from gear.cli.engine import add_engine, add_engine_workers
 from gear.cli.flag_types import positive
-from gear.cli.streams import line_width
+from gear.cli.streams import folded, line_width
 
 EXAMPLE = """examples:
   gear evaluate --model ddrnet23_slim --data data/clean
@@ -111,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
     print(
         json.dumps(report.as_json(), indent=1, allow_nan=False) + "\n"
         if args.json
-        else table(report, width=line_width()),
+        else folded(table(report, width=line_width())),
         end="",
     )
     return 0

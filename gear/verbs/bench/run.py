@@ -30,6 +30,7 @@ from gear.leaderboard.record import Kind
 from gear.measuring.plugin_selection import check_optics
 from gear.measuring.run_log import FOLDER, RunLog, choose_logger
 from gear.networks.runtime import has_cuda
+from gear.reporting.advice import fitted
 from gear.reporting.display import displayed
 from gear.values.errors import GearError
 from gear.values.progress import Callbacks, PhaseProgress, Progress, Warn
@@ -328,7 +329,8 @@ def _report(plan: Plan, root: Path, request: BenchRequest, reports: Reports) -> 
             for planned in plan.planned_evaluations(task_plugins)
         ]
         tasks.append(TaskResult(name=task_plugins.name, metric=metric, results=tuple(results)))
-    notes = [note for task in tasks for one in task.results for note in one.evaluation.facts.get("notes", [])]
+    said = (note for task in tasks for one in task.results for note in one.evaluation.facts.get("notes", []))
+    notes = [fitted("bench", note) for note in said]
     facts = {
         "config": to_plain(plan.config),
         "scenes": [scene.label for scene in plan.scenes],

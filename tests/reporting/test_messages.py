@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from gear.cli.messages import LONGEST, one_line
+from gear.reporting.messages import LONGEST, one_line
 from gear.values.errors import GearError
 
 
