@@ -17,6 +17,14 @@ def positive(text: str) -> int:
     return number
 
 
+def not_negative(text: str) -> int:
+    """Parses the text of a flag as a whole number of at least 0; a `type` function for argparse."""
+    number = int(text)
+    if number < 0:
+        raise argparse.ArgumentTypeError("must be at least 0")
+    return number
+
+
 def workers(text: str) -> Workers:
     """Parses `text`, the value of `--workers`: a whole number of at least 1, or `auto`; a `type` function for
     argparse.

@@ -18,6 +18,7 @@ from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
 from gear.dataset.json_text import load_json
 from gear.formats.picture_size import check_size
 from gear.formats.png_chunks import check_chunks
+from gear.formats.quiet_decoder import decode_quietly
 from gear.networks.shipped import shipped_patches
 from gear.values.errors import DatasetError, PatchError
 from gear.values.frames import UInt8Image
@@ -135,8 +136,8 @@ def read_patch(path: Path) -> UInt8Image:
     try:
         check_size(data, least_px=SIDE_PX[0], most_px=SIDE_PX[1])
         check_chunks(data)
-        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except (cv2.error, ValueError) as error:
+        picture = decode_quietly(data)
+    except ValueError as error:
         raise PatchError(path, str(error) if " px; sides of " in str(error) else no_picture) from error
     if picture is None:
         raise PatchError(path, no_picture)

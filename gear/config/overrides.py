@@ -9,6 +9,9 @@ from gear.config.nodes import Mapping, Node, Place, Scalar, parse_value
 from gear.config.reader import expand_shorthand
 from gear.values.errors import ConfigError
 
+LONGEST = 200
+"""Largest number of characters of a setting in an error message."""
+
 
 def with_overrides(node: Node, settings: Iterable[str], kind: Any = None, *, flag: str = "--set") -> Node:
     """Inserts the values of `--set` options into a YAML tree; later settings override earlier ones.
@@ -26,7 +29,7 @@ def with_overrides(node: Node, settings: Iterable[str], kind: Any = None, *, fla
     hint = "such as --set weather.cloudiness=30" if kind else "with a key that `gear plugins show NAME` lists"
     for setting in settings:
         key, separator, text = setting.partition("=")
-        name = f"{flag} {setting}"
+        name = f"{flag} {setting if len(setting) <= LONGEST else setting[:LONGEST] + '…'}"
         if not separator or not key.strip():
             raise ConfigError(name, 0, 0, "", f"expected KEY=VALUE, {hint}")
         text = f"'{text.strip()}'" if text.strip() == "-" else text  # to YAML a minus alone begins a list

@@ -12,6 +12,7 @@ from gear.contracts.tasks import Auxiliary, Encoded, ExtendsIndexes, Sample, Sid
 from gear.dataset.claims import clear_claims
 from gear.dataset.failures import clear_failures
 from gear.dataset.files import clear_scratch, inside, read_bytes, sha256, sync_folder, write_whole
+from gear.dataset.find_datasets import no_dataset
 from gear.dataset.finishing.cards import write_cards
 from gear.dataset.finishing.closing import ClosedPart, SidecarStream, can_extend, closed_part
 from gear.dataset.guarded_paths import owned, refuse_links, remove_empty_folders, remove_file, remove_files
@@ -449,7 +450,7 @@ def splits_of(root: Path) -> Sequence[str]:
     folder = root / "gear"
     names = sorted(p.parent.name for p in folder.glob("*/plan.json")) if folder.is_dir() else []
     if not names:
-        raise DatasetError(root, "is not a dataset of gear's (it has no gear/<split>/plan.json)")
+        raise no_dataset(root)
     return names
 
 

@@ -7,20 +7,14 @@ from typing import Any
 
 from gear.config.nodes import parse_text
 from gear.contracts.tasks import Sample, Task
+from gear.dataset.find_datasets import roots_of
 from gear.dataset.plan import Plan
 from gear.dataset.reading import Dataset, Twins, pair_twins, read_manifest
 from gear.dataset.store import plan_of, splits_of
 from gear.plugins.build import build_task, name_of_task
-from gear.values.counted import counted
 from gear.values.errors import DatasetError
 
 __all__ = ["Dataset", "Twins", "open_dataset", "open_twins", "root_and_split", "roots_of", "task_of"]
-
-DEEPEST = 3
-"""Largest number of folder levels between a folder and the dataset roots that are searched in it."""
-
-LISTED = 5
-"""Largest number of datasets that an error names."""
 
 
 def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
@@ -40,7 +34,6 @@ def open_dataset(path: str | Path, split: str | None = None) -> Dataset[Any]:
     """
     root = Path(path)
     if split is None:
-        _refuse_folder_of_datasets(root)
         names = splits_of(root)
         if len(names) > 1:
             raise DatasetError(root, f"holds several splits ({', '.join(names)}); say which")
@@ -77,19 +70,6 @@ def root_and_split(path: str | Path) -> tuple[Path, str | None]:
     return Path(path), None
 
 
-def roots_of(folder: Path) -> list[Path]:
-    """Returns the folder itself if it is the root of a dataset, otherwise the sorted roots of datasets inside the
-    folder.
-
-    Args:
-        folder: the folder; it is searched `DEEPEST` levels deep.
-    """
-    if next(folder.glob("gear/*/plan.json"), None) is not None:
-        return [folder]
-    plans = (plan for depth in range(DEEPEST + 1) for plan in folder.glob("*/" * depth + "gear/*/plan.json"))
-    return sorted({plan.parents[2] for plan in plans})
-
-
 def open_twins(first: str | Path, second: str | Path, split: str | None = None) -> Twins[Sample]:
     """Opens two datasets that differ only in their patch (twins), and pairs their samples by index.
 
@@ -101,14 +81,6 @@ def open_twins(first: str | Path, second: str | Path, split: str | None = None) 
         DatasetError: the datasets differ in more than the patch, or one of them cannot be opened.
     """
     return pair_twins(open_dataset(first, split), open_dataset(second, split))
-
-
-def _refuse_folder_of_datasets(folder: Path) -> None:
-    """Raises an error that names the datasets in a folder that is not a dataset itself."""
-    roots = roots_of(folder) if folder.is_dir() else []
-    if roots and folder not in roots:
-        listed = ", ".join(str(root) for root in roots[:LISTED]) + ", …" * (len(roots) > LISTED)
-        raise DatasetError(folder, f"is a folder of {counted(len(roots), 'dataset')}; give one of them: {listed}")
 
 
 def _as_yaml(options: Any) -> str:

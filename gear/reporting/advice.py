@@ -14,7 +14,8 @@ Rewrites = tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...]
 
 _SETTING = r"\w+=\S*[^\s;,.)]"
 _OF_A_DEFENSE = rf"--defense-set ({_SETTING}(?: {_SETTING})*)"
-_OF_A_NETWORK = rf"--(?:model-)?set ({_SETTING})"
+_OF_A_NETWORK = rf"(?:--model-set|(?<=say )--set|--set(?= input_scale)) ({_SETTING})"
+"""Options of a network: `--set` alone also sets keys of the config of `gear bench` and `gear drive`."""
 
 
 def _in_yaml(where: str) -> Callable[[re.Match[str]], str]:

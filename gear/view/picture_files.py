@@ -9,6 +9,7 @@ import numpy as np
 
 from gear.contracts.tasks import Sidecar
 from gear.dataset.files import inside, read_bytes
+from gear.formats.quiet_decoder import decode_quietly
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
 
@@ -35,7 +36,7 @@ def picture_file(root: Path, sidecar: Sidecar, pixels: UInt8Image) -> str | None
                 data = read_bytes(inside(root, relative))
             except DatasetError:
                 continue
-            stored = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) if data else None
+            stored = decode_quietly(data, cv2.IMREAD_COLOR)
             if stored is not None and np.array_equal(stored[..., ::-1], pixels):
                 return relative
     return None

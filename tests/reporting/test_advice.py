@@ -163,6 +163,13 @@ def test_messages_name_flags_of_the_command_that_prints_them(module: str, flags:
             "its masks mean nothing (other layers: --defense-set shallow=[TAP] deep=[TAP])",
             "its masks mean nothing (other layers: `shallow: [TAP]`, `deep: [TAP]` in the driver's key `defense_set`)",
         ),
+        ("bench", "--set foo=1: foo: unknown key", "--set foo=1: foo: unknown key"),
+        ("drive", "--set foo=1: foo: unknown key", "--set foo=1: foo: unknown key"),
+        (
+            "drive",
+            "the model assumes 70; say --set hfov_deg=90",
+            "the model assumes 70; say `hfov_deg: 90` in the driver's key `model_set`",
+        ),
         ("defend", "raise it with --defense-set false_alarms=0.1", "raise it with --set false_alarms=0.1"),
         ("verify", "wait for its end, or use another --out", "wait for its end"),
         ("attack --verify", "or use --renderer filament", "or collect the dataset with --renderer filament"),

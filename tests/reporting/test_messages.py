@@ -23,6 +23,14 @@ def test_long_quoted_values_are_cut(quote: str) -> None:
     assert one_line(short) == short
 
 
+def test_values_without_quotes_are_cut_and_names_of_files_are_not() -> None:
+    text = one_line(f"--set weather.cloudiness={'x' * 5000}: expected float")
+    assert len(text) < LONGEST + 60 and text.endswith("x… expected float")
+    name = "n" * 255
+    assert one_line(f"/data/{name}/{name}: no such file") == f"/data/{name}/{name}: no such file"
+    assert len(one_line(f"/data/{'n' * 3000}: is not a dataset")) < LONGEST + 60
+
+
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
 @pytest.mark.parametrize("command", ["attack", "train", "collect"])
 def test_help_in_any_encoding(command: str, encoding: str) -> None:

@@ -6,6 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from gear.cli.device import add_device
+from gear.cli.flag_types import not_negative, positive
 from gear.cli.log import add_log
 
 if TYPE_CHECKING:
@@ -39,10 +40,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_drive(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the patches")
     parser.add_argument("--attack", metavar="NAME", help="attack plugin (scene_specific; with --drive square)")
-    parser.add_argument("--steps", type=int, metavar="N", help="most optimisation steps (300; with --queries no limit)")
+    parser.add_argument(
+        "--steps", type=positive, metavar="N", help="most optimisation steps (300; with --queries no limit)"
+    )
     parser.add_argument(
         "--queries",
-        type=int,
+        type=positive,
         metavar="N",
         help="most forward passes of the model, for attacks without gradients; with --drive most tried patches (100)",
     )
@@ -62,10 +65,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="dataset on which patches are validated; the best patches are kept",
     )
-    parser.add_argument("--every", type=int, default=25, metavar="N", help="steps between two validations (25)")
+    parser.add_argument("--every", type=positive, default=25, metavar="N", help="steps between two validations (25)")
     parser.add_argument(
         "--patience",
-        type=int,
+        type=not_negative,
         default=0,
         metavar="N",
         help="validations without improvement until the attack stops early (0: never)",
@@ -104,13 +107,16 @@ def _add_drive(parser: argparse.ArgumentParser) -> None:
         help="with --drive: sets a key of the drive config; repeatable",
     )  # fmt: skip
     parser.add_argument(
-        "--redrive", type=int, metavar="N", help="with --drive: steps after which the drives are made anew (100)"
+        "--redrive", type=positive, metavar="N", help="with --drive: steps after which the drives are made anew (100)"
     )
     parser.add_argument(
-        "--frames", type=int, metavar="N", help="with --drive: frames of the drives to optimise on, with gradients (60)"
+        "--frames",
+        type=positive,
+        metavar="N",
+        help="with --drive: frames of the drives to optimise on, with gradients (60)",
     )
     parser.add_argument(
-        "--held-out", type=int, metavar="N",
+        "--held-out", type=not_negative, metavar="N",
         help="with --drive: seeds per situation at which the patches are judged; 0 for none (3)",
     )  # fmt: skip
 

@@ -6,7 +6,7 @@ import argparse
 
 from gear.cli.device import add_device
 from gear.cli.engine import add_engine, add_engine_workers
-from gear.cli.flag_types import positive
+from gear.cli.flag_types import not_negative, positive
 from gear.cli.streams import folded, line_width
 
 EXAMPLE = """examples:
@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--pictures",
-        type=int,
+        type=not_negative,
         default=4,
         metavar="N",
         help="samples on the sheet of what changed most in each dataset, linked from report.html; 0 for none (4)",

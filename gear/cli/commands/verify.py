@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import argparse
 
+from gear.cli.flag_types import positive
+
 EXAMPLE = """examples:
   gear verify data/semseg/town10-billboard01-ClearNoon/none
   gear verify data/twin --repair
@@ -25,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", metavar="FILE", help="scene library of that town")
     parser.add_argument("--simulation", metavar="FILE", help="simulation config, if it is not one of gear's")
     parser.add_argument(
-        "--workers", type=int, default=1, metavar="N", help="number of processes that make samples again (1)"
+        "--workers", type=positive, default=1, metavar="N", help="number of processes that make samples again (1)"
     )
 
 
@@ -51,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         town=args.town,
         scenes=args.scenes,
         simulation=args.simulation,
-        workers=max(args.workers, 1),
+        workers=args.workers,
         progress=True,
     )
     print(json.dumps(report.as_json(), indent=1) if args.json else "\n".join(report.lines()))

@@ -16,6 +16,7 @@ from typing import Literal
 from gear.dataset.checks.salvage import files_below, listed_hashes
 from gear.dataset.failures import failures_folder
 from gear.dataset.files import inside
+from gear.dataset.find_datasets import no_dataset
 from gear.dataset.hashing import file_hash, in_threads
 from gear.dataset.layout import GEAR, is_temporary, manifest_path, patch_path, plan_path, sidecar_path, split_folder
 from gear.dataset.plan import Plan, read_plan
@@ -104,7 +105,7 @@ def splits_in(root: Path) -> list[str]:
     entries = [*root.glob(f"{GEAR}/*/plan.json"), *root.glob(f"{GEAR}/*/manifest.json")]
     names = {path.parent.name for path in entries} | {path.parent.name for path in root.glob(f"{GEAR}/*/samples")}
     if not names:
-        raise DatasetError(root, "is not a dataset of gear's (it has no gear/<split>/plan.json)")
+        raise no_dataset(root)
     return sorted(names)
 
 
