@@ -31,6 +31,9 @@ def with_direction(name: str, *, lower_is_better: bool | None, whose: str = "") 
 def metric_direction(name: str, spec: TaskSpec[Any], task: Task[Any, Any]) -> bool | None:
     """Whether lower values of a task's metric are better; None if no direction is better, or if none is stated.
 
+    An evaluator of another package that fails, or returns something else, states no direction: a name of a curve must
+    not end a training.
+
     Args:
         name: name of the metric; `<report>.<metric>` for a metric of a report.
         spec: spec of the task, which states the direction of its main metric.
@@ -41,4 +44,8 @@ def metric_direction(name: str, spec: TaskSpec[Any], task: Task[Any, Any]) -> bo
     evaluators = task.reports() if isinstance(task, Reports) else {}
     report, _, metric = name.partition(".")
     evaluator, known = (evaluators[report], metric) if report in evaluators else (task.evaluator(), name)
-    return evaluator.lower_is_better(known) if isinstance(evaluator, Directed) else None
+    try:
+        stated = evaluator.lower_is_better(known) if isinstance(evaluator, Directed) else None
+    except Exception:  # an evaluator of another package
+        return None
+    return stated if isinstance(stated, bool) else None

@@ -42,3 +42,10 @@ def test_without_statements_the_main_metric_alone_has_a_direction() -> None:
     task: Any = SimpleNamespace(evaluator=SimpleNamespace)
     assert metric_direction("error", spec, task) is True
     assert metric_direction("other.share", spec, task) is None
+
+
+@pytest.mark.parametrize("answer", [lambda metric: 1 / 0, lambda metric: "up", lambda: True])
+def test_an_evaluator_that_fails_states_no_direction(answer: Any) -> None:
+    spec: Any = SimpleNamespace(metric="error", lower_is_better=True)
+    task: Any = SimpleNamespace(evaluator=lambda: SimpleNamespace(lower_is_better=answer))
+    assert metric_direction("other", spec, task) is None

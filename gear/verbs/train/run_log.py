@@ -93,8 +93,8 @@ class TrainLog:
             views: names of the cameras whose pictures the network uses.
             samples: the validation samples.
         """
-        titled = {f"validation/{metric_title(name, self._spec, self._task)}": value for name, value in metrics.items()}
-        self._log.scalars(titled, state.step)
+        for name, value in metrics.items() if self._log.is_on else ():
+            self._log.scalar(f"validation/{metric_title(name, self._spec, self._task)}", value, state.step)
         self._log.pictures(state.step, lambda: {FIGURE: figure_of(self._task, network, views, samples)})
 
     def patches(self, state: TrainingState, adversary: Adversary) -> None:
