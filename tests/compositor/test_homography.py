@@ -139,3 +139,15 @@ def test_the_memory_of_a_prepared_sample_is_that_of_its_tensors() -> None:
     parts = [tensor.numel() * tensor.element_size() for tensor in tensors]
     assert prepared.nbytes == sum(parts) + inner.matrices[0].nbytes
     assert all(parts)
+
+
+def test_edges_read_the_near_side_of_the_patch() -> None:
+    """Samples beside the board do not count: they would read the opposite side of the repeating texture."""
+    sample = sample_of(turned(board(14.0, -4.0), -0.9))
+    patch = torch.zeros(3, 60, 120)
+    patch[0, :, :60], patch[2, :, 60:] = 1, 1
+    cover = 1 - composed(sample, flat(0.0, 1.0, 0.0))[..., 0] / stored(sample)[..., 0]
+    blue = (composed(sample, patch) - stored(sample) * (1 - cover[..., None]))[..., 2] / cover
+    left_edge = torch.from_numpy(places(sample)[0] < 0.1) & (cover > 0.2) & (cover < 0.9)
+    assert int(left_edge.sum()) > 10
+    assert float(blue[left_edge].max()) < 0.5
