@@ -32,7 +32,7 @@ myst_heading_anchors = 3
 # Notebooks are committed without outputs: the build runs them, in a temporary folder, and an error fails the build.
 nb_execution_mode = "force"
 nb_execution_in_temp = True
-nb_execution_timeout = 900
+nb_execution_timeout = 3600
 nb_execution_raise_on_error = True
 
 autodoc_member_order = "bysource"

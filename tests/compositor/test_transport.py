@@ -8,11 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from scipy import sparse
 
 import gear
+from gear.camera.response import IDENTITY, Response
 from gear.compositor.homography import HomographyCompositor
 from gear.compositor.registry import open_compositor
-from gear.compositor.transport import TransportCompositor
+from gear.compositor.sparse import SparseMatrix
+from gear.compositor.transport import TransportCompositor, _Light
 from gear.dataset.probe_files import probes_of
 from gear.values.errors import DatasetError, UnknownNameError
 from gear.values.frames import LINEAR_FULL_SCALE
@@ -177,3 +180,36 @@ def test_a_broken_probe_is_named(twins: MakeTwins, tmp_path: Path) -> None:
     broken = replace(gear.open_dataset(tmp_path), root=tmp_path)
     with pytest.raises(DatasetError, match=r"white\.png"):
         probes_of(broken, 0, "left")
+
+
+def test_light_of_all_surfaces_is_added_and_each_view_has_its_own_camera() -> None:
+    """Two views of two and one pixels, two surfaces: picture = response(effects(B + M_1 p_1 G_1 + M_2 p_2 G_2))."""
+    rng = np.random.default_rng(0)
+    counts, texels = (2, 1), (3, 4)
+    dense = [[rng.uniform(0, 0.2, (count, each)).astype(np.float32) for each in texels] for count in counts]
+    black = [rng.uniform(0, 0.1, (count, 3)).astype(np.float32) for count in counts]
+    gains = [[rng.uniform(0, 1, (count, 3)).astype(np.float32) for _ in texels] for count in counts]
+    patches = [rng.uniform(0, 1, (each, 3)).astype(np.float32) for each in texels]
+    responses = (Response(exposure=1.5, contrast=1.2), IDENTITY)
+    effects = ((), (lambda light: light * 0.5, lambda light: light + 0.1))
+    inner = [
+        _Light(
+            black=torch.from_numpy(black[view]),
+            matrices=tuple(SparseMatrix.of(sparse.csr_matrix(m), torch.device("cpu")) for m in dense[view]),
+            gains=tuple(torch.from_numpy(gain) for gain in gains[view]),
+            response=responses[view],
+            effects=effects[view],
+        )
+        for view in range(2)
+    ]
+    shown = TransportCompositor([])._composed(inner, [torch.from_numpy(p) for p in patches])  # type: ignore[arg-type]
+    light = [
+        black[view] + sum(m @ p * gain for m, p, gain in zip(dense[view], patches, gains[view], strict=True))
+        for view in range(2)
+    ]
+    wanted = np.concatenate([responses[0].curve(light[0]), light[1] * 0.5 + 0.1])
+    assert shown.numpy() == pytest.approx(wanted, abs=1e-6)
+    for view, one in enumerate(inner):
+        assert one.nbytes == black[view].nbytes + sum(
+            matrix.nbytes + gain.nbytes for matrix, gain in zip(one.matrices, gains[view], strict=True)
+        )

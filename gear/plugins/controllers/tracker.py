@@ -58,7 +58,7 @@ class Track:
 
     @property
     def gap_m(self) -> float:
-        """Estimated free distance from the front of the ego car."""
+        """Estimated free distance from the front of the ego car to the obstacle, metres."""
         return float(self.state[0])
 
     @property
