@@ -151,3 +151,12 @@ def test_edges_read_the_near_side_of_the_patch() -> None:
     left_edge = torch.from_numpy(places(sample)[0] < 0.1) & (cover > 0.2) & (cover < 0.9)
     assert int(left_edge.sum()) > 10
     assert float(blue[left_edge].max()) < 0.5
+
+
+def test_pixels_are_the_covered_share_of_the_patch_and_the_rest_of_the_picture() -> None:
+    """With a black patch c = s (1 - a), with a white one c = a + s (1 - a), for a pixel s and its covered share a."""
+    sample = sample_of(turned(board(14.0, -4.0), -0.9))
+    black, white = (composed(sample, flat(value, value, value)) for value in (0.0, 1.0))
+    share = white - black
+    assert torch.allclose(black, stored(sample) * (1 - share), atol=1e-6)
+    assert set((share * 4).round(decimals=4).unique().tolist()) == {0.0, 1.0, 2.0, 3.0, 4.0}
