@@ -9,6 +9,7 @@ import ctypes
 import os
 from typing import Any
 
+from gear.render.triton_import import bind_triton_to_its_own_symbols
 from gear.values.errors import BackendError
 
 _NO_LIBRARY = "apt-get install libegl1 libopengl0 libegl-mesa0 libgl1-mesa-dri"
@@ -66,6 +67,7 @@ def open_context(backend: str, renderer: str) -> Any:
         BackendError: the driver is missing, or `MUJOCO_EGL_DEVICE_ID` is not the number of a device.
     """
     _silence_mesa()
+    bind_triton_to_its_own_symbols()
     try:
         if backend == "egl":
             from mujoco.egl import GLContext

@@ -160,3 +160,12 @@ def test_pixels_are_the_covered_share_of_the_patch_and_the_rest_of_the_picture()
     share = white - black
     assert torch.allclose(black, stored(sample) * (1 - share), atol=1e-6)
     assert set((share * 4).round(decimals=4).unique().tolist()) == {0.0, 1.0, 2.0, 3.0, 4.0}
+
+
+def test_a_board_seen_from_behind_hides_no_other_board() -> None:
+    front, back = board(24.0, -0.5), turned(board(12.0, 0.5, surface=1), np.pi)
+    sample = sample_of(front, back)
+    picture = composed(sample, flat(0.0, 0.0, 1.0), flat(*FULL))
+    u, v = places(sample, 0)
+    inside = torch.from_numpy((u > 0.03) & (u < 0.97) & (v > 0.03) & (v < 0.97))
+    assert torch.allclose(picture[inside], torch.tensor((0.0, 0.0, 1.0)), atol=1e-5)
