@@ -206,7 +206,9 @@ def _refusal(error: Exception, path: Path) -> GearError:
         )
     if not isinstance(error, DAMAGE):
         raise error
-    return GearError(f"{path}: not a checkpoint of PyTorch's ({_first_line(error)})")
+    # Some of torch's messages suggest reading the file unsafely.
+    cause = type(error).__name__ if "weights_only" in str(error) else _first_line(error)
+    return GearError(f"{path}: not a checkpoint of PyTorch's ({cause})")
 
 
 def _foreign_global(path: Path) -> str | None:

@@ -14,6 +14,7 @@ from gear.dataset.json_text import parse_json
 from gear.networks.options import NONE, SHIPPED
 from gear.values.entry_points import installed_entry_points
 from gear.values.errors import GearError
+from gear.values.regular_file import NotAFileError, check_regular
 from gear.values.serial import Json
 
 GROUP = "gear.weights"
@@ -92,18 +93,22 @@ def inspect(path: str | Path) -> WeightsFile:
 
 
 def check_file(path: Path) -> None:
-    """Checks that a weights file exists.
+    """Checks that a weights file exists and is a regular file.
 
     Args:
         path: the file.
 
     Raises:
-        GearError: there is no such file.
+        GearError: there is no such file, or it is a folder, a device, a FIFO or a socket.
     """
     if path.is_dir():
         raise GearError(f"{path}: is a folder; name the file in it")
-    if not path.is_file():
-        raise GearError(f"{path}: there is no such weights file")
+    try:
+        check_regular(path)
+    except NotAFileError as error:
+        raise GearError(f"{path}: {error.strerror}") from error
+    except OSError as error:
+        raise GearError(f"{path}: there is no such weights file") from error
 
 
 def not_safetensors(path: str | Path, error: Exception) -> GearError:

@@ -1,6 +1,7 @@
 """Reads files whose paths come from users or data, and refuses everything but regular files.
 
-On a device, a FIFO or a socket, `open` or `read` could wait for ever or fill the memory.
+On a device, a FIFO or a socket, `open` or `read` could wait for ever or fill the memory. A file of 40 GB could also
+fill the memory; it may need no space on the disk.
 """
 
 from __future__ import annotations
@@ -9,6 +10,11 @@ import errno
 import os
 import stat
 from pathlib import Path
+
+from gear.values.machine import free_memory_bytes
+
+LARGE_BYTES = 256 * 1024**2
+"""Size above which a file is compared with the free memory before it is read."""
 
 KINDS = (
     (stat.S_ISDIR, "folder"),
@@ -31,6 +37,19 @@ class NotAFileError(OSError):
         """
         number = errno.EISDIR if kind == "folder" else errno.EINVAL
         super().__init__(number, f"is a {kind}; a file was asked for", str(path))
+
+
+class FileTooLargeError(OSError):
+    """Error for a file that does not fit into the free memory. Code that handles `OSError` handles it as well."""
+
+    def __init__(self, path: Path, size_bytes: int) -> None:
+        """Makes the error.
+
+        Args:
+            path: the file.
+            size_bytes: its size.
+        """
+        super().__init__(errno.EFBIG, f"has {size_bytes / 1024**3:.1f} GiB, more than the free memory", str(path))
 
 
 def check_regular(path: str | Path) -> Path:
@@ -57,6 +76,7 @@ def read_regular(path: str | Path, *, most_bytes: int | None = None) -> bytes:
 
     Raises:
         NotAFileError: the path is a folder, a device, a FIFO or a socket.
+        FileTooLargeError: the file is larger than the free memory.
         OSError: the path does not exist or cannot be read.
     """
     checked = check_regular(path)  # before it is opened: opening some devices has effects
@@ -64,6 +84,10 @@ def read_regular(path: str | Path, *, most_bytes: int | None = None) -> bytes:
     with os.fdopen(descriptor, "rb") as stream:
         status = os.fstat(descriptor)
         _refuse_other_kinds(checked, status.st_mode)  # another file may have taken its place
+        if most_bytes is None and status.st_size > LARGE_BYTES:
+            free = free_memory_bytes()
+            if free is not None and status.st_size > free:
+                raise FileTooLargeError(checked, status.st_size)
         # A file whose size the system calls 0, as those in /proc, is read to its end.
         return stream.read() if most_bytes is None or status.st_size < most_bytes else stream.read(most_bytes)
 

@@ -4,6 +4,7 @@ import argparse
 import collections
 import datetime
 import enum
+import os
 import pickle
 import types
 import warnings
@@ -140,8 +141,9 @@ def test_a_torchscript_archive_is_refused(tmp_path: Path) -> None:
         (b"hello world" * 10, "not a checkpoint of PyTorch's"),
         (pickle.dumps({1: 2}, 0), "not a checkpoint"),
         (b"PK\x03\x04 but no archive", "not a checkpoint of PyTorch's"),
+        (bytes(2048), "not a checkpoint of PyTorch's"),
     ],
-    ids=["empty", "text", "pickle", "broken zip"],
+    ids=["empty", "text", "pickle", "broken zip", "zeros"],
 )
 def test_what_is_no_checkpoint_is_said_in_one_line(tmp_path: Path, content: bytes, problem: str) -> None:
     (tmp_path / "a.pth").write_bytes(content)
@@ -159,3 +161,6 @@ def test_what_holds_no_network_is_refused(tmp_path: Path) -> None:
             read_published(tmp_path / "a.pth")
     with pytest.raises(GearError, match="no such weights file"):
         read_published(tmp_path / "b.pth")
+    os.mkfifo(tmp_path / "c.pth")
+    with pytest.raises(GearError, match="is a FIFO; a file was asked for"):
+        read_published(tmp_path / "c.pth")

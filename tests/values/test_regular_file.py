@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gear.values.regular_file import NotAFileError, check_regular, read_regular
+from gear.values.regular_file import FileTooLargeError, NotAFileError, check_regular, read_regular
 
 
 def test_a_file_and_a_link_to_it_are_read(tmp_path: Path) -> None:
@@ -53,3 +53,13 @@ def test_a_file_that_becomes_a_fifo_before_it_is_opened_is_refused(
 def test_a_file_that_is_not_there_is_the_usual_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         read_regular(tmp_path / "a")
+
+
+def test_a_file_that_does_not_fit_into_the_memory_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "huge"
+    with path.open("wb") as stream:
+        stream.truncate(1 << 42)  # it needs no space on the disk
+    with pytest.raises(FileTooLargeError, match=r"has 4096\.0 GiB, more than the free memory") as caught:
+        read_regular(path)
+    assert caught.value.filename == str(path) and caught.value.errno == errno.EFBIG
+    assert read_regular(path, most_bytes=3) == bytes(3)
