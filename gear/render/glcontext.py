@@ -106,6 +106,7 @@ def _cause(backend: str, error: Exception) -> tuple[str, str]:
 def egl_problem() -> tuple[str, str] | None:
     """The reason why EGL cannot be used without a display, and what to install; None if EGL can start a device."""
     _silence_mesa()
+    bind_triton_to_its_own_symbols()
     if not _loads("libEGL.so.1"):
         return "the EGL library libEGL.so.1 is not installed", _NO_LIBRARY
     devices = _egl_devices()

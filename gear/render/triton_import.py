@@ -43,7 +43,7 @@ class _Finder:
 def bind_triton_to_its_own_symbols() -> None:
     """Makes a later import of Triton in this process safe; it does not import Triton.
 
-    It must be called before an OpenGL context of Mesa is opened.
+    It must be called before a driver of Mesa is loaded.
     """
     if _Finder not in sys.meta_path:
         sys.meta_path.insert(0, _Finder)
