@@ -11,6 +11,9 @@ from gear.reporting.progress_text import plural, rate_text
 from gear.values.resources import data_dir
 from gear.values.serial import Json
 
+TOWN_FILE, SCENES_FILE = "TOWN.xml", "SCENES.yml"
+"""Placeholders for the files of a town that is not one of gear's, in the next command."""
+
 TWIN_NAMES = {"none": "no patch", "random": "random patches", "patch": "these patches"}
 """Names of the twins of a drive in the summary."""
 
@@ -50,17 +53,27 @@ class AttackReport:
                 "the objective follows its gradient only in part: gradients are masked, so a stronger attack may exist "
                 "(see gradient_check in attack.json)"
             )
-        lines.append(f"next: {self.next_command}")
+        foreign = "" if self._is_ours else f" ({TOWN_FILE} and {SCENES_FILE}: the files of the town)"
+        lines.append(f"next: {self.next_command}{foreign}")
         return "\n".join(lines)
 
     @property
     def next_command(self) -> str:
-        """The `gear collect` command that renders test pictures of the scene with these patches."""
+        """The `gear collect` command that renders test pictures of the scene with these patches.
+
+        Datasets store no paths, so for a town that is not one of gear's the command has placeholders for its files.
+        """
         town, _, scene = self.facts["data"][0]["scene"].partition("/")
-        is_ours = (data_dir("mjcf") / "towns" / f"{town}.xml").is_file()
-        words = ["gear", "collect", "--task", self.facts["task"], "--scene", scene, "--split", "test"]
-        where = ["--town", town if is_ours else "FILE"]
-        return shlex.join([*words, *where, "--patch", str(self.out)])
+        if not self._is_ours:
+            town, scene = TOWN_FILE, f"{SCENES_FILE}:{scene}"
+        words = ["gear", "collect", "--task", self.facts["task"], "--scene", scene, "--split", "test", "--town", town]
+        return shlex.join([*words, "--patch", str(self.out)])
+
+    @property
+    def _is_ours(self) -> bool:
+        """Whether the attacked scene is in a town of gear."""
+        town = self.facts["data"][0]["scene"].partition("/")[0]
+        return (data_dir("mjcf") / "towns" / f"{town}.xml").is_file()
 
     def _achieved(self) -> list[str]:
         """Returns one line per group of samples, with the objective for random patches and for these patches."""

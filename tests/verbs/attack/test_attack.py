@@ -389,7 +389,8 @@ def test_a_control_takes_no_steps(small: Small, install: Install, tmp_path: Path
     assert (report.facts["steps_done"], report.facts["steps_per_s"], report.facts["gradient_check"]) == (0, None, None)
     first, then = report.summary().splitlines()
     assert first == f"{tmp_path}: 1 patch after 0 steps"
-    assert then == f"next: gear collect --task semseg --scene board --split test --town FILE --patch {tmp_path}"
+    command = f"gear collect --task semseg --scene SCENES.yml:board --split test --town TOWN.xml --patch {tmp_path}"
+    assert then == f"next: {command} (TOWN.xml and SCENES.yml: the files of the town)"
     assert report.facts["achieved"] is None
 
 

@@ -49,5 +49,7 @@ def test_the_next_command_asks_for_a_town_that_gear_does_not_have() -> None:
     words = shlex.split(report().next_command)
     assert words[-4:] == ["--town", "town10", "--patch", "my patches"]
     other = shlex.split(report(data=[{"scene": "mine/corner"}]).next_command)
-    assert other[-4:-2] == ["--town", "FILE"]
-    assert other[other.index("--scene") + 1] == "corner"
+    assert other[-4:-2] == ["--town", "TOWN.xml"]
+    assert other[other.index("--scene") + 1] == "SCENES.yml:corner"
+    last = report(data=[{"scene": "mine/corner"}]).summary().split("\n")[-1]
+    assert last.endswith("(TOWN.xml and SCENES.yml: the files of the town)")
