@@ -84,7 +84,7 @@ def test_what_a_disk_refuses_is_one_line(
 ) -> None:
     monkeypatch.setattr(doctor, "run", lambda args: (tmp_path / ("x" * 300)).read_bytes())
     assert main(["doctor"]) == 2
-    assert capsys.readouterr().err == f"gear: {tmp_path / ('x' * 300)}: File name too long\n"
+    assert capsys.readouterr().err == f"gear: {tmp_path / ('x' * 200)}…: File name too long\n"
     monkeypatch.setattr(doctor, "run", lambda args: (tmp_path / "gone").read_bytes())
     with pytest.raises(FileNotFoundError):
         main(["doctor"])

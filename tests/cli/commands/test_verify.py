@@ -28,9 +28,9 @@ def test_flags_reach_the_library(monkeypatch: pytest.MonkeyPatch, capsys: pytest
         return report()
 
     monkeypatch.setattr(COMMAND, verify)
-    assert main(["verify", "d", "--split", "test", "--repair", "--workers", "0", "--patch", "p.png"]) == 0
+    assert main(["verify", "d", "--split", "test", "--repair", "--workers", "3", "--patch", "p.png"]) == 0
     assert {key: asked[key] for key in ("dataset", "split", "repair", "workers", "patch", "town")} == {
-        "dataset": "d", "split": "test", "repair": True, "workers": 1, "patch": "p.png", "town": None,
+        "dataset": "d", "split": "test", "repair": True, "workers": 3, "patch": "p.png", "town": None,
     }  # fmt: skip
     assert capsys.readouterr().out.strip()
 
