@@ -42,7 +42,7 @@ from gear.verbs.evaluate.report import Difference, Estimate, EvaluateReport, Pai
 
 MODELS = {
     "semseg": "ddrnet23_slim", "depth": "ddrnet23_slim_depth", "detect2d": "retinanet_r18_fpn",
-    "stereo3d": "stereo_centre",
+    "stereo3d": "stereo_centre_lite0",
 }  # fmt: skip
 TINY = (
     f"scenes={TINY_SCENES}", "renderer=classic", "quality=fast", "options.width_px=320", "options.height_px=160",
@@ -117,7 +117,7 @@ def test_small_pictures_are_seen_at_the_size_that_the_weights_know(monkeypatch: 
     told = model_settings("semseg", "ddrnet23_slim", "net.safetensors", TRAINING_OPTIONS["semseg"])
     assert told == ("weights=net.safetensors", "input_scale=1")
     assert model_settings("semseg", "ddrnet23_slim", "shipped", ()) == ()
-    assert model_settings("stereo3d", "stereo_centre", "shipped", TRAINING_OPTIONS["stereo3d"]) == ()
+    assert model_settings("stereo3d", "stereo_centre_lite0", "shipped", TRAINING_OPTIONS["stereo3d"]) == ()
 
 
 def test_what_cannot_be_made_is_refused() -> None:

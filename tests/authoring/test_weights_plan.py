@@ -83,7 +83,7 @@ def test_training_and_patched_streets_have_just_so_many_road_users() -> None:
         assert counts(flags(board), board.settings) == around_boards
     for task, model, around_boards in (
         ("detect2d", "retinanet_lite0_fpn", ((9, 21), (18, 60))),
-        ("stereo3d", "stereo_centre", ((15, 35), (30, 100))),
+        ("stereo3d", "stereo_centre_lite0", ((15, 35), (30, 100))),
     ):
         (patched,) = plans(task, model, towns=["town10"], scenes=["billboard01"])
         assert counts({"task": task, "scene": "billboard01"}, patched.settings) == around_boards

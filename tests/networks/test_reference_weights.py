@@ -61,15 +61,17 @@ def test_the_network_takes_them(path: Path) -> None:
 
 
 UNSEEN: dict[str, tuple[str, dict[str, tuple[float, float]]]] = {
+    "bisenet_x39": ("reference", {"iou_road": (0.7, 1), "iou_building": (0.5, 1), "iou_sky": (0.7, 1)}),
+    "glpn_b0": ("reference", {"d1": (0.5, 1), "rmse_m": (0, 14)}),
     "adabins_lite0": ("reference", {"d1": (0.6, 1), "rmse_m": (0, 12)}),
     "ddrnet23_slim_depth": ("reference", {"d1": (0.75, 1), "rmse_m": (0, 10)}),
     "ddrnet23_slim": (
         "reference",
         {"iou_road": (0.85, 1), "iou_building": (0.75, 1), "iou_sky": (0.85, 1), "iou_car": (0.3, 1)},
     ),
-    "stereo_centre": ("task", {"pedestrian_2d_moderate_r40": (0.05, 1)}),  # at most n of 40 where n stand
-    "stereo_centre_lite0": ("task", {"pedestrian_2d_moderate_r40": (0.05, 1)}),
-    "retinanet_lite0_fpn": ("task", {"ap50": (0.25, 1)}),  # there are too few of everything for the other report
+    "stereo_centre_lite0": ("task", {"pedestrian_2d_moderate_r40": (0.05, 1)}),  # at most n of 40 where n stand
+    "fasterrcnn_lite0_fpn": ("task", {"ap50": (0.15, 1)}),  # there are too few of everything for the other report
+    "retinanet_lite0_fpn": ("task", {"ap50": (0.25, 1)}),
 }
 """Between what each network's metrics must lie on two pictures of a street and weather that it never saw; it does far
 better than the worse of them."""
