@@ -51,13 +51,13 @@ def write_town10(folder: Path) -> None:
     regions, lanes = town10_regions(), town10_lanes()
     sites = _sites(regions)
     sink = Sink("static")
-    lay_ground(sink, regions, sites)
+    lots = plan_lots(regions, sites, rng=np.random.default_rng([SEED, 1]))
+    lay_ground(sink, regions, sites, unary_union([lot.footprint for lot in lots]))
     wear_streets(sink, regions, seed=SEED)
     paint_streets(sink, regions, lambda lane: turns_of(lanes, lane))
     for street in regions.network.streets.values():
         if street.hump_m:
             build_bridge(sink, regions.network, street)
-    lots = plan_lots(regions, sites, rng=np.random.default_rng([SEED, 1]))
     build_lots(sink, lots, seed=SEED)
     build_skyline(sink, regions, lots, rng=np.random.default_rng([SEED, 2]))
 

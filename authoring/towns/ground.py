@@ -26,12 +26,24 @@ BACKING_RIM_M = 0.5
 BACKING_CELL_M = 87.0
 """Side of its pieces: not that of the layer above, so that no two joints lie one below the other."""
 
+WALL_FOOT_M = 0.4
+"""How far the paving of a sidewalk reaches towards buildings beside it, so that no strip of yard of a few centimetres
+is seen between the sidewalk and a wall.
+"""
+
 YARD_M = KERB_M - 0.01
 """Yards lie a finger lower than what borders them: where a site reaches over one, the site is what is seen."""
 
 
-def lay_ground(sink: Sink, regions: Regions, sites: BaseGeometry) -> None:
-    """Build all level ground except the sites, which `authoring.towns.sites` builds."""
+def lay_ground(sink: Sink, regions: Regions, sites: BaseGeometry, footprints: BaseGeometry) -> None:
+    """Builds all level ground except the sites, which `authoring.towns.sites` builds.
+
+    Args:
+        sink: takes the faces.
+        regions: the plan.
+        sites: ground of the sites.
+        footprints: ground on which buildings stand.
+    """
     worn = unary_union(
         [
             regions.band(s.name, -s.profile.half_width_m, s.profile.half_width_m)
@@ -44,22 +56,30 @@ def lay_ground(sink: Sink, regions: Regions, sites: BaseGeometry) -> None:
     solids.flat(sink, roads.intersection(worn), 0.0, "asphalt_worn", "road")
     tactile = tactile_paving(regions)
     stones = regions.kerb_stones
-    solids.flat(sink, regions.sidewalks.difference(stones).difference(tactile), KERB_M, "pavement", "sidewalk")
+    quay = regions.canal.buffer(COPING_M, join_style="mitre").difference(regions.canal)
+    taken = unary_union([sites, quay])
+    before_walls = _before_walls(regions, footprints).difference(taken)
+    paved = unary_union([regions.sidewalks, before_walls]).difference(stones).difference(tactile)
+    solids.flat(sink, paved, KERB_M, "pavement", "sidewalk")
     solids.flat(sink, stones, KERB_M, "kerb", "sidewalk")
     solids.flat(sink, tactile.difference(stones), KERB_M, "tactile", "sidewalk")
     for land in regions.blocks:
         for rim in solids.boundary_towards(land, regions.level_roads):
             solids.wall(sink, rim, 0.0, KERB_M, "kerb", "sidewalk")
     lay_backing(sink, regions, unary_union(regions.blocks))
-    quay = regions.canal.buffer(COPING_M, join_style="mitre").difference(regions.canal)
-    taken = unary_union([sites, quay])
     for interior in regions.interiors:
-        solids.flat(
-            sink, interior.difference(taken), YARD_M, "cobbles" if interior.area < 12000 else "concrete", "ground"
-        )
+        yard = interior.difference(taken).difference(before_walls)
+        solids.flat(sink, yard, YARD_M, "cobbles" if interior.area < 12000 else "concrete", "ground")
     for median in regions.medians.values():
         _median(sink, median)
     _canal(sink, regions)
+
+
+def _before_walls(regions: Regions, footprints: BaseGeometry) -> BaseGeometry:
+    """The ground inside the blocks that lies both beside a building and beside a sidewalk, and below their walls."""
+    near_walls = footprints.buffer(WALL_FOOT_M, join_style="mitre")
+    near_sidewalks = regions.sidewalks.buffer(2 * WALL_FOOT_M, join_style="mitre")
+    return near_walls.intersection(near_sidewalks).intersection(unary_union(list(regions.interiors)))
 
 
 def lay_backing(sink: Sink, regions: Regions, land: BaseGeometry, paved: BaseGeometry | None = None) -> None:
