@@ -33,6 +33,12 @@ CLOSED = frozenset({*GROUND_CODES, LABEL_BY_NAME["building"].code, LABEL_BY_NAME
 PINHOLES_A_MILLION = 5
 """Number of pinholes allowed per million pixels, because outlines that meet within a pixel look like cracks too."""
 
+SLIVERS_A_MILLION = 5
+"""Number of slivers allowed per million pixels, because a thin part of a yard can also be seen from far away."""
+
+SLIVER_PX = 3
+"""Largest number of pixels of a sliver."""
+
 SURFACE_RATIO = 1.1
 """Depths of neighbouring pixels on one surface differ by less than this factor."""
 
@@ -99,8 +105,9 @@ def unusable(town: TownUnderTest, names: Sequence[str], samples: int, min_visibl
 def cracks(town: TownUnderTest, samples: int) -> list[str]:
     """One line for each crack between meshes in rendered samples of the first scene.
 
-    Cracks are pixels of sky below the horizon that ground surrounds, and the single pixels of `pinholes`. Pinholes are
-    reported only if there are more than `PINHOLES_A_MILLION` in a million pixels.
+    Cracks are pixels of sky below the horizon that ground surrounds, the single pixels of `pinholes`, and the pieces of
+    `slivers`. Pinholes and slivers are reported only if there are more than `PINHOLES_A_MILLION` or `SLIVERS_A_MILLION`
+    in a million pixels.
 
     Args:
         town: the town under test.
@@ -110,6 +117,7 @@ def cracks(town: TownUnderTest, samples: int) -> list[str]:
     planner = _planner(world, samples)
     problems: list[str] = []
     holes: list[str] = []
+    strips: list[str] = []
     for index in range(samples):
         record = planner.plan(index)
         placed = world.place(record)
@@ -135,8 +143,16 @@ def cracks(town: TownUnderTest, samples: int) -> list[str]:
                 f"scene {record.scene}, sample {index}: {through} shows through {within} "
                 f"near ({x_m:.1f}, {y_m:.1f}, {z_m:.1f})"
             )
-    pixels = samples * RIG.cameras[0].width_px * RIG.cameras[0].height_px
-    return problems + (holes if len(holes) > PINHOLES_A_MILLION * pixels / 1e6 else [])
+        for row, column in slivers(labels).tolist():
+            point_m = camera.intrinsics.unproject([column, row], float(view.depth_m[row, column]))
+            x_m, y_m, z_m = camera.world_from_camera_transform.apply(point_m)
+            strips.append(
+                f"scene {record.scene}, sample {index}: a thin strip of ground is seen between other surfaces "
+                f"near ({x_m:.1f}, {y_m:.1f}, {z_m:.1f})"
+            )
+    millions = samples * RIG.cameras[0].width_px * RIG.cameras[0].height_px / 1e6
+    problems += holes if len(holes) > PINHOLES_A_MILLION * millions else []
+    return problems + (strips if len(strips) > SLIVERS_A_MILLION * millions else [])
 
 
 def pinholes(label_code: npt.NDArray[np.uint8], depth_m: FloatImage) -> npt.NDArray[np.int64]:
@@ -163,6 +179,30 @@ def pinholes(label_code: npt.NDArray[np.uint8], depth_m: FloatImage) -> npt.NDAr
         np.maximum(farthest, depths[part], out=farthest)
     is_hole &= (farthest < SURFACE_RATIO * nearest) & (depths[inner] > SURFACE_RATIO * farthest)
     return np.argwhere(is_hole) + 1
+
+
+def slivers(label_code: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
+    """Pieces of `ground` of a few pixels amid closed surfaces, such as a thin strip of yard along the foot of a wall.
+
+    Args:
+        label_code: (H, W) codes of labels, `NOTHING` for the sky.
+
+    Returns:
+        (N, 2) row and column of the first pixel of each piece. A piece has at most `SLIVER_PX` pixels, and all pixels
+        around it have labels of `CLOSED`.
+    """
+    ground = LABEL_BY_NAME["ground"].code
+    count, number, stats, _ = cv2.connectedComponentsWithStats((label_code == ground).astype(np.uint8), connectivity=8)
+    found = []
+    for piece in range(1, count):
+        left, top, width, height, area = stats[piece].tolist()
+        if area > SLIVER_PX:
+            continue
+        part = np.s_[max(top - 1, 0) : top + height + 1, max(left - 1, 0) : left + width + 1]
+        is_piece = number[part] == piece
+        if np.isin(label_code[part][~is_piece], list(CLOSED)).all():
+            found.append((top, left + int(np.flatnonzero(number[top, left : left + width] == piece)[0])))
+    return np.array(found, np.int64).reshape(-1, 2)
 
 
 def disagreement(town: TownUnderTest, min_agreement: float) -> list[str]:

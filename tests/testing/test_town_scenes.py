@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gear.testing.town_scenes import NOTHING, pinholes
+from gear.testing.town_scenes import NOTHING, pinholes, slivers
 from gear.values.labels import LABEL_BY_NAME
 
 SIDEWALK, GROUND, BUILDING, PERSON = (LABEL_BY_NAME[n].code for n in ("sidewalk", "ground", "building", "person"))
@@ -39,3 +39,22 @@ def test_what_is_no_crack_is_none() -> None:
     at_an_edge[0][2, 5], at_an_edge[1][2, 5] = NOTHING, np.nan
     cases += [nearer, same_label, at_the_surface, two_pixels, between_things, at_an_edge]
     assert [pinholes(*case).size for case in cases] == [0] * len(cases)
+
+
+def test_a_thin_strip_of_ground_at_the_foot_of_a_wall_is_found() -> None:
+    labels = np.full((8, 12), BUILDING, np.uint8)
+    labels[4:] = SIDEWALK
+    labels[3, [1, 2, 5]] = GROUND  # along the wall, a piece open here and there
+    labels[4, 6] = GROUND  # touches the second piece by a corner
+    labels[6, 10] = GROUND
+    assert slivers(labels).tolist() == [[3, 1], [3, 5], [6, 10]]
+
+
+def test_yards_and_ground_beside_other_things_are_no_slivers() -> None:
+    yard = np.full((8, 12), SIDEWALK, np.uint8)
+    yard[2, 3:7] = GROUND
+    beside_a_person = np.full((8, 12), SIDEWALK, np.uint8)
+    beside_a_person[2:4, 3], beside_a_person[2, 4] = PERSON, GROUND
+    at_the_horizon = np.full((8, 12), SIDEWALK, np.uint8)
+    at_the_horizon[:3], at_the_horizon[3, 4] = NOTHING, GROUND
+    assert [slivers(labels).size for labels in (yard, beside_a_person, at_the_horizon)] == [0, 0, 0]
