@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -211,3 +213,14 @@ def test_few_file_descriptors_are_one_line(
     with few_files(further):
         code = main(["drive", str(config), "--out", str(tmp_path / "out")])
     assert (code, capsys.readouterr().err) == (2, f"gear: {OPEN_FILES}\n")
+
+
+def test_a_study_that_does_not_fit_the_disk_is_refused_after_its_first_drives(
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=1000))
+    with pytest.raises(
+        GearError, match=r"the missing ones of 6 drives need about .* and 1 kB are free there; make fewer drives"
+    ):
+        gear.drive(config, out=tmp_path / "out")
+    assert not (tmp_path / "out" / "drive.json").exists()
