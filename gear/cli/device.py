@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from typing import Any
+
+from gear.cli.settings import AddSetting
 
 DEVICE = "device="
 """Beginning of the model option that the flag sets."""
@@ -19,7 +20,7 @@ def add_device(parser: argparse.ArgumentParser, settings: str) -> None:
     parser.add_argument(
         "--device",
         choices=("auto", "cpu", "cuda"),
-        action=_AsSetting,
+        action=_AddDevice,
         dest=settings,
         default=argparse.SUPPRESS,
         help="device of the model: auto takes a GPU if there is one (auto)",
@@ -39,12 +40,5 @@ def device_of(settings: Sequence[str]) -> tuple[str | None, list[str]]:
     return (devices[-1] if devices else None), [text for text in settings if not text.startswith(DEVICE)]
 
 
-class _AsSetting(argparse.Action):
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: str | Sequence[Any] | None,
-        option_string: str | None = None,
-    ) -> None:
-        setattr(namespace, self.dest, [*getattr(namespace, self.dest, []), f"{DEVICE}{values}"])
+class _AddDevice(AddSetting):
+    key = DEVICE

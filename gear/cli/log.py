@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from gear.cli.settings import add_settings
+
 
 def add_log(parser: argparse.ArgumentParser) -> None:
     """Adds `--log-to` and `--log-set` to the parser of a command."""
@@ -12,11 +14,4 @@ def add_log(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="logger plugin, such as tensorboard: curves and figures in OUT/log while the command runs",
     )
-    parser.add_argument(
-        "--log-set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="log_settings",
-        help="an option of the logger; repeatable",
-    )
+    add_settings(parser, "--log-set", dest="log_settings", help="an option of the logger; repeatable")

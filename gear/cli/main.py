@@ -133,7 +133,7 @@ def main(argv: Sequence[str]) -> int:
             return 2
         if not isinstance(error, GearError):
             raise
-        print(f"gear: {_as_given(argv, fitted(_command_of(argv) or '', one_line(error)))}", file=sys.stderr)
+        print(f"gear: {fitted(_command_of(argv) or '', one_line(error))}", file=sys.stderr)
         return 2
     return code
 
@@ -162,13 +162,6 @@ def full_parser(wanted: str | None = None) -> Parser:
             module.add_arguments(command)
             command.set_defaults(run=module.run)
     return parser
-
-
-def _as_given(argv: Sequence[str], line: str) -> str:
-    """Returns an error about a value of `--set` with the name `--model-set` if the user gave the flag that name."""
-    given = {word.partition("=")[0] for word in argv}
-    is_other = line.startswith("--set ") and "--model-set" in given and "--set" not in given
-    return line.replace("--set ", "--model-set ", 1) if is_other else line
 
 
 def _command_of(argv: Sequence[str]) -> str | None:

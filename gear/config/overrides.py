@@ -8,20 +8,21 @@ from typing import Any
 from gear.config.nodes import Mapping, Node, Place, Scalar, parse_value
 from gear.config.reader import expand_shorthand
 from gear.values.errors import ConfigError
+from gear.values.setting import Setting
 
 LONGEST = 200
 """Largest number of characters of a setting in an error message."""
 
 
-def with_overrides(node: Node, settings: Iterable[str], kind: Any = None, *, flag: str = "--set") -> Node:
+def with_overrides(node: Node, settings: Iterable[str], kind: Any = None) -> Node:
     """Inserts the values of `--set` options into a YAML tree; later settings override earlier ones.
 
     Args:
         node: the tree.
-        settings: `KEY=VALUE` texts; the key may be a path with dots, such as `weather.cloudiness`.
+        settings: `KEY=VALUE` texts; the key may be a path with dots, such as `weather.cloudiness`. Errors name a
+            `Setting` as it was given, and any other text as a value of `--set`.
         kind: dataclass of the tree. Its shorthands (`weather: ClearNoon`) are expanded to mappings, so keys below them
             can be set. None if the tree has no such class.
-        flag: the command-line flag of the settings, for error messages.
 
     Raises:
         ConfigError: a setting has no `=`, or its path leads through a value without keys.
@@ -29,7 +30,8 @@ def with_overrides(node: Node, settings: Iterable[str], kind: Any = None, *, fla
     hint = "such as --set weather.cloudiness=30" if kind else "with a key that `gear plugins show NAME` lists"
     for setting in settings:
         key, separator, text = setting.partition("=")
-        name = f"{flag} {setting if len(setting) <= LONGEST else setting[:LONGEST] + '…'}"
+        given = (setting if isinstance(setting, Setting) else Setting(setting)).given
+        name = given if len(given) <= LONGEST else given[:LONGEST] + "…"
         if not separator or not key.strip():
             raise ConfigError(name, 0, 0, "", f"expected KEY=VALUE, {hint}")
         text = f"'{text.strip()}'" if text.strip() == "-" else text  # to YAML a minus alone begins a list

@@ -228,18 +228,17 @@ class Drives:
         return f"{RUNS}/{run.driver}/{_safe(name)}"
 
 
-def read_drive_config(config: str | Path, settings: Iterable[str] = (), *, flag: str = "--set") -> DriveConfig:
+def read_drive_config(config: str | Path, settings: Iterable[str] = ()) -> DriveConfig:
     """Reads a drive config.
 
     Args:
         config: name or path of the config.
         settings: `KEY=VALUE` texts that replace its values.
-        flag: the command-line flag of the settings, for error messages.
 
     Raises:
         GearError: the config does not exist, or cannot be read; the message is one line.
     """
-    node = with_overrides(parse_file(find_config("drive", str(config))), settings, DriveConfig, flag=flag)
+    node = with_overrides(parse_file(find_config("drive", str(config))), settings, DriveConfig)
     return read_node(DriveConfig, node)
 
 

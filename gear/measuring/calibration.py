@@ -123,7 +123,6 @@ def opened_calibration(
     models: Sequence[Chosen],
     defense: str | None,
     *,
-    flag: str = "--set ",
     callbacks: Callbacks = NO_CALLBACKS,
 ) -> Calibration:
     """Opens the calibration data of a defense and checks them.
@@ -132,7 +131,6 @@ def opened_calibration(
         clean, patched: roots of the datasets without and with patches; None for no dataset.
         models: models that the defense protects.
         defense: name of the defense.
-        flag: the command-line flag that sets options of the models, for error messages.
         callbacks: called while the defense is calibrated, as in `Calibration`.
 
     Raises:
@@ -149,7 +147,7 @@ def opened_calibration(
     for dataset in opened:
         for model in models:
             if dataset is not None:
-                check_model(model, dataset, flag)
+                check_model(model, dataset)
     pair = Calibration(clean=opened[0], patched=opened[1], callbacks=callbacks)
     if pair.shows_patch and pair.patched is not None and _label(pair.patched) == NO_PATCH:
         raise GearError(f"{clean} shows a patch, {patched} none: --calibration and --calibration-patched are swapped")

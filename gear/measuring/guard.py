@@ -79,7 +79,6 @@ def open_guard(
     models: Sequence[Chosen],
     task: str,
     *,
-    flag: str = "--set ",
     callbacks: Callbacks = NO_CALLBACKS,
 ) -> OpenedGuard:
     """Finds the plugin of a requested defense, opens its calibration data, and checks that they fit the models and
@@ -89,7 +88,6 @@ def open_guard(
         guard: the request for a defense; None for no defense.
         models: models that the defense protects, one after the other.
         task: name of the dataset's task.
-        flag: the command-line flag that sets options of the models, for error messages.
         callbacks: called while the defense is calibrated, as in `Calibration`.
 
     Raises:
@@ -105,7 +103,6 @@ def open_guard(
         guard.calibration_patched,
         models,
         guard.defense,
-        flag=flag,
         callbacks=callbacks,
     )
     for model in models:

@@ -44,18 +44,17 @@ class Chosen:
         return {**named, "options": to_plain(config)}
 
 
-def chosen_model(name: str, settings: Iterable[str], flag: str = "--set") -> Chosen:
+def chosen_model(name: str, settings: Iterable[str]) -> Chosen:
     """Finds a model by name and checks its options.
 
     Args:
         name: name of the plugin.
         settings: options as `KEY=VALUE` texts.
-        flag: the command-line flag that sets these options, for error messages.
 
     Raises:
         GearError: there is no such model, or an option does not fit.
     """
-    found, options = find("model", name), with_overrides(NO_OPTIONS, settings, flag=flag)
+    found, options = find("model", name), with_overrides(NO_OPTIONS, settings)
     read_node(found.spec.config, options, "")
     return Chosen(found=found, options=options)
 
@@ -75,18 +74,17 @@ def chosen_defense(name: str | None, settings: Iterable[str]) -> Chosen | None:
         if settings:
             raise GearError(f"{settings[0]} is a defense's option, but there is no defense: name one with --defense")
         return None
-    found, options = find("defense", name), with_overrides(NO_OPTIONS, settings, flag="--defense-set")
+    found, options = find("defense", name), with_overrides(NO_OPTIONS, settings)
     read_node(found.spec.config, options, "")
     return Chosen(found=found, options=options)
 
 
-def check_model(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> None:
+def check_model(model: Chosen, dataset: Dataset[Any]) -> None:
     """Checks that a model supports the task and the cameras of a dataset.
 
     Args:
         model: the model with its options.
         dataset: dataset on which the model predicts.
-        flag: the command-line flag that sets options of the model, for error messages.
 
     Raises:
         GearError: the model does not support the task or a camera.
@@ -99,31 +97,30 @@ def check_model(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> N
     missing = [name for name in spec.views if name not in cameras]
     if missing:
         raise GearError(f"model {spec.name!r} looks at {', '.join(missing)}, which {dataset.root} does not have")
-    check_camera(model, dataset, flag)
+    check_camera(model, dataset)
 
 
-def check_camera(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> None:
+def check_camera(model: Chosen, dataset: Dataset[Any]) -> None:
     """Checks that a model assumes the camera of a dataset; otherwise its predicted distances would be wrong.
 
     Args:
         model: the model with its options.
         dataset: dataset whose task options describe the camera.
-        flag: the command-line flag that sets options of the model, for error messages.
 
     Raises:
         GearError: the model assumes another camera.
     """
-    check_optics(model, dataset.plan.options, f"{dataset.root} was collected", flag)
+    check_optics(model, dataset.plan.options, f"{dataset.root} was collected")
 
 
-def check_optics(model: Chosen, options: Json, collected: str, flag: str) -> None:
+def check_optics(model: Chosen, options: Json, collected: str, place: str = "--model-set ") -> None:
     """Checks that a model assumes the camera that the options of a task describe.
 
     Args:
         model: the model with its options.
         options: the task's options, such as `hfov_deg` (horizontal field of view) and `baseline_m`.
         collected: beginning of the error message, such as `DIR was collected`.
-        flag: the command-line flag that sets options of the model, for error messages.
+        place: what sets an option of the model, followed by the option in the error message.
 
     Raises:
         GearError: the model assumes another camera.
@@ -141,7 +138,7 @@ def check_optics(model: Chosen, options: Json, collected: str, flag: str) -> Non
         if assumed is not None and taken is not None and assumed != taken:
             raise GearError(
                 f"{collected} with {name} {taken:g}, but model {model.found.spec.name!r} assumes {assumed:g}; say "
-                f"{flag}{name}={taken:g}"
+                f"{place}{name}={taken:g}"
             )
 
 

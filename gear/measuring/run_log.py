@@ -61,7 +61,7 @@ def choose_logger(name: str | None, settings: Iterable[str]) -> ChosenLogger | N
             raise GearError("--log-set has options of a logger, and none is named; add --log-to NAME")
         return None
     found = find("logger", name)
-    return ChosenLogger(found=found, logger=build(found, with_overrides(NO_OPTIONS, given, flag="--log-set")))
+    return ChosenLogger(found=found, logger=build(found, with_overrides(NO_OPTIONS, given)))
 
 
 class RunLog:

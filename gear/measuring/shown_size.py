@@ -23,7 +23,7 @@ from gear.plugins.build import NO_OPTIONS, build, find, name_of_task
 from gear.values.errors import ConfigError
 
 
-def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str | None:
+def size_note(model: Chosen, dataset: Dataset[Any]) -> str | None:
     """A warning if the dataset's pictures have another size than those that the model was trained on.
 
     The result is None if the sizes agree, if the training size is unknown, or if the user set the input scale.
@@ -31,7 +31,6 @@ def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str
     Args:
         model: the model with its options.
         dataset: dataset on which the model predicts.
-        flag: the command-line flag that sets options of the model, for the message.
     """
     network = _network_with_free_scale(model)
     if network is None:
@@ -49,7 +48,7 @@ def size_note(model: Chosen, dataset: Dataset[Any], flag: str = "--set ") -> str
     wanted = round(share * usual_px / width_px, 4)
     try:
         read_node(spec.config, with_value(model.options, (OPTION,), Scalar(f"{wanted:g}", False, Place("size"))), "")
-        remedy = f"{flag}{OPTION}={wanted:g} corrects this"
+        remedy = f"--model-set {OPTION}={wanted:g} corrects this"
     except ConfigError:
         remedy = "collect larger ones"
     look = "smaller" if width_px < usual_px else "larger"

@@ -62,6 +62,6 @@ def input_scale_of(options: Scaled, name: str, default: float = 1.0) -> float:
         path: Path | None = resolve(options.weights, name)
         raise GearError(
             f"{path}: says input_scale {said!r}, which is no number above 0 and at most {LARGEST_SCALE:g}; "
-            f"say --set {OPTION}=… yourself, or take another file"
+            f"say --model-set {OPTION}=… yourself, or take another file"
         )
     return float(said)

@@ -67,7 +67,7 @@ def export(
             written.
     """
     chosen = find_layout(layout)
-    options = read_node(chosen.options, with_overrides(NO_OPTIONS, settings, flag="--set"), "options")
+    options = read_node(chosen.options, with_overrides(NO_OPTIONS, settings), "options")
     with displayed(Callbacks.of(on_progress=on_progress), "export", progress=progress) as callbacks:
         callbacks.part("reading the manifests")
         source = _Source.of(Path(dataset), layout, chosen)

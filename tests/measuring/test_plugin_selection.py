@@ -20,10 +20,10 @@ from gear.values.errors import GearError
 )
 def test_a_stereo_network_refuses_pictures_of_another_pinhole(options: dict[str, Any], said: str) -> None:
     with pytest.raises(GearError, match=said):
-        check_optics(chosen_model("stereo_rcnn", []), options, "collected", "--set ")
+        check_optics(chosen_model("stereo_rcnn", []), options, "collected")
 
 
 def test_networks_without_a_camera_take_pictures_of_any() -> None:
-    check_optics(chosen_model("ddrnet23_slim", []), {"principal_px": [600.0, 180.0]}, "collected", "--set ")
+    check_optics(chosen_model("ddrnet23_slim", []), {"principal_px": [600.0, 180.0]}, "collected")
     usual = {"hfov_deg": 90.0, "principal_px": None, "focal_px": None}
-    check_optics(chosen_model("stereo_rcnn", []), usual, "collected", "--set ")
+    check_optics(chosen_model("stereo_rcnn", []), usual, "collected")

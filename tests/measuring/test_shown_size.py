@@ -46,7 +46,8 @@ def test_attack_and_gap_tell_of_it(
     attack = ["attack", "--model=tiny_segmenter", f"--data={small()}", "--steps=1", "--set=height_px=12"]
     attack += ["--set=width_px=24", "--set=batch=1"]
     gap = ["gap", str(small()), f"--twin={tmp_path / 'twin'}", "--model=tiny_segmenter", "--samples=1"]
-    for words, flag in ((attack, "--model-set"), (gap, "--set")):
+    flag = "--model-set"
+    for words in (attack, gap):
         out = f"--out={tmp_path / words[0]}"
         assert main([*words, f"{flag}=weights={weights}", out]) == 0
         (line,) = [one for one in capsys.readouterr().err.splitlines() if "note:" in one]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from gear.cli.main import COMMANDS, full_parser
-from gear.reporting.advice import fitted
+from gear.reporting.advice import WORDS, fitted
 from gear.reporting.display import Display
 
 GEAR = Path(__file__).parents[2] / "gear"
@@ -59,6 +59,7 @@ REACHED: dict[str, tuple[str, ...]] = {
     "readers": ("train", "attack"),
     "render": RENDERING,
     "values/errors.py": ("collect", "attack"),
+    "values/setting.py": ("collect", "evaluate", "gap", "attack", "train", "bench", "drive", "defend", "export"),
     "verbs/attack": ("attack",),
     "verbs/attack/job.py": ("attack",),
     "verbs/attack/models.py": ("attack", "bench"),
@@ -167,17 +168,40 @@ def test_messages_name_flags_of_the_command_that_prints_them(module: str, flags:
         ("drive", "--set foo=1: foo: unknown key", "--set foo=1: foo: unknown key"),
         (
             "drive",
-            "the model assumes 70; say --set hfov_deg=90",
+            "the model assumes 70; say --model-set hfov_deg=90",
             "the model assumes 70; say `hfov_deg: 90` in the driver's key `model_set`",
         ),
         ("defend", "raise it with --defense-set false_alarms=0.1", "raise it with --set false_alarms=0.1"),
-        ("verify", "wait for its end, or use another --out", "wait for its end"),
-        ("attack --verify", "or use --renderer filament", "or collect the dataset with --renderer filament"),
-        ("evaluate", "--set input_scale=0.5 corrects this", "--set input_scale=0.5 corrects this"),
+        ("verify", "wait for its end, or use another --out", "wait for its end, or use another folder"),
+        ("attack --verify", "or use --renderer filament", "or use a dataset collected with --renderer filament"),
+        ("evaluate", "--model-set input_scale=0.5 corrects this", "--model-set input_scale=0.5 corrects this"),
+        ("train", "say --model-set hfov_deg=90", "say --set options.hfov_deg=90"),
+        (
+            "bench",
+            "use --renderer filament or classic",
+            "use `renderer: filament` in the key `collect`",
+        ),
+        (
+            "bench",
+            "can (--attack square with --queries N)",
+            "can (`plugin: square` in the key `attack` with the key `attack.queries`)",
+        ),
+        (
+            "leaderboard",
+            "with fewer --workers more memory is free",
+            "with fewer other programs at the same time more memory is free",
+        ),
+        ("attack", "use fewer --workers; or another --out", "use fewer --engine-workers; or another --out"),
     ],
 )
 def test_advice_fits_the_command(command: str, message: str, said: str) -> None:
     assert fitted(command, message) == said
+
+
+@pytest.mark.parametrize("command", sorted(WORDS))
+def test_only_options_that_a_command_lacks_have_other_words(command: str, flags: dict[str, set[str]]) -> None:
+    """Otherwise an error that repeats what the user gave would name another flag."""
+    assert not {f"--{option}" for option in WORDS[command]} & flags[command]
 
 
 def test_notes_of_a_display_fit_its_command(capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from gear.cli.device import add_device
 from gear.cli.flag_types import not_negative, positive
 from gear.cli.log import add_log
+from gear.cli.settings import add_settings
 
 if TYPE_CHECKING:
     from gear.values.serial import Json
@@ -49,13 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="most forward passes of the model, for attacks without gradients; with --drive most tried patches (100)",
     )
-    parser.add_argument(
-        "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings", help="an option of the attack"
-    )
-    parser.add_argument(
-        "--model-set", metavar="KEY=VALUE", action="append", default=[], dest="model_settings",
-        help="an option of the models",
-    )  # fmt: skip
+    add_settings(parser, "--set", help="an option of the attack")
+    add_settings(parser, "--model-set", dest="model_settings", help="an option of the models")
     add_device(parser, "model_settings")
     _add_defense(parser)
     parser.add_argument(
@@ -102,10 +98,9 @@ def _add_drive(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--driver", metavar="NAME", help="with --drive: the attacked driver (the only one with cameras)"
     )
-    parser.add_argument(
-        "--drive-set", metavar="KEY=VALUE", action="append", default=[], dest="drive_settings",
-        help="with --drive: sets a key of the drive config; repeatable",
-    )  # fmt: skip
+    add_settings(
+        parser, "--drive-set", dest="drive_settings", help="with --drive: sets a key of the drive config; repeatable"
+    )
     parser.add_argument(
         "--redrive", type=positive, metavar="N", help="with --drive: steps after which the drives are made anew (100)"
     )
@@ -128,14 +123,7 @@ def _add_defense(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--defense", metavar="NAME", help="defense that guards the models; the attack is adaptive to it"
     )
-    parser.add_argument(
-        "--defense-set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="defense_settings",
-        help="an option of the defense",
-    )
+    add_settings(parser, "--defense-set", dest="defense_settings", help="an option of the defense")
     add_calibration(parser)
     parser.add_argument(
         "--score-weight",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from gear.cli.engine import add_engine
 from gear.cli.flag_types import workers
 from gear.cli.log import add_log
+from gear.cli.settings import add_settings
 
 if TYPE_CHECKING:
     from gear.verbs.bench.plan import Step
@@ -33,14 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLE
     parser.add_argument("config", metavar="CONFIG", help="name (quick, paper, ablation-samples, times, ...) or path")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for data, patches, results and the report")
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="settings",
-        help="sets a key of the config; repeatable",
-    )
+    add_settings(parser, "--set", help="sets a key of the config; repeatable")
     parser.add_argument(
         "--device", choices=("auto", "cpu", "cuda"), help="device of the networks (the one in the config)"
     )

@@ -6,6 +6,7 @@ import argparse
 
 from gear.cli.engine import add_engine
 from gear.cli.flag_types import workers
+from gear.cli.settings import add_settings
 
 EXAMPLE = """examples:
   gear collect --task stereo3d
@@ -35,14 +36,7 @@ def add_collection_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", metavar="DIR", help="root of the dataset (data/<task>/<town>-<scene>-<weather>/<patch>)"
     )
     parser.add_argument("--config", metavar="FILE", help="collection config, gear's or CARLA-GeAR's; flags override it")
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="settings",
-        help="sets a key of the config; repeatable",
-    )
+    add_settings(parser, "--set", help="sets a key of the config; repeatable")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from gear.cli.settings import add_settings
+
 EXAMPLE = """examples:
   gear defend data/semseg/town10-billboard01-ClearNoon/random --defense lgs --out cleaned/
   gear defend data/twin --defense jpeg --set quality=30 --out cleaned/
@@ -20,14 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the cleaned pictures")
     parser.add_argument("--split", help="split to clean, if the dataset has several")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the defense's random draws (0)")
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="settings",
-        help="an option of the defense; repeatable",
-    )
+    add_settings(parser, "--set", help="an option of the defense; repeatable")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,6 +6,7 @@ import argparse
 
 from gear.cli.engine import add_engine
 from gear.cli.flag_types import workers
+from gear.cli.settings import add_settings
 
 EXAMPLE = """examples:
   gear drive quick --out drive/quick --workers auto       three scenarios, three twins, one network
@@ -23,14 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = EXAMPLE
     parser.add_argument("config", metavar="CONFIG", help="name (quick, study) or path of a drive config")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for logs, results and the report")
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="settings",
-        help="sets a key of the config; repeatable",
-    )
+    add_settings(parser, "--set", help="sets a key of the config; repeatable")
     parser.add_argument(
         "--device", choices=("auto", "cpu", "cuda"), help="device of the networks (the one in the config)"
     )

@@ -7,6 +7,7 @@ import argparse
 from gear.cli.device import add_device
 from gear.cli.engine import add_engine, add_engine_workers
 from gear.cli.flag_types import not_negative, positive
+from gear.cli.settings import add_settings
 from gear.cli.streams import folded, line_width
 
 EXAMPLE = """examples:
@@ -35,18 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--split", help="split to evaluate, if the datasets have several")
     parser.add_argument("--defense", metavar="NAME", help="defense plugin; gear plugins --kind defense")
-    for flags, dest, what in (
-        (("--set", "--model-set"), "model_settings", "model"),
-        (("--defense-set",), "defense_settings", "defense"),
-    ):
-        parser.add_argument(
-            *flags,
-            metavar="KEY=VALUE",
-            action="append",
-            default=[],
-            dest=dest,
-            help=f"an option of the {what}; repeatable",
-        )
+    add_settings(parser, "--set", "--model-set", dest="model_settings", help="an option of the model; repeatable")
+    add_settings(parser, "--defense-set", dest="defense_settings", help="an option of the defense; repeatable")
     add_calibration(parser)
     parser.add_argument(
         "--report",

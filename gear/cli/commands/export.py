@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from gear.cli.settings import add_settings
+
 EXAMPLE = """examples:
   gear export data/stereo3d/town10-billboard01-ClearNoon/none --layout kitti --out kitti/
   gear export data/detect2d/town10-billboard01-ClearNoon/none --layout yolo --set labels=polygons --out yolo/
@@ -23,9 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder of the new tree, or an address such as s3://bucket/folder; must be empty or new",
     )
-    parser.add_argument(
-        "--set", action="append", default=[], dest="settings", metavar="KEY=VALUE", help="option of the layout"
-    )
+    add_settings(parser, "--set", help="option of the layout")
 
 
 def run(args: argparse.Namespace) -> int:

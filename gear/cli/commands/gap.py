@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 
 from gear.cli.device import add_device
+from gear.cli.settings import add_settings
 
 EXAMPLE = """examples:
   gear gap data/train --twin data/train-patched
@@ -33,24 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model", metavar="NAME", help="also compare the effect of composed and rendered patches on this model"
     )
-    parser.add_argument(
-        "--set",
-        "--model-set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="model_settings",
-        help="an option of the model",
-    )
+    add_settings(parser, "--set", "--model-set", dest="model_settings", help="an option of the model")
     parser.add_argument("--defense", metavar="NAME", help="defense plugin that guards the model")
-    parser.add_argument(
-        "--defense-set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="defense_settings",
-        help="an option of the defense",
-    )
+    add_settings(parser, "--defense-set", dest="defense_settings", help="an option of the defense")
     add_calibration(parser)
     parser.add_argument("--compositor", action="append", dest="compositors", help="transport, homography (both)")
     parser.add_argument("--samples", type=positive, metavar="N", help="the first N samples only")

@@ -6,6 +6,7 @@ import argparse
 import json
 
 from gear.cli.flag_types import positive
+from gear.cli.settings import add_settings
 
 EXAMPLE = """examples:
   gear bench paper --out bench/paper --record                        write records into bench/paper/records
@@ -40,13 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     checking.add_argument("--drives", type=positive, default=2, metavar="N", help="drives to make again (2)")
     checking.add_argument("--seed", type=int, metavar="N", help="seed of the choice of samples (random)")
-    checking.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="settings",
-        help="replaces a key of the record's config, such as the file of a town; repeatable",
+    add_settings(
+        checking, "--set", help="replaces a key of the record's config, such as the file of a town; repeatable"
     )
     checking.add_argument("--withheld", metavar="FILE", help="file with the seed and places that were withheld")
     checking.add_argument("--commitment", metavar="HASH", help="the published salted hash of that file")

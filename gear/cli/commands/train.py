@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from gear.cli.flag_types import positive
 from gear.cli.log import add_log
+from gear.cli.settings import add_settings
 
 if TYPE_CHECKING:
     from gear.reporting.display import Display
@@ -85,13 +86,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="adversarial patch training: show patches that this attack makes during the training",
     )
     parser.add_argument("--allow-test-data", action="store_true", help="allow test splits in --data")
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        dest="settings",
-        help="sets a key of the training config; options.KEY for options of the network; repeatable",
+    add_settings(
+        parser, "--set", help="sets a key of the training config; options.KEY for options of the network; repeatable"
     )
     add_log(parser)
 

@@ -8,6 +8,8 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
+from gear.cli.settings import add_settings
+
 if TYPE_CHECKING:
     from gear.verbs.weights.convert import ConvertReport
 
@@ -37,10 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     converting.add_argument("out", metavar="OUT", help="the file to write; ends in .safetensors")
     converting.add_argument("--half", action="store_true", help="store matrices in float16, half the size")
-    converting.add_argument(
-        "--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
-        help="an option of the model that changes its graph; repeatable",
-    )  # fmt: skip
+    add_settings(converting, "--set", help="an option of the model that changes its graph; repeatable")
     converting.add_argument(
         "--entry", metavar="NAME", default="", help="entry of the checkpoint to use, such as ema (the one that fits)"
     )

@@ -204,7 +204,7 @@ class _Pool:
             BackendError: the worker had taken no item.
         """
         if not worker.has_taken:
-            raise BackendError(self.asked.backend, problem, f"{AGAIN}; fewer --workers need less memory")
+            raise BackendError(self.asked.backend, problem, f"{AGAIN}; with fewer --workers more memory is free")
         worker.process.kill()
         self.workers.remove(worker)
         self.deaths += 1

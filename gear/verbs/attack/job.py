@@ -28,7 +28,7 @@ from gear.values.errors import DatasetError, GearError
 from gear.values.progress import Callbacks
 from gear.values.serial import Json
 from gear.verbs.attack.data import check_joined
-from gear.verbs.attack.models import FLAG, check_attack, check_gradient, choose_models
+from gear.verbs.attack.models import check_attack, check_gradient, choose_models
 from gear.verbs.attack.request import AttackRequest
 
 STEPS = 300
@@ -133,7 +133,7 @@ def resolve(request: AttackRequest, callbacks: Callbacks) -> Job:
     config = read_node(found.spec.config, options, "")
     surfaces = len(datasets[0].sidecar(0).record.surfaces)
     spec = check_attack(found, models, task, surfaces, request.queries)
-    guard = open_guard(request.guard, models, task, flag=FLAG, callbacks=callbacks)
+    guard = open_guard(request.guard, models, task, callbacks=callbacks)
     check_gradient(guard.defense, spec)
     if {scenes_of(one) for one in datasets} & {scenes_of(one) for one in validation}:
         raise GearError("--data and --val hold the same samples; give --val another split")

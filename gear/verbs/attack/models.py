@@ -25,9 +25,6 @@ from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError
 from gear.values.rng import derive_rng
 
-FLAG = "--model-set "
-"""Flag for options of the models, for messages; `--set` is for options of the attack."""
-
 
 def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Sequence[Dataset[Any]]) -> list[Chosen]:
     """Finds the plugins of all models, with the same options for each, and checks that the models fit the datasets.
@@ -46,12 +43,12 @@ def choose_models(names: Sequence[str], settings: Iterable[str], datasets: Seque
     """
     if not names:
         raise GearError("name a model to attack: --model NAME (gear plugins --kind model lists them)")
-    chosen = [chosen_model(name, settings, FLAG.strip()) for name in names]
+    chosen = [chosen_model(name, settings) for name in names]
     if len({one.found.full_name for one in chosen}) < len(names):
         raise GearError(f"a model is named twice: {', '.join(names)}")
     for model in chosen:
         for dataset in datasets:
-            check_model(model, dataset, FLAG)
+            check_model(model, dataset)
     return chosen
 
 
@@ -68,7 +65,7 @@ def check_gradient(defense: Chosen | None, attack: AttackSpec[Any]) -> None:
     if spec.gradient == "none" and attack.needs_gradients:
         raise GearError(
             f"defense {spec.name!r} declares no gradient, so an attack that needs one cannot look through it; attacks "
-            "that count queries can (--attack square --queries N)"
+            "that count queries can (--attack square with --queries N)"
         )
 
 

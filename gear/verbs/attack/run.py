@@ -41,7 +41,7 @@ from gear.values.serial import Json
 from gear.verbs.attack.achieved import MOST_SAMPLES, compared, plain
 from gear.verbs.attack.folder import begin, read_patches, tidy
 from gear.verbs.attack.job import Job, resolve
-from gear.verbs.attack.models import FLAG, build_model
+from gear.verbs.attack.models import build_model
 from gear.verbs.attack.monitor import Recorder
 from gear.verbs.attack.outputs import as_picture, write_curves, write_patches, write_samples
 from gear.verbs.attack.report import AttackReport
@@ -238,7 +238,7 @@ def _warn(job: Job, on_warning: Warn) -> None:
     """Warns if the pictures have another size than those a model was trained on, or if the calibration data are
     doubtful.
     """
-    sizes = (size_note(model, job.datasets[0], FLAG) for model in job.models)
+    sizes = (size_note(model, job.datasets[0]) for model in job.models)
     for note in (*sizes, *job.guard.calibration.doubts()):
         if note is not None:
             on_warning(note)

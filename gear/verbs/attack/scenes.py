@@ -133,7 +133,7 @@ class Scenes:
                     raise GearError(
                         f"the pictures that the defense{of_model} returns have no gradient at random patches, so that "
                         "the attack would change nothing that the model sees; attacks that count queries need none "
-                        "(--attack square --queries N)"
+                        "(--attack square with --queries N)"
                     )
                 raise GearError(
                     f"the {kind} of the defense{of_model} has no gradient at random patches, so that the attack would "

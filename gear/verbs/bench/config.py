@@ -16,6 +16,7 @@ from gear.config.nodes import Node, Place, Scalar
 from gear.contracts.tasks import CONTROLS
 from gear.values.errors import FieldError
 from gear.values.serial import Json
+from gear.values.setting import Setting
 
 LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
@@ -228,8 +229,9 @@ class BenchConfig:
             raise FieldError("seed", f"must not be negative, got {self.seed}")
 
 
-def settings_of(node: Node, above: str = "") -> Iterable[str]:
-    """Yields nested options as flat `KEY=VALUE` texts, one per option, such as `augmentation.flip=0`.
+def settings_of(node: Node, above: str = "") -> Iterable[Setting]:
+    """Yields nested options as flat `KEY=VALUE` texts, one per option, such as `augmentation.flip=0`. Errors name
+    them as YAML.
 
     Args:
         node: the nested options.
@@ -239,9 +241,13 @@ def settings_of(node: Node, above: str = "") -> Iterable[str]:
         for key, (_, below) in node.entries.items():
             yield from settings_of(below, f"{above}.{key}" if above else key)
     elif not isinstance(node, Scalar):
-        yield f"{above}={flow_text(node_to_json(node))}"
+        yield _setting(above, flow_text(node_to_json(node)))
     elif above:
-        yield f"{above}={_quoted(node)}"
+        yield _setting(above, _quoted(node))
+
+
+def _setting(key: str, value: str) -> Setting:
+    return Setting(f"{key}={value}", given=f"`{key}: {value}`")
 
 
 def flow_text(value: Json) -> str:

@@ -17,6 +17,7 @@ from gear.measuring.plugin_selection import Chosen, check_defense, chosen_defens
 from gear.plugins.build import NO_OPTIONS, build, find
 from gear.plugins.catalogue import PluginEntry
 from gear.values.errors import GearError
+from gear.values.setting import Setting
 from gear.verbs.attack.models import check_attack
 from gear.verbs.bench.config import BenchConfig, PluginConfig, settings_of
 from gear.verbs.bench.scenes import located
@@ -173,7 +174,7 @@ def _entrants(
         plugin, settings = one.plugin or label, tuple(settings_of(one.set))
         try:
             if device is not None and hasattr(find(kind, plugin).spec.config(), "device"):
-                settings = (*settings, f"device={device}")
+                settings = (*settings, Setting(f"device={device}", given=f"--device {device}"))
             chosen = chosen_model(plugin, settings) if kind == "model" else chosen_defense(plugin, settings)
         except GearError as error:
             raise located(node, error, *at, label) from error

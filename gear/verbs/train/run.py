@@ -251,7 +251,7 @@ def _origin(request: TrainRequest, callbacks: Callbacks) -> Origin:
     spec = task_found.spec
     assert isinstance(spec, TaskSpec)
     for dataset in (*training.datasets, *validation.datasets):
-        check_camera(Chosen(found=found, options=config.options), dataset, "--set options.")
+        check_camera(Chosen(found=found, options=config.options), dataset)
         for keys in PLANNED:
             dataset.content(str, *keys)
     scale, precision = picture_scale(found, config, training), precision_of(found, config)

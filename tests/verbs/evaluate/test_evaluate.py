@@ -357,7 +357,7 @@ def test_a_model_for_another_camera_is_refused(tmp_path: Path, small: Small, ins
     data = small("stereo3d")
     install(replace(model_spec(lambda _: Oracle([data]), "stereo3d"), config=CameraConfig))
     for name, value, taken in (("baseline_m", "0.3", "0.54"), ("hfov_deg", "60", "90")):
-        message = f"collected with {name} {taken}, but model 'odd' assumes {value}; say --set {name}={taken}"
+        message = f"collected with {name} {taken}, but model 'odd' assumes {value}; say --model-set {name}={taken}"
         with pytest.raises(GearError, match=message):
             evaluate(data, model="odd", model_settings=[f"{name}={value}"], out=tmp_path / "x")
     assert not (tmp_path / "x").exists()
@@ -376,7 +376,7 @@ class ScaledConfig(Config):
 
 @pytest.mark.parametrize(
     ("said", "remedy"),
-    [(0.25, "sees them at 80 px; it learnt from 512 px, .* smaller .* --set input_scale=1.6 corrects this"),
+    [(0.25, "sees them at 80 px; it learnt from 512 px, .* smaller .* --model-set input_scale=1.6 corrects this"),
      (0.75, "collect larger ones")]
 )  # fmt: skip
 def test_pictures_of_another_size_than_the_weights_are_for_are_noted(

@@ -410,7 +410,7 @@ class CameraConfig(TinyConfig):
 
 def test_a_network_for_another_camera_is_refused(street: Street, tmp_path: Path, install: Any) -> None:
     install(replace(tiny_segmenter, config=CameraConfig))
-    with pytest.raises(GearError, match=r"collected with hfov_deg 90, .* 60; say --set options.hfov_deg=90"):
+    with pytest.raises(GearError, match=r"collected with hfov_deg 90, .* 60; say --model-set hfov_deg=90"):
         quick(street, tmp_path / "out", settings=["options.hfov_deg=60"])
     assert not (tmp_path / "out").exists()
 

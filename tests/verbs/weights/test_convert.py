@@ -99,7 +99,7 @@ def test_metadata_of_a_file_is_kept_and_options_are_recorded(official: dict[str,
 def test_a_size_that_is_none_is_refused(official: dict[str, Path], tmp_path: Path, said: Any) -> None:
     path = tmp_path / "a.safetensors"
     write(path, read(_converted(official, tmp_path))[0], {"options": json.dumps({"input_scale": said})})
-    with pytest.raises(GearError, match=r"a\.safetensors: says input_scale .* say --set input_scale="):
+    with pytest.raises(GearError, match=r"a\.safetensors: says input_scale .* say --model-set input_scale="):
         build(find("model", "bisenet_x39"), with_overrides(NO_OPTIONS, [f"weights={path}"]))
     own = build(find("model", "bisenet_x39"), with_overrides(NO_OPTIONS, [f"weights={path}", "input_scale=0.5"]))
     assert own.input_scale == 0.5

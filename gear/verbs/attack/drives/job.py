@@ -116,7 +116,7 @@ def resolve_drives(request: DriveAttackRequest) -> DriveJob:
     Raises:
         GearError: something does not exist, or two inputs do not fit together.
     """
-    given = read_drive_config(request.drive, request.drive_settings, flag="--drive-set")
+    given = read_drive_config(request.drive, request.drive_settings)
     label = _driver(given, request)
     scenes = [(town, scene) for town, names in given.towns.items() for scene in names]
     if len(scenes) > 1:
