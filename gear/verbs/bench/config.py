@@ -107,6 +107,9 @@ class AttackBench:
         steps: number of optimisation steps.
         queries: number of forward passes for attacks without gradients; 0 for attacks with gradients.
         compositor: method that puts patches into pictures: `transport` (exact), or `homography`, which needs no probes.
+        patches: source of patches that exist already and are used in place of this attack: `shipped` for those of the
+            installed weights packages, or the folder of another benchmark; empty for none. Patches that the source
+            does not have are made by the attack.
         set: options of the attack (`gear plugins show ATTACK` lists them).
     """
 
@@ -114,6 +117,7 @@ class AttackBench:
     steps: int = 120
     queries: int = 0
     compositor: Literal["transport", "homography"] = "transport"
+    patches: str = ""
     set: Node = field(default_factory=_nothing)
 
     def __post_init__(self) -> None:

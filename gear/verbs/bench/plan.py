@@ -4,6 +4,7 @@ tables need.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from gear.plugins.build import build, find
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
 from gear.verbs.bench.config import BenchConfig, settings_of
+from gear.verbs.bench.existing_patches import PATCHES, ExistingPatches
 from gear.verbs.bench.scenes import Scene
 from gear.verbs.bench.validation import Candidate, TaskPlugins
 
@@ -117,6 +119,27 @@ class Plan:
         self.weathers = tuple(weathers(config.weathers))
         self._calibration, self._attack, self.root = calibration, attack, root
         self.workers = workers
+        self.existing: dict[Path, Path] = {}
+        """Folders of patches that exist already, by the folder in which an attack would write such patches."""
+
+    def take_existing(self, source: ExistingPatches) -> None:
+        """Uses all patches that a source has in place of attacks.
+
+        Args:
+            source: the patches that exist already.
+        """
+        scenes = (*self.scenes, *([] if self._calibration is None else [self._calibration]))
+        for one in self.plugins_of_tasks:
+            for model, scene in itertools.product(one.models, scenes):
+                for defense in self.adaptive_defenses(one) if scene in self.scenes else (None,):
+                    folder = source.find(one, model, defense, scene)
+                    if folder is not None:
+                        own = self.root / PATCHES / one.folder / self.name(model, defense) / scene.label
+                        self.existing[own] = folder
+
+    def _is_attacked(self, task_plugins: TaskPlugins, scene: Scene, name: str) -> bool:
+        """Whether the patches against a network, alone or with a defense, do not exist yet."""
+        return self.root / PATCHES / task_plugins.folder / name / scene.label not in self.existing
 
     def steps(self) -> Iterator[Step]:
         """Yields all steps in an order in which each step comes after the steps that it depends on."""
@@ -175,14 +198,15 @@ class Plan:
         return self._place(task_plugins, scene) / weather.label / kind
 
     def patch(self, task_plugins: TaskPlugins, scene: Scene, name: str) -> Path:
-        """Returns the folder of the patches that were optimised in a scene.
+        """Returns the folder of the patches that were optimised in a scene: by this benchmark, or before it.
 
         Args:
             task_plugins: networks and defenses of the task.
             scene: the scene.
             name: name of the attacked network, or of a network with a defense, as `Plan.name` returns it.
         """
-        return self.root / "patches" / task_plugins.folder / name / scene.label
+        own = self.root / PATCHES / task_plugins.folder / name / scene.label
+        return self.existing.get(own, own)
 
     def adaptive_defenses(self, task_plugins: TaskPlugins) -> tuple[Candidate | None, ...]:
         """Returns the defenses that attacks on a network take into account; None stands for the attack on the network
@@ -232,8 +256,11 @@ class Plan:
         return self.config.adaptive and defense.supports_adaptive_attack(self._attack)
 
     def _pictures(self, task_plugins: TaskPlugins, scene: Scene) -> Iterator[Step]:
+        guarded = itertools.product(task_plugins.models, self.adaptive_defenses(task_plugins))
+        is_attacked = any(self._is_attacked(task_plugins, scene, self.name(*pair)) for pair in guarded)
         for weather in self.weathers:
-            yield from self._grounds(task_plugins, scene, weather)
+            if is_attacked:
+                yield from self._grounds(task_plugins, scene, weather)
             for patch in (NO_PATCH, RANDOM):
                 out = self.pictures(task_plugins, scene, weather, patch)
                 yield self._collect(task_plugins, scene, weather, "measure", out, patch=patch)
@@ -254,7 +281,8 @@ class Plan:
         """Yields the steps for a network's patch, its adaptive patches, and the rendered pictures of both."""
         for defense in self.adaptive_defenses(task_plugins):
             name = self.name(model, defense)
-            yield self._attacked(task_plugins, scene, model, defense, self.weathers)
+            if self._is_attacked(task_plugins, scene, name):
+                yield self._attacked(task_plugins, scene, model, defense, self.weathers)
             for weather in self.weathers:
                 out, patch = self.pictures(task_plugins, scene, weather, name), self.patch(task_plugins, scene, name)
                 yield self._collect(task_plugins, scene, weather, "measure", out, patch=patch)
@@ -266,10 +294,12 @@ class Plan:
         network's patch.
         """
         weather = self.weathers[0]
-        yield from self._grounds(task_plugins, scene, weather)
+        if any(self._is_attacked(task_plugins, scene, model.label) for model in task_plugins.models):
+            yield from self._grounds(task_plugins, scene, weather)
         yield self._collect(task_plugins, scene, weather, "calibrate", self._calibration_folder(task_plugins, NO_PATCH))
         for model in task_plugins.models:
-            yield self._attacked(task_plugins, scene, model, None, (weather,))
+            if self._is_attacked(task_plugins, scene, model.label):
+                yield self._attacked(task_plugins, scene, model, None, (weather,))
             out, patch = (
                 self._calibration_folder(task_plugins, model.label),
                 self.patch(task_plugins, scene, model.label),
@@ -291,7 +321,8 @@ class Plan:
         *,
         patch: str | Path = NO_PATCH,
     ) -> Step:
-        shown = "" if patch == NO_PATCH else f", {patch if isinstance(patch, str) else patch.parent.name} patch"
+        named = patch if isinstance(patch, str) else out.name.partition("patch-")[2]
+        shown = "" if patch == NO_PATCH else f", {named} patch"
         arguments = {
             "task": task_plugins.name,
             "town": scene.town,

@@ -43,6 +43,7 @@ from gear.verbs.bench.disk import PictureSpace
 from gear.verbs.bench.drives.results import COLUMNS as DRIVE_COLUMNS
 from gear.verbs.bench.drives.results import DriveSection, drive_section
 from gear.verbs.bench.drives.steps import check_drives, every_step, planned_drives
+from gear.verbs.bench.existing_patches import PATCHES, ExistingPatches
 from gear.verbs.bench.page import page
 from gear.verbs.bench.paper.latex import document, tabular
 from gear.verbs.bench.paper.tables import paper_tables
@@ -260,6 +261,7 @@ def prepared(request: BenchRequest) -> Plan:
     attacker = find_attack(read, node)
     assert isinstance(attacker.spec, AttackSpec)
     surfaces = max(scene.surfaces for scene in scenes)
+    existing = _existing_patches(read, node, request)
     plan = Plan(
         read,
         scenes=scenes,
@@ -269,9 +271,24 @@ def prepared(request: BenchRequest) -> Plan:
         root=root,
         workers=_workers(request),
     )
+    plan.take_existing(existing)
     _check_pictures(plan, node)
     check_drives(plan, node)
     return plan
+
+
+def _existing_patches(config: BenchConfig, node: Node, request: BenchRequest) -> ExistingPatches:
+    """Returns the source of patches that the benchmark uses in place of attacks.
+
+    Raises:
+        ConfigError: the source holds no patches, or records are wanted, which state what the benchmark's attack did.
+    """
+    try:
+        if config.attack.patches and request.record:
+            raise GearError("records state what the attack of their benchmark did; leave out --record or this key")
+        return ExistingPatches(config.attack.patches)
+    except GearError as error:
+        raise located(node, error, "attack", "patches") from error
 
 
 def _workers(request: BenchRequest) -> dict[str, str | int]:
@@ -334,6 +351,7 @@ def _report(plan: Plan, root: Path, request: BenchRequest, reports: Reports) -> 
     facts = {
         "config": to_plain(plan.config),
         "scenes": [scene.label for scene in plan.scenes],
+        "existing_patches": [own.relative_to(root / PATCHES).as_posix() for own in plan.existing],
         "weathers": [weather.label for weather in plan.weathers],
         "name": request.name,
         "command": request.command,
