@@ -14,6 +14,7 @@ from authoring.materials.atlas import LOBBY_PANES, door_rect, shop_rect
 
 FLOOR_M = 3.7
 LOBBY_M = 5.2
+LOBBY_DEEP_M = 1.1
 PANE_M = 1.5
 PANES_PER_TILE = 8
 CORNER_M = 1.3
@@ -36,7 +37,7 @@ def glass_office(
         else:
             facade.wall("ashlar", 0.0, 0.0, facade.width_m, LOBBY_M)
         facade.box(frame, (0.0, facade.width_m), (LOBBY_M - 0.25, LOBBY_M + 0.15), (0.0, 0.18))
-    core(sink, width_m, depth_m, top_m)
+    core(sink, width_m, depth_m, top_m, ground_m=LOBBY_M, deep_m=LOBBY_DEEP_M + 0.1)
     flat_roof(sink, width_m, depth_m, top_m, wall="metal_panel", coping=frame, parapet_m=1.1)
     half_w, half_d = width_m * 0.28, depth_m * 0.25
     sink.tiled_box("metal_panel", (-half_w, -half_d, top_m), (half_w, half_d, top_m + 3.0), tile_m=2.0, skip="z")
@@ -81,15 +82,21 @@ def _lobby(facade: Facade, frame: str, *, main: bool) -> None:
         left = CORNER_M if index == 0 else 0.35
         right = CORNER_M if index == count - 1 else 0.35
         hole = Opening(index * pitch + left, 0.0, (index + 1) * pitch - right, LOBBY_M - 0.6)
-        facade.reveal("limestone", hole, 1.1, skip="s")
+        facade.reveal("limestone", hole, LOBBY_DEEP_M, skip="s")
         holes.append(hole)
         if main and index == count // 2:
             middle = (hole.u0 + hole.u1) / 2
             facade.picture("shop_fronts", door_rect("glass_double"), middle - 1.2, 0.0, middle + 1.2, 2.7, d_m=-1.05)
-            facade.box(frame, (hole.u0, hole.u1), (2.72, 2.95), (-1.1, 0.9))
+            facade.box(frame, (hole.u0, hole.u1), (2.72, 2.95), (-LOBBY_DEEP_M, 0.9))
         facade.picture(
-            "shop_fronts", shop_rect(LOBBY_PANES[index % len(LOBBY_PANES)]), hole.u0, 0.0, hole.u1, hole.v1, d_m=-1.1
+            "shop_fronts",
+            shop_rect(LOBBY_PANES[index % len(LOBBY_PANES)]),
+            hole.u0,
+            0.0,
+            hole.u1,
+            hole.v1,
+            d_m=-LOBBY_DEEP_M,
         )
         for u in np.linspace(hole.u0, hole.u1, 4):
-            facade.box(frame, (u - 0.03, u + 0.03), (0.0, hole.v1), (-1.1, -1.0), skip="but")
+            facade.box(frame, (u - 0.03, u + 0.03), (0.0, hole.v1), (-LOBBY_DEEP_M, -1.0), skip="but")
     facade.wall("ashlar", 0.0, 0.0, width, LOBBY_M, holes)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from authoring.kit.parts import Part, Sink
-from authoring.kit.shapes import cylinder, dome, tube
+from authoring.kit.shapes import cylinder, disc, dome, tube
 
 Array = npt.NDArray[np.float64]
 
@@ -23,6 +23,7 @@ def silos(count: int, *, radius_m: float = 3.0, height_m: float = 18.0) -> list[
         cylinder(sink, "aluminium", (x, 0, 0), radius_m, height_m, segments=20, cap=False)
         for z in np.arange(1.5, height_m, 1.5):
             cylinder(sink, "galvanised", (x, 0, z), radius_m + 0.04, 0.1, segments=20, cap=False)
+        disc(sink, "galvanised", (x, 0, height_m), radius_m + 0.05, segments=20, is_underside=True)
         dome(sink, "galvanised", (x, 0, height_m), radius_m + 0.05, 1.6, segments=20, rings=1)
         _ladder(sink, x, -radius_m - 0.25, height_m)
     end = first + (count - 1) * pitch + radius_m + 1.5

@@ -9,7 +9,7 @@ import numpy as np
 from authoring.kit.cores import sheet
 from authoring.kit.facade import belt, facades
 from authoring.kit.parts import Sink
-from authoring.kit.shapes import cylinder, dome
+from authoring.kit.shapes import cylinder, disc, dome
 from authoring.materials.atlas import window_rect
 from authoring.materials.registry import MATERIALS
 
@@ -89,7 +89,10 @@ def roof_machinery(
                     skip="zZ",
                 )
         sink.swatch_box("rust", (x - 1.1, y - 1.1, top_m + 2.4), (x + 1.1, y + 1.1, top_m + 2.55), skip="")
+        # The tank reaches over its frame, and its roof over the tank: both are seen from below.
+        disc(sink, "weathered_wood", (x, y, top_m + 2.55), 1.25, segments=14, is_underside=True)
         cylinder(sink, "weathered_wood", (x, y, top_m + 2.55), 1.25, 2.3, segments=14, cap=False)
+        disc(sink, "bitumen", (x, y, top_m + 4.85), 1.4, segments=14, is_underside=True)
         dome(sink, "bitumen", (x, y, top_m + 4.85), 1.4, 0.9, segments=14, rings=1)
     mast_x, mast_y = half_w * float(rng.uniform(-0.8, 0.8)), half_d * 0.5
     sink.swatch_box(

@@ -63,13 +63,21 @@ def turned(
 
 
 def disc(
-    sink: Sink, swatch: str, centre: Sequence[float], radius_m: float, *, segments: int = 12, label: str | None = None
+    sink: Sink,
+    swatch: str,
+    centre: Sequence[float],
+    radius_m: float,
+    *,
+    segments: int = 12,
+    is_underside: bool = False,
+    label: str | None = None,
 ) -> None:
-    """A flat disc that faces up."""
+    """A flat disc that faces up, or down as the underside of what stands on it."""
     angle = np.arange(segments) * 2 * np.pi / segments
     ring = np.stack([np.cos(angle) * radius_m, np.sin(angle) * radius_m, np.zeros(segments)], 1) + centre
-    faces = [(0, i, i + 1) for i in range(1, segments - 1)]
-    sink.swatch_mesh(swatch, ring, faces, np.tile([0.0, 0.0, 1.0], (segments, 1)), label=label)
+    faces = [(0, i + 1, i) if is_underside else (0, i, i + 1) for i in range(1, segments - 1)]
+    up = -1.0 if is_underside else 1.0
+    sink.swatch_mesh(swatch, ring, faces, np.tile([0.0, 0.0, up], (segments, 1)), label=label)
 
 
 def tube(

@@ -41,7 +41,7 @@ def storeyed_building(
                 facade, style, floors, top_m, ridge_m=_ridge_m(style, depth_m), covered_m=low_m.get(side, 0.0), rng=rng
             )
     _ornament(sink, style, width_m, depth_m, floors, top_m, sides)
-    core(sink, width_m, depth_m, top_m)
+    core(sink, width_m, depth_m, top_m, ground_m=style.ground_m)
     if style.roof == "mansard":
         mansard(sink, width_m, depth_m, top_m, sides=sides, dormer_pitch_m=style.bay_m, rng=rng)
     elif style.roof == "gable" and depth_m < 16:

@@ -75,7 +75,7 @@ def build_lots(sink: Sink, lots: list[Lot], *, seed: int) -> None:
     for index, lot in enumerate(lots):
         parts = building(
             style=lot.style,
-            width_m=lot.width_m - 0.02,
+            width_m=lot.width_m,
             depth_m=lot.depth_m,
             floors=lot.floors,
             rng=np.random.default_rng([seed, index]),

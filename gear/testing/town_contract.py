@@ -218,6 +218,10 @@ class TownContract:
         """Meshes of ground and buildings have no cracks, through which pixels would show what lies behind."""
         fail_if("there are cracks in the ground", town_scenes.cracks(self.under_test(), self.samples))
 
+    def test_no_surface_is_seen_from_behind(self) -> None:
+        """No small piece of sky amid ground and buildings is the back of a surface, as if a face were missing."""
+        fail_if("surfaces are seen from behind", town_scenes.open_backs(self.under_test(), self.samples))
+
     def test_ids_and_depth_are_those_of_rays(self) -> None:
         """Ids and depth of the classic renderer agree with MuJoCo's own rays on the first scene."""
         fail_if("pixels and rays differ", town_scenes.disagreement(self.under_test(), self.min_agreement))

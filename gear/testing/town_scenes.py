@@ -22,11 +22,15 @@ from gear.world.planner import ScenePlanner
 from gear.world.world import PlacedStage, World
 
 RIG = Rig(cameras=(CameraMount(name="rgb", width_px=640, height_px=320),))
+LARGE_RIG = Rig(cameras=(CameraMount(name="rgb", width_px=2048, height_px=1024),))
+"""Camera of `open_backs`, with pixels of 5 cm at a distance of 50 m."""
+
 FACE_GRID = (9, 5)
 PIXELS = 400
 NOTHING = 255
 """Label code of pixels that show no geom (the sky)."""
 
+GROUND = LABEL_BY_NAME["ground"].code
 CLOSED = frozenset({*GROUND_CODES, LABEL_BY_NAME["building"].code, LABEL_BY_NAME["wall"].code})
 """Codes of the labels whose meshes must have no holes: ground, buildings, walls."""
 
@@ -35,6 +39,10 @@ PINHOLES_A_MILLION = 5
 
 SLIVERS_A_MILLION = 5
 """Number of slivers allowed per million pixels, because a thin part of a yard can also be seen from far away."""
+
+BACKS_A_MILLION = 0.5
+"""Number of pieces of sky allowed per million pixels where rays hit a geom, because rasterisers leave single pixels
+open where walls meet in the middle of an edge."""
 
 SLIVER_PX = 3
 """Largest number of pixels of a sliver."""
@@ -181,18 +189,51 @@ def pinholes(label_code: npt.NDArray[np.uint8], depth_m: FloatImage) -> npt.NDAr
     return np.argwhere(is_hole) + 1
 
 
-def slivers(label_code: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
-    """Pieces of `ground` of a few pixels amid closed surfaces, such as a thin strip of yard along the foot of a wall.
+def open_backs(town: TownUnderTest, samples: int) -> list[str]:
+    """One line for each small piece of sky amid closed surfaces that is no gap: a ray through it hits a geom.
+
+    Renderers draw no surface from behind. If a face is missing, such as the underside of a roof, the sky is seen there,
+    through the back of what lies behind. A real gap between surfaces, through which a ray hits nothing, is no problem.
+    The pieces are reported only if there are more than `BACKS_A_MILLION` in a million pixels of the first scene.
+
+    Args:
+        town: the town under test.
+        samples: number of samples that are rendered.
+    """
+    world, _ = town.first_world
+    planner = _planner(world, samples, LARGE_RIG)
+    problems = []
+    for index in range(samples):
+        record = planner.plan(index)
+        placed = world.place(record)
+        camera, rays = record.cameras[0], _rays(placed)
+        pose = camera.world_from_camera_transform
+        labels = np.append(placed.geoms.label_code, NOTHING)[_truth(world, placed, record).geom_id]
+        for row, column in slivers(labels, NOTHING).tolist():
+            along = np.ascontiguousarray(pose.rotation @ camera.intrinsics.unproject([column, row], 1.0))
+            distance_m, geom = rays.first_hit(pose.translation_m, along)
+            if geom >= 0:
+                x_m, y_m, z_m = pose.translation_m + distance_m * along
+                problems.append(
+                    f"scene {record.scene}, sample {index}: the sky shows through the back of {_named(rays, geom)} "
+                    f"near ({x_m:.1f}, {y_m:.1f}, {z_m:.1f})"
+                )
+    millions = samples * LARGE_RIG.cameras[0].width_px * LARGE_RIG.cameras[0].height_px / 1e6
+    return problems if len(problems) > BACKS_A_MILLION * millions else []
+
+
+def slivers(label_code: npt.NDArray[np.uint8], of: int = GROUND) -> npt.NDArray[np.int64]:
+    """Pieces of one label of a few pixels amid closed surfaces, such as a thin strip of yard along the foot of a wall.
 
     Args:
         label_code: (H, W) codes of labels, `NOTHING` for the sky.
+        of: code of the label of the pieces, `ground` by default.
 
     Returns:
         (N, 2) row and column of the first pixel of each piece. A piece has at most `SLIVER_PX` pixels, and all pixels
         around it have labels of `CLOSED`.
     """
-    ground = LABEL_BY_NAME["ground"].code
-    count, number, stats, _ = cv2.connectedComponentsWithStats((label_code == ground).astype(np.uint8), connectivity=8)
+    count, number, stats, _ = cv2.connectedComponentsWithStats((label_code == of).astype(np.uint8), connectivity=8)
     found = []
     for piece in range(1, count):
         left, top, width, height, area = stats[piece].tolist()
@@ -263,8 +304,8 @@ def _truth(world: World, placed: PlacedStage, record: SceneRecord) -> _Truth:
     return _Truth(view.geom_id, view.depth_m)
 
 
-def _planner(world: World, samples: int) -> ScenePlanner:
-    return ScenePlanner(world, RIG, SplitConfig(seed=0, samples=samples), split_name="debug")
+def _planner(world: World, samples: int, rig: Rig = RIG) -> ScenePlanner:
+    return ScenePlanner(world, rig, SplitConfig(seed=0, samples=samples), split_name="debug")
 
 
 def _hidden_faces(world: World, record: SceneRecord, min_visible: float) -> list[str]:

@@ -124,7 +124,7 @@ def test_whatever_comes_through_a_wall_meets_the_core_or_the_ceiling() -> None:
     """Lines of sight from the street through any point of the front, four metres off its corners, up to the ceiling."""
     width, depth, top = 14.0, 11.0, 12.0
     sink = Sink("building")
-    core(sink, width, depth, top)
+    core(sink, width, depth, top, ground_m=4.0)
     (part,) = sink.parts()
     corners = np.asarray(part.mesh.vertices)[np.asarray(part.mesh.faces)]
     origin, first, second = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
+import numpy as np
 import pytest
 
 from gear.testing.tiny_town import DATA, TINY_SCENES, TINY_TOWN
@@ -72,6 +73,19 @@ EAST_TO_SOUTH = 'data="3.5 5  26.5 -1.75 0  27.4 -2.1 0  28 -2.75 0  28.25 -3.5 
 STEEL = '<material name="steel" rgba="0.30 0.31 0.32 1" metallic="0" roughness="0.5"/>'
 CUBE = '<texture name="cube" type="cube" builtin="flat" rgb1="0.3 0.3 0.3" width="16" height="96"/>'
 FLAT = '<texture name="flat" type="2d" builtin="flat" rgb1="0.8 0.8 0.8" width="16" height="16" colorspace="sRGB"/>'
+
+SHELL = (
+    '<mesh name="shell" inertia="shell" vertex="0 -3 -3  0 3 -3  0 3 3  0 -3 3  2 0 0"'
+    ' face="0 1 4  1 2 4  2 3 4  3 0 4"/>'
+)
+"""A pyramid that is open towards -x, so that its faces show their backs there."""
+
+SLATS = "".join(
+    f'<geom class="building.plaster" pos="60 {place:.2f} 3" size="0.02 0.115 2"/>'
+    f'<geom class="building.plaster" pos="60.04 0 {3 + place:.2f}" size="0.02 2 0.115"/>'
+    for place in np.arange(-2, 2.1, 0.25)
+)
+"""A wall across the main road, of two layers of slats that leave holes of 2 cm."""
 
 BREAKS: dict[str, tuple[tuple[tuple[str, str], ...], str, str]] = {
     "a geom without a label": (
@@ -265,6 +279,11 @@ BREAKS: dict[str, tuple[tuple[tuple[str, str], ...], str, str]] = {
          ('pos="0 0 -0.25" size="80 3.5 0.25"', 'pos="-20.2 0 -0.01" size="59.8 3.5 0.01"'),
          add_geom('<geom name="rest" class="road" material="asphalt" pos="60.2 0 -0.01" size="19.8 3.5 0.01"/>')),
         "test_the_ground_is_closed", r"sample 0: the sky shows near .(39|40)\.",
+    ),
+    "a shell behind a wall with holes": (
+        (("</asset>", f"{SHELL}</asset>"),
+         add_geom(f'{SLATS}<geom name="shell" class="building.plaster" type="mesh" mesh="shell" pos="61 0 3"/>')),
+        "test_no_surface_is_seen_from_behind", "the sky shows through the back of 'shell' near .6[1-3]",
     ),
     "no MJCF": (
         (("<worldbody>", "<worldbodies>"), ("</worldbody>", "</worldbodies>")),
