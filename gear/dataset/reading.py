@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar, overload
+from typing import Any, Generic, TypeVar
 
 from gear.contracts.tasks import Sample, SampleT, Sidecar, Task
 from gear.dataset.files import inside, read_bytes, sha256
@@ -15,6 +14,7 @@ from gear.dataset.plan import Plan
 from gear.dataset.sealed_json import REPAIR, DamagedError, load_sealed
 from gear.dataset.sidecar import no_sidecar, read_sidecar
 from gear.values.errors import DatasetError, FieldError
+from gear.values.lazy_sequence import LazySequence
 from gear.values.serial import Json, from_json
 
 T = TypeVar("T")
@@ -24,7 +24,7 @@ SHOWN = 4
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Dataset(Sequence[SampleT], Generic[SampleT]):
+class Dataset(LazySequence[SampleT], Generic[SampleT]):
     """One finished split: a sequence of samples, each read and decoded on access.
 
     Attributes:
@@ -55,23 +55,23 @@ class Dataset(Sequence[SampleT], Generic[SampleT]):
         shown = ((f"{i:06d}", self.task.preview(self[i])) for i in range(min(len(self), SHOWN)))
         return preview_table(repr(self), shown)
 
-    @overload
-    def __getitem__(self, index: int) -> SampleT: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[SampleT]: ...
-    def __getitem__(self, index: int | slice) -> SampleT | Sequence[SampleT]:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
+    def item(self, index: int) -> SampleT:
+        """Reads and decodes the sample `index`; `dataset[index]` does the same, and counts negative indices from the
+        end.
+
+        Args:
+            index: index of the sample.
+
+        Raises:
+            DatasetError: a file of the sample is missing, damaged, or cannot be read.
+        """
         sidecar = self.sidecar(index)
         self._refuse_damaged(sidecar)
         try:
             return self.task.decode(self.root, sidecar, self.plan.info)
         except FieldError as error:  # facts are the task's own, which reads them with `from_json`
-            path = self.root / sidecar_path(self.plan.info.split, index % len(self))
+            path = self.root / sidecar_path(self.plan.info.split, index)
             raise no_sidecar(path, FieldError(f"facts.{error.field}", error.problem)) from error
-
-    def __iter__(self) -> Iterator[SampleT]:
-        return (self[i] for i in range(len(self)))
 
     def sidecar(self, index: int) -> Sidecar:
         """The metadata of one sample without its pictures: scene record, surfaces, the task's metadata and file hashes.
@@ -222,7 +222,7 @@ def scenes_of(dataset: Dataset[Any]) -> tuple[str, int]:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Twins(Sequence[tuple[SampleT, SampleT]], Generic[SampleT]):
+class Twins(LazySequence[tuple[SampleT, SampleT]], Generic[SampleT]):
     """Two splits that differ only in their patch (twins), as a sequence of pairs of samples.
 
     Attributes:
@@ -247,16 +247,9 @@ class Twins(Sequence[tuple[SampleT, SampleT]], Generic[SampleT]):
                 rows.append((f"{i:06d} {one.plan.info.patch_label}", one.task.preview(one[i])))
         return preview_table(repr(self), rows)
 
-    @overload
-    def __getitem__(self, index: int) -> tuple[SampleT, SampleT]: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[tuple[SampleT, SampleT]]: ...
-    def __getitem__(self, index: int | slice) -> tuple[SampleT, SampleT] | Sequence[tuple[SampleT, SampleT]]:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        if not -len(self) <= index < len(self):
-            raise IndexError(f"pair {index} of {len(self)}")
-        return self.first[index % len(self)], self.second[index % len(self)]
+    def item(self, index: int) -> tuple[SampleT, SampleT]:
+        """Reads and decodes the pair of samples `index`."""
+        return self.first[index], self.second[index]
 
 
 def pair_twins(first: Dataset[Sample], second: Dataset[Sample]) -> Twins[Sample]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -60,9 +61,10 @@ class Paired:
 
     Attributes:
         other: name of the other twin.
-        pairs: number of situations that both have driven.
-        only_here, only_there: situations in which only this twin, or only the other twin, crashed.
-        p: two-sided p of McNemar's exact test: how often chance alone gives crashes as unequal as these.
+        pairs: number of pairs of drives, one of each twin, in the same situation and weather.
+        only_here, only_there: pairs in which only this twin, or only the other twin, crashed.
+        p: two-sided p of McNemar's exact test: how often chance alone gives crashes as unequal as these
+            (`exact_p`).
         crash_difference: difference of the shares of crashes, this twin minus the other one.
         crash_interval: its interval (`mean_difference`).
         least_ttc_difference_s: mean difference of the least time to collision; None if none was approached in both.
@@ -91,9 +93,6 @@ class Paired:
 def compared(here: Sequence[DriveResult], there: Sequence[DriveResult], other: str) -> Paired:
     """Compares two twins over the situations that both have driven.
 
-    McNemar's test in its exact form: of the situations in which only one of the twins crashed, each is equally likely
-    to be either's (McNemar, Psychometrika 1947).
-
     Args:
         here: drives of one twin.
         there: drives of the other twin.
@@ -103,15 +102,28 @@ def compared(here: Sequence[DriveResult], there: Sequence[DriveResult], other: s
         Numbers of the pairs, the p value of the test, and the mean differences of braking delay and score, first twin
         minus other twin.
     """
-    from scipy import stats
+    twins = {one.run.situation: one for one in there}
+    return compared_pairs([(one, twins[one.run.situation]) for one in here if one.run.situation in twins], other)
 
-    twins = {one.run.situation: one.measures for one in there}
-    both = [one for one in here if one.run.situation in twins]
-    pairs = [(one.measures, twins[one.run.situation]) for one in both]
-    clusters = [one.run.situation[:4] for one in both]
+
+def compared_pairs(drives: Sequence[tuple[DriveResult, DriveResult]], other: str) -> Paired:
+    """Compares two twins over pairs of drives. Several pairs of one situation, such as its drives in several weathers,
+    are not independent, and count as one in the test and in the intervals.
+
+    Args:
+        drives: pairs of a drive of one twin and the drive of the other twin in the same situation and weather.
+        other: name of the other twin.
+
+    Returns:
+        As `compared`.
+    """
+    pairs = [(one.measures, twin.measures) for one, twin in drives]
+    clusters = [one.run.situation[:4] for one, _ in drives]
     only_here = sum(a.is_crash and not b.is_crash for a, b in pairs)
     only_there = sum(b.is_crash and not a.is_crash for a, b in pairs)
-    unequal = only_here + only_there
+    crashes: Counter[Hashable] = Counter()
+    for one, twin in drives:
+        crashes[one.run.situation] += one.measures.is_crash - twin.measures.is_crash
     crash, crash_interval = mean_difference([float(a.is_crash) - float(b.is_crash) for a, b in pairs], clusters, SHARES)
     ttc_s, ttc_interval = mean_difference([_less(a.least_ttc_s, b.least_ttc_s) for a, b in pairs], clusters)
     delay_s, delay_interval = mean_difference([_less(a.braking_s, b.braking_s) for a, b in pairs], clusters)
@@ -121,7 +133,7 @@ def compared(here: Sequence[DriveResult], there: Sequence[DriveResult], other: s
         pairs=len(pairs),
         only_here=only_here,
         only_there=only_there,
-        p=float(stats.binomtest(only_here, unequal, 0.5).pvalue) if unequal else 1.0,
+        p=exact_p(list(crashes.values())),
         crash_difference=crash or 0.0,
         crash_interval=crash_interval,
         least_ttc_difference_s=ttc_s,
@@ -131,6 +143,24 @@ def compared(here: Sequence[DriveResult], there: Sequence[DriveResult], other: s
         score=score or 0.0,
         score_interval=score_interval,
     )
+
+
+def exact_p(differences: Sequence[int]) -> float:
+    """The two-sided p of the exact sign test of paired counts: each difference is equally likely to have either sign.
+
+    It is the share of all choices of signs whose sum is at least as far from 0 as the given one. For differences of -1,
+    0 and 1 this is McNemar's exact test (McNemar, Psychometrika 1947).
+
+    Args:
+        differences: crashes of one twin minus crashes of the other one, for each situation.
+    """
+    ways = {0: 1}  # number of choices of signs, by their sum
+    for size in map(abs, differences):
+        ways = Counter({total + size: many for total, many in ways.items()}) + Counter(
+            {total - size: many for total, many in ways.items()}
+        )
+    far = sum(many for total, many in ways.items() if abs(total) >= abs(sum(differences)))
+    return far / (1 << len(differences))
 
 
 def _less(here: float | None, there: float | None) -> float | None:

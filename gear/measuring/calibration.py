@@ -17,6 +17,7 @@ from gear.plugins.build import blamed
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import GearError
 from gear.values.frames import UInt8Image
+from gear.values.lazy_sequence import LazySequence
 from gear.values.progress import NO_CALLBACKS, Callbacks
 from gear.values.rng import derive_rng
 from gear.values.serial import Json
@@ -158,7 +159,7 @@ def _label(dataset: Dataset[Any]) -> str:
     return dataset.plan.info.patch_label
 
 
-class CalibrationViews(Sequence[Views]):
+class CalibrationViews(LazySequence[Views]):
     """The pictures of a dataset as a sequence; each sample is a mapping from camera names to (H, W, 3) uint8 pictures.
 
     A sample is read from disk when it is indexed.
@@ -177,9 +178,8 @@ class CalibrationViews(Sequence[Views]):
     def __len__(self) -> int:
         return len(self._dataset)
 
-    def __getitem__(self, index: Any) -> Any:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
+    def item(self, index: int) -> Views:
+        """Reads the pictures of the sample `index`."""
         images = self._dataset[index].images
-        self._took(index % len(self))
+        self._took(index)
         return {name: images[name] for name in self._names}

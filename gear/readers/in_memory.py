@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import threading
 from collections.abc import Mapping, Sequence
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
+from gear.values.lazy_sequence import LazySequence
 
-class Kept(Sequence[Any]):
+
+class Kept(LazySequence[Any]):
     """Samples that stay in memory after their first access, until a limit of bytes is reached.
 
     A sample in memory is never replaced by another one. Every pass over the data, in any order, therefore finds the
@@ -32,14 +34,8 @@ class Kept(Sequence[Any]):
     def __len__(self) -> int:
         return len(self._samples)
 
-    @overload
-    def __getitem__(self, index: int) -> Any: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Any]: ...
-    def __getitem__(self, index: int | slice) -> Any:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        index = range(len(self))[index]
+    def item(self, index: int) -> Any:
+        """Returns the sample `index` from memory, or reads it and keeps it if there is room."""
         kept = self._kept.get(index)
         if kept is not None:
             return kept

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 from gear.config.dump import to_plain
 from gear.config.overrides import with_overrides
@@ -26,6 +26,7 @@ from gear.plugins.build import NO_OPTIONS
 from gear.plugins.datasets import open_dataset
 from gear.reporting.display import displayed
 from gear.values.errors import DatasetError
+from gear.values.lazy_sequence import LazySequence
 from gear.values.progress import Callbacks, Progress
 from gear.values.serial import Json
 
@@ -174,7 +175,7 @@ def _check_disk(target: Path, needed: float) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Sidecars(Sequence[Sidecar]):
+class _Sidecars(LazySequence[Sidecar]):
     """The sidecars (JSON metadata of the samples) of a split; each file is read when it is accessed."""
 
     opened: Dataset[Any]
@@ -182,13 +183,7 @@ class _Sidecars(Sequence[Sidecar]):
     def __len__(self) -> int:
         return len(self.opened)
 
-    @overload
-    def __getitem__(self, index: int) -> Sidecar: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Sidecar]: ...
-    def __getitem__(self, index: int | slice) -> Sidecar | Sequence[Sidecar]:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
+    def item(self, index: int) -> Sidecar:
         return self.opened.sidecar(index)
 
 

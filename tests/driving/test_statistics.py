@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from gear.driving.statistics import mean_difference
+from gear.driving.statistics import exact_p, mean_difference
 from gear.measuring.intervals import REAL
 from gear.values.rng import derive_rng
 
@@ -46,3 +48,19 @@ def test_scenarios_are_left_out_with_all_their_seeds() -> None:
     _, wide = mean_difference([0.0, 0.0, 1.0, 1.0, 2.0, 2.0], ["a", "a", "b", "b", "c", "c"])
     _, narrow = mean_difference([0.0, 0.0, 1.0, 1.0, 2.0, 2.0], list("abcdef"))
     assert wide is not None and narrow is not None and wide[1] - wide[0] > narrow[1] - narrow[0]
+
+
+@pytest.mark.parametrize(("only_here", "only_there", "equal"), [(0, 0, 3), (7, 0, 2), (5, 2, 0), (3, 3, 1)])
+def test_one_drive_per_situation_gives_mcnemars_exact_test(only_here: int, only_there: int, equal: int) -> None:
+    differences = [1] * only_here + [-1] * only_there + [0] * equal
+    unequal = only_here + only_there
+    expected = stats.binomtest(only_here, unequal, 0.5).pvalue if unequal else 1.0
+    assert exact_p(differences) == pytest.approx(expected, rel=1e-12)
+
+
+def test_several_drives_per_situation_are_compared_by_all_choices_of_signs() -> None:
+    differences = [3, -1, 2, 0, 2]
+    sums = [sum(sign * one for sign, one in zip(signs, differences, strict=True))
+            for signs in itertools.product((-1, 1), repeat=5)]  # fmt: skip
+    assert exact_p(differences) == np.mean(np.abs(sums) >= 6)
+    assert exact_p([4] * 5) == exact_p([1] * 5) and exact_p([]) == 1.0

@@ -6,10 +6,9 @@ hashed, but not parsed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
-from typing import overload
 
 from gear.contracts.tasks import Sidecar
 from gear.dataset.files import inside, read_bytes, sha256
@@ -19,6 +18,7 @@ from gear.dataset.layout import manifest_path, sidecar_path
 from gear.dataset.sealed_json import load_sealed
 from gear.dataset.sidecar import no_sidecar, read_sidecar
 from gear.values.errors import DatasetError, FieldError
+from gear.values.lazy_sequence import LazySequence
 from gear.values.progress import NO_CALLBACKS, Progress
 from gear.values.serial import Json
 
@@ -83,7 +83,7 @@ def can_extend(task: type) -> bool:
     return owners[0] is owners[1]
 
 
-class SidecarStream(Sequence[Sidecar]):
+class SidecarStream(LazySequence[Sidecar]):
     """All sidecars (JSON files of the samples) of a split in order of index; each is read on access and not kept.
 
     The sidecars of 20,000 samples would take gigabytes of memory. Only the entries of the manifest are kept: indices,
@@ -121,22 +121,11 @@ class SidecarStream(Sequence[Sidecar]):
     def __len__(self) -> int:
         return len(self._entries)
 
-    @overload
-    def __getitem__(self, index: int) -> Sidecar: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Sidecar]: ...
-    def __getitem__(self, index: int | slice) -> Sidecar | Sequence[Sidecar]:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        if not -len(self) <= index < len(self):
-            raise IndexError(f"sidecar {index} of {len(self)}")
-        return self._read(index % len(self))
-
-    def __iter__(self) -> Iterator[Sidecar]:
-        return (self._read(index) for index in range(len(self)))
-
-    def _read(self, index: int) -> Sidecar:
+    def item(self, index: int) -> Sidecar:
         """Reads a sidecar, and keeps the data that the manifest lists about it.
+
+        Args:
+            index: index of the sample.
 
         Raises:
             DatasetError: the sidecar is missing, damaged, or lacks a camera.
@@ -169,6 +158,6 @@ class SidecarStream(Sequence[Sidecar]):
         """
         for index, known in enumerate(self._hashes):
             if not known:
-                self._read(index)
+                self.item(index)
         hashes = {sidecar_path(self._split, index): digest for index, digest in enumerate(self._hashes)}
         return {"samples": self._entries, "sidecars": hashes}

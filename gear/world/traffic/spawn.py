@@ -105,7 +105,9 @@ class FreeSlots:
     """
 
     bodies: dict[str, list[str]] = field(default_factory=dict)
-    _drawable: dict[bool, list[ActorType]] = field(default_factory=dict, init=False, repr=False)
+    _drawable: dict[bool, tuple[Mapping[str, ActorType], list[ActorType]]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @staticmethod
     def of(slots: Sequence[Slot]) -> FreeSlots:
@@ -142,20 +144,22 @@ class FreeSlots:
         the weights of the assets.
 
         Args:
-            types: measured assets by name, the same in every call.
+            types: measured assets by name; the mapping must not be changed between calls.
             rng: random generator.
             people: whether a person is drawn; otherwise a vehicle.
 
         Returns:
             The asset; None if no asset of this kind has a free slot.
         """
-        if people not in self._drawable:  # dozens of draws per sample would search all types again
-            self._drawable[people] = [
+        searched, drawable = self._drawable.get(people, (None, []))
+        if searched is not types:  # else dozens of draws per sample would search all types again
+            drawable = [
                 actor_type
                 for name, actor_type in types.items()
                 if name in self.bodies and actor_type.is_person == people and actor_type.facts.weight > 0
             ]
-        kinds = [actor_type for actor_type in self._drawable[people] if self.bodies[actor_type.facts.name]]
+            self._drawable[people] = types, drawable
+        kinds = [actor_type for actor_type in drawable if self.bodies[actor_type.facts.name]]
         if not kinds:
             return None
         shares = np.cumsum([actor_type.facts.weight for actor_type in kinds])

@@ -51,6 +51,15 @@ def test_assets_are_drawn_by_their_weights(types: dict[str, ActorType]) -> None:
     assert FreeSlots({}).draw(types, rng, people=True) is None
 
 
+def test_each_draw_is_among_the_given_types(types: dict[str, ActorType]) -> None:
+    free = FreeSlots({name: ["body"] for name in types})
+    rng = np.random.default_rng(0)
+    for name in ("van_small", "car_saloon", "van_small"):
+        drawn = free.draw({name: types[name]}, rng, people=False)
+        assert drawn is not None and drawn.facts.name == name
+    assert free.draw({}, rng, people=False) is None
+
+
 def test_colours_are_drawn_by_their_weights(types: dict[str, ActorType]) -> None:
     car = types["car_saloon"]
     palette = (((1.0, 0.0, 0.0), 1.0), ((0.0, 1.0, 0.0), 0.0), ((0.0, 0.0, 1.0), 3.0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 import torch
@@ -12,13 +12,14 @@ from torch import Tensor
 from torch.nn import functional
 
 from gear.formats import rle
+from gear.values.lazy_sequence import LazySequence
 from gear.values.rng import derive_rng
 
 Place = tuple[int, int, int, int]
 """Position and size of a pasted patch: top, left, height, width in pixels, inside the picture."""
 
 
-class Upright(Sequence[Any]):
+class Upright(LazySequence[Any]):
     """A dataset and a compositor in one: patches are pasted upright into its pictures at random positions.
 
     The surfaces in its samples are these positions. Both views of a stereo pair show a patch at the same pixels, like
@@ -59,13 +60,8 @@ class Upright(Sequence[Any]):
     def __len__(self) -> int:
         return len(self._dataset)
 
-    @overload
-    def __getitem__(self, index: int) -> Any: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Any]: ...
-    def __getitem__(self, index: int | slice) -> Any:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
+    def item(self, index: int) -> Any:
+        """Returns the sample `index` with the positions of the patches as its surfaces."""
         sample = self._dataset[index]
         places = self.places(index)
         surfaces = []

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gear.contracts.tasks import NO_PATCH
-from gear.driving.statistics import Paired, Rate, compared
+from gear.driving.statistics import Paired, Rate, compared_pairs
 from gear.driving.worker import DriveResult
 from gear.values.serial import Json
 from gear.verbs.bench.drives.steps import BenchDriver, PlannedDrives
@@ -30,8 +30,8 @@ random patch.
 Key = tuple[str, BenchDriver, str, str]
 """Task, driver, scenario and kind of patch of the drives in one line."""
 
-Situation = tuple[str, str, str, float, int]
-"""What `DriveRun.situation` returns; with several weathers, the name of the scene is followed by the weather's."""
+Situation = tuple[str, tuple[str, str, str, float, int]]
+"""The weather's label, and what `DriveRun.situation` returns."""
 
 TITLES = ("network", "defense", "controller", "patch", "drives", "collision rate", "impact km/h", "score", "p none",
           "p random")  # fmt: skip
@@ -41,7 +41,7 @@ LEGEND = (
     "drives in the closed loop, over all scenes, weathers and scenarios that are not free roads; collision rate: share"
     " of drives that ended in a crash, with the exact 95 % interval of Clopper and Pearson; impact: mean speed at first"
     " contact; score: CARLA's driving score; p: McNemar's exact test of the crashes against the same situations without"
-    " a patch and with a random patch"
+    " a patch and with a random patch, in which the drives of a situation in several weathers count as one"
 )
 
 
@@ -147,27 +147,20 @@ def drive_section(made: Sequence[tuple[PlannedDrives, DriveReport]], root: Path)
     for planned, report in made:
         studies.append(planned.out.relative_to(root).as_posix())
         failed += report.failed
-        for one in (_in_weather(result, planned.weather) for result in report.results):
+        for one in report.results:
             driver, kind = planned.drivers[one.run.driver], planned.kind(one.run.twin)
             task = planned.task_plugins.name if driver.model else ""
             names = [one.run.scenario] if one.run.scenario in report.free else [one.run.scenario, ALL]
             for name in names:
                 group = found.setdefault((task, driver, name, kind), {})
-                group.setdefault(one.run.situation, one)  # references drive again for each task, and count once
-    groups = {key: list(group.values()) for key, group in found.items()}
+                # References drive again for each task, and count once.
+                group.setdefault((planned.weather, one.run.situation), one)
     return DriveSection(
-        lines=tuple(_line(key, groups) for key in sorted(groups, key=lambda key: _order(key, groups))),
+        lines=tuple(_line(key, found) for key in sorted(found, key=lambda key: _order(key, found))),
         studies=tuple(studies),
         failed=tuple(failed),
         made=tuple(made),
     )
-
-
-def _in_weather(result: DriveResult, weather: str) -> DriveResult:
-    """The result of a drive whose scene also names the weather, so that drives are paired only within a weather."""
-    if not weather:
-        return result
-    return replace(result, run=replace(result.run, scene=f"{result.run.scene}, {weather}"))
 
 
 def _order(key: Key, groups: Mapping[Key, Any]) -> tuple[int, bool, int]:
@@ -179,15 +172,15 @@ def _order(key: Key, groups: Mapping[Key, Any]) -> tuple[int, bool, int]:
     return drivers.index((task, driver)), name == ALL, place * len(KINDS) + KINDS.index(kind)
 
 
-def _line(key: Key, groups: Mapping[Key, Sequence[DriveResult]]) -> DriveLine:
+def _line(key: Key, groups: Mapping[Key, Mapping[Situation, DriveResult]]) -> DriveLine:
     task, driver, scenario, kind = key
-    here = groups[key]
-    others = {NO_PATCH: (), RANDOM: (NO_PATCH,)}.get(kind, (NO_PATCH, RANDOM))
-    paired = [
-        compared(here, groups[task, driver, scenario, other], other)
-        for other in others
-        if (task, driver, scenario, other) in groups
-    ]
+    paired = []
+    for other in {NO_PATCH: (), RANDOM: (NO_PATCH,)}.get(kind, (NO_PATCH, RANDOM)):
+        twins = groups.get((task, driver, scenario, other), {})
+        if twins:
+            both = [(one, twins[place]) for place, one in groups[key].items() if place in twins]
+            paired.append(compared_pairs(both, other))
+    here = list(groups[key].values())
     impacts = [one.measures.impact_mps for one in here if one.measures.impact_mps is not None]
     return DriveLine(
         task=task,

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from gear.driving.statistics import Paired
 from gear.driving.worker import DriveResult
 from gear.verbs.bench.drives.results import COLUMNS, DriveSection, drive_section
 from gear.verbs.bench.drives.steps import BenchDriver, PlannedDrives
@@ -84,6 +85,27 @@ def test_drives_are_paired_within_their_weather() -> None:
     assert [found["all", kind].crashes.count for kind in ("none", "patch")] == [5, 10]
     (paired,) = found["all", "patch"].paired
     assert (paired.pairs, paired.only_here, paired.only_there) == (10, 5, 0)
+
+
+def test_the_weathers_of_a_situation_are_no_further_evidence() -> None:
+    """A driver that sees no picture drives alike in every weather; test and interval are those of one weather."""
+
+    def against_none(*weathers: str) -> Paired:
+        made = []
+        for weather in weathers:
+            for scene in ("a", "b", "c"):
+                drives = [drive("net", "none", seed, scene) for seed in range(2)]
+                drives += [drive("net", "patch", seed, scene, is_crash=scene < "c") for seed in range(2)]
+                made.append((planned(scene, weather=weather), study(drives)))
+        (line,) = [
+            one for one in drive_section(made, Path("out")).lines if (one.scenario, one.patch) == ("all", "patch")
+        ]
+        return line.paired[0]
+
+    one, three = against_none(""), against_none("Clear", "Wet", "Fog")
+    assert (one.pairs, one.only_here, three.pairs, three.only_here) == (6, 4, 18, 12)
+    assert one.p == three.p == pytest.approx(2 / 2**4)
+    assert one.crash_interval is not None and three.crash_interval == pytest.approx(one.crash_interval)
 
 
 def test_the_tables_of_the_report() -> None:
