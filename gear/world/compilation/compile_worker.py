@@ -18,6 +18,7 @@ from gear.values.scene import Weather
 from gear.values.serial import from_json
 from gear.world.assets.asset_hash import asset_files
 from gear.world.assets.library import AssetLibrary
+from gear.world.compilation import quiet_mjcf
 from gear.world.compilation.compiled_world import compile_world
 from gear.world.compilation.world_cache import DONE, MAY_CACHE, world_key
 from gear.world.compilation.world_plan import plan_world
@@ -55,6 +56,7 @@ def main(folder: str) -> None:
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     known = {os.path.realpath(path) for path in asset_files(library).values()}
     readers = min(_READERS, cores())  # reads files of the system, which do not determine the world
+    assert quiet_mjcf.mjcf  # imported now, because it reads files of its own
     files_read = _record_files_read()
     plan = plan_world(library, scene, weather)
     compiled = compile_world(plan, lighting, readers=readers)

@@ -16,19 +16,21 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gear.values.errors import TownError
 from gear.world.assets.scene_assets import AssetFile
 from gear.world.compilation.actor_pool import Slot
 from gear.world.compilation.instances import AssetInstances, FaceNames, load_mjcf
-from gear.world.compilation.quiet_mjcf import mjcf
 from gear.world.compilation.scene_mjcf import SceneMjcf
 from gear.world.compilation.static_parts import MeshPath
 from gear.world.compilation.world_plan import WorldPlan
 from gear.world.scene_spec import BoardSpec
 from gear.world.weather.light import Lighting, lighting_of
 from gear.world.weather.presets import apply_weather
+
+if TYPE_CHECKING:
+    from gear.world.compilation.quiet_mjcf import mjcf
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

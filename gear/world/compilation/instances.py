@@ -7,15 +7,18 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gear.values.errors import TownError
 from gear.world.assets.scene_assets import AssetFile
+from gear.world.compilation import quiet_mjcf
 from gear.world.compilation.copies import Copy, put_copies_into
 from gear.world.compilation.mujoco_errors import compile_problem, without_breaks
-from gear.world.compilation.quiet_mjcf import mjcf
 from gear.world.compilation.static_parts import UNNAMED, MeshPath, SplitAsset
 from gear.world.surfaces.face_texture import FACE_SIZE_PX
+
+if TYPE_CHECKING:
+    from gear.world.compilation.quiet_mjcf import mjcf
 
 _UNREAD = ("frame", "replicate", "attach")
 """Child elements of a body that MuJoCo can read and dm_control cannot."""
@@ -57,9 +60,9 @@ def load_mjcf(
     """
     try:
         if text is None:
-            root = mjcf.from_path(str(path))
+            root = quiet_mjcf.mjcf.from_path(str(path))
         else:
-            root = mjcf.from_xml_string(text, model_dir=str(path.parent), assets=mesh_paths)
+            root = quiet_mjcf.mjcf.from_xml_string(text, model_dir=str(path.parent), assets=mesh_paths)
     except (KeyError, ValueError, OSError, AttributeError, SyntaxError, RecursionError) as error:
         if text is not None:
             load_mjcf(path)  # raises the same error with the file's line numbers

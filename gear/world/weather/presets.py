@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -14,10 +14,13 @@ from gear.contracts.rendering import FULL_SCALE_LUX
 from gear.values.frames import UInt8Image
 from gear.values.resources import data_dir
 from gear.values.scene import Weather
+from gear.world.compilation import quiet_mjcf
 from gear.world.compilation.instances import free_name
-from gear.world.compilation.quiet_mjcf import mjcf
 from gear.world.weather.light import FACE_ORDER, Floats, Lighting, encode_srgb, lighting_of
 from gear.world.weather.wet_ground import GeomMaterial, wet_materials
+
+if TYPE_CHECKING:
+    from gear.world.compilation.quiet_mjcf import mjcf
 
 _CLASSIC_WHITE = 1.1
 _CLASSIC_SKY_SHARE = (0.48, 0.95)
@@ -107,7 +110,7 @@ def _add_cube(root: mjcf.RootElement, name: str, kind: str, faces: UInt8Image) -
         "texture",
         name=free_name(root, "texture", name),
         type=kind,
-        file=mjcf.Asset(strip, ".png"),
+        file=quiet_mjcf.mjcf.Asset(strip, ".png"),
         gridsize=(6, 1),
         gridlayout=FACE_ORDER,
         colorspace="sRGB",

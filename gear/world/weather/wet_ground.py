@@ -7,7 +7,7 @@ sharply.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -16,7 +16,9 @@ import numpy.typing as npt
 from gear.contracts.rendering import has_own_colour
 from gear.values.labels import LABEL_BY_NAME
 from gear.world.compilation.instances import class_name
-from gear.world.compilation.quiet_mjcf import mjcf
+
+if TYPE_CHECKING:
+    from gear.world.compilation.quiet_mjcf import mjcf
 
 WET_LABELS = frozenset({"road", "road_marking", "sidewalk", "parking", "ground"})
 """Labels of the ground that rain makes wet."""
