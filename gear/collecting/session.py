@@ -223,7 +223,7 @@ def open_session(job: Job) -> Iterator[Session]:
         rig = task.rig()
     world = load_or_compile(town=job.config.town, scene_name=job.config.scene, scene=job.scene, weather=job.weather)
     night = night_of(world, job.weather, job.config.renderer)
-    renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality)
+    renderer = open_renderer(job.config.renderer, world.model, quality=job.config.quality, shelf=world.shelf)
     try:
         here = versions()
         refuse_other_renderer(job.plan.content, renderer.info, here)

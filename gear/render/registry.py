@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from gear.contracts.rendering import Quality, Renderer
+from gear.values.array_shelf import NO_SHELF, ArrayShelf
 from gear.values.errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -20,13 +21,17 @@ _SUMMARIES = {
 }
 
 
-def open_renderer(name: str, model: mujoco.MjModel, *, quality: Quality = "film") -> Renderer:
+def open_renderer(
+    name: str, model: mujoco.MjModel, *, quality: Quality = "film", shelf: ArrayShelf = NO_SHELF
+) -> Renderer:
     """Opens a renderer for one compiled model. The caller must close the renderer.
 
     Args:
         name: one of `RENDERERS`.
         model: the compiled world; every stage must be of this model, which is never changed.
         quality: `film` takes several samples per pixel; `fast` takes one and smooths edges.
+        shelf: shelf of this model, on which `raster` keeps what it computes when it opens; the other renderers keep
+            nothing.
 
     Raises:
         UnknownNameError: there is no renderer with this name.
@@ -39,7 +44,7 @@ def open_renderer(name: str, model: mujoco.MjModel, *, quality: Quality = "film"
     if name == "raster":
         from gear.render.raster import open_raster
 
-        return open_raster(model, quality=quality)
+        return open_raster(model, quality=quality, shelf=shelf)
     if name == "classic":
         from gear.render.classic import ClassicRenderer
 

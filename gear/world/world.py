@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from gear.contracts.rendering import Stage
+from gear.values.array_shelf import NO_SHELF, ArrayShelf
 from gear.values.errors import PlacementError
 from gear.values.frames import GeomTable, SceneObject, Shape, UInt8Image
 from gear.values.labels import GROUND_CODES
@@ -79,6 +80,7 @@ class World:
         faces: the faces that can show patches, in patch order.
         statics: countable objects of the town, such as traffic lights.
         lanes: lanes, walks and parking bays.
+        shelf: keeps arrays that are computed from the models; it keeps nothing for a world that is not in the cache.
     """
 
     library: AssetLibrary
@@ -93,6 +95,7 @@ class World:
     faces: tuple[Face, ...]
     statics: StaticObjects
     lanes: LaneGraph
+    shelf: ArrayShelf = NO_SHELF
     _data: mujoco.MjData = field(init=False, repr=False)
     _slot_geoms: tuple[_SlotGeoms, ...] = field(init=False, repr=False)
     _textures: OrderedDict[tuple[str, str], UInt8Image] = field(init=False, repr=False, default_factory=OrderedDict)
@@ -119,13 +122,14 @@ class World:
         return World.of(plan, scene_name, compile_world(plan))
 
     @staticmethod
-    def of(plan: WorldPlan, scene_name: str, compiled: CompiledWorld) -> World:
+    def of(plan: WorldPlan, scene_name: str, compiled: CompiledWorld, shelf: ArrayShelf = NO_SHELF) -> World:
         """Makes a world from compiled models: measures actors and faces, and reads the lanes.
 
         Args:
             plan: the plan from which the models were compiled.
             scene_name: name of the scene in records.
             compiled: the models.
+            shelf: shelf of these models.
 
         Raises:
             TownError: an actor, a face or a lane breaks the conventions.
@@ -143,9 +147,10 @@ class World:
             classes=classes,
             slots=slots,
             types=actor_types(model, data, classes, slots),
-            faces=find_faces(model, data, compiled.faces, library.town),
+            faces=find_faces(model, data, compiled.faces, library.town, shelf),
             statics=static_objects(model, data, classes, slots, library.town),
             lanes=LaneGraph.from_model(compiled.placement_model, library.town),
+            shelf=shelf,
         )
         release_memory()
         return world

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from gear.contracts.rendering import Quality
 from gear.render.glcontext import backend_setting, choose_backend, egl_problem, open_context
+from gear.values.array_shelf import NO_SHELF, ArrayShelf
 from gear.values.errors import BackendError
 
 if TYPE_CHECKING:
@@ -25,12 +26,13 @@ __all__ = ["open_raster"]
 _OTHERS = "use --renderer filament or classic"
 
 
-def open_raster(model: mujoco.MjModel, *, quality: Quality = "film") -> RasterRenderer:
+def open_raster(model: mujoco.MjModel, *, quality: Quality = "film", shelf: ArrayShelf = NO_SHELF) -> RasterRenderer:
     """Makes a renderer for one model, in an OpenGL context of its own.
 
     Args:
         model: the compiled world; it is not changed.
         quality: `film` takes several samples per pixel; `fast` takes one and smooths edges.
+        shelf: shelf of this model, for its triangles and the shadow map of its static geoms.
 
     Raises:
         BackendError: EGL has no driver for OpenGL 4.5; the message names the setting or the missing package.
@@ -49,7 +51,7 @@ def open_raster(model: mujoco.MjModel, *, quality: Quality = "film") -> RasterRe
         # PyOpenGL keeps the platform that is set at its first import, so it is imported after the context is opened.
         from gear.render.raster.renderer import RasterRenderer
 
-        return RasterRenderer(model, context, quality=quality)
+        return RasterRenderer(model, context, quality=quality, shelf=shelf)
     except BaseException:
         context.free()
         raise

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from gear.render import pinhole
 from gear.render.pinhole import FAR_M
+from gear.render.raster import primitives
 from gear.render.raster.primitives import Triangles, height_field, primitive
+from gear.values.array_shelf import ArrayShelf, code_digest
 from gear.values.geometry import Array
 
 VERTEX = np.dtype([("position_m", "<f4", 3), ("normal", "<i2", 4), ("texcoord", "<f4", 2)])
@@ -60,6 +64,28 @@ class _Shape:
     starts: npt.NDArray[np.int64]
     centres_m: Array
     radii_m: Array
+
+
+def shelved_geometry(model: mujoco.MjModel, drawn: npt.NDArray[np.bool_], shelf: ArrayShelf) -> Geometry:
+    """The triangles of the geoms that are drawn, as `geometry_of` collects them, from the shelf if they are there.
+
+    Args:
+        model: the compiled world.
+        drawn: (ngeom,) bool: which geoms are drawn.
+        shelf: shelf of this model.
+
+    Raises:
+        ValueError: a mesh has more than two million vertices.
+    """
+
+    def collected() -> tuple[npt.NDArray[Any], ...]:
+        geometry = geometry_of(model, drawn)
+        return tuple(getattr(geometry, field.name) for field in fields(Geometry))
+
+    assert primitives.__file__ is not None and pinhole.__file__ is not None
+    code = code_digest(__file__, primitives.__file__, pinhole.__file__)
+    inputs = (code, mujoco.__version__.encode(), drawn.tobytes())
+    return Geometry(*shelf.arrays("geometry", inputs, collected))
 
 
 def geometry_of(model: mujoco.MjModel, drawn: npt.NDArray[np.bool_]) -> Geometry:

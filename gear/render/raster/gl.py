@@ -190,6 +190,16 @@ class RenderTarget:
         GL.glViewport(*rectangle)
         GL.glScissor(*rectangle)
 
+    def read_depth(self, part: tuple[int, int, int, int]) -> npt.NDArray[np.float32]:
+        """The depth of a part of the target, which must be current: (height, width) float32, 0..1.
+
+        Args:
+            part: left, top, width and height in pixels.
+        """
+        depth = np.empty((part[3], part[2]), np.float32)
+        GL.glReadPixels(*part, GL.GL_DEPTH_COMPONENT, GL.GL_FLOAT, depth)
+        return depth
+
 
 def upload_texture(content: npt.NDArray[np.uint8], *, is_srgb: bool) -> int:
     """Uploads a 2D texture with mip levels. The texture repeats and is filtered trilinearly.
@@ -278,6 +288,18 @@ def shadow_map(width: int, height: int) -> int:
         GL.glTextureParameteri(texture, name, value)
     GL.glTextureParameterfv(texture, GL.GL_TEXTURE_BORDER_COLOR, np.ones(4, np.float32))
     return texture
+
+
+def upload_depth(texture: int, left: int, top: int, depth: npt.NDArray[np.float32]) -> None:
+    """Replaces a part of a depth texture.
+
+    Args:
+        texture: OpenGL name of the texture.
+        left, top: first column and row of the part, pixels.
+        depth: (height, width) float32 values 0..1.
+    """
+    height, width = depth.shape
+    GL.glTextureSubImage2D(texture, 0, left, top, width, height, GL.GL_DEPTH_COMPONENT, GL.GL_FLOAT, depth)
 
 
 def free_textures(textures: list[int]) -> None:

@@ -25,6 +25,7 @@ from gear.render.raster.many_samples import LOD_BIAS, at_contrasts, at_edges_and
 from gear.render.raster.pixel_mask import PixelMask
 from gear.render.raster.scene import Scene, Selection
 from gear.render.raster.sun_shadows import SunShadows
+from gear.values.array_shelf import NO_SHELF, ArrayShelf
 from gear.values.frames import LINEAR_FULL_SCALE, FloatImage, IdImage, UInt16Image
 from gear.values.geometry import Array
 from gear.values.scene import CameraRecord
@@ -37,13 +38,16 @@ _MASK_UNIT = 1
 class RasterRenderer:
     """The raster renderer: an OpenGL context with one model in it. It is not thread-safe."""
 
-    def __init__(self, model: mujoco.MjModel, context: Any, *, quality: Quality = "film") -> None:
+    def __init__(
+        self, model: mujoco.MjModel, context: Any, *, quality: Quality = "film", shelf: ArrayShelf = NO_SHELF
+    ) -> None:
         """Uploads a model into an OpenGL context.
 
         Args:
             model: the compiled world; every stage must be of this model.
             context: MuJoCo's `GLContext`, current; `close` frees it.
             quality: `film` takes several samples per pixel; `fast` takes one and smooths edges.
+            shelf: shelf of this model, for its triangles and the shadow map of its static geoms.
 
         Raises:
             BackendError: the driver does not support OpenGL 4.5.
@@ -58,7 +62,9 @@ class RasterRenderer:
         self._info = RendererInfo(
             name="raster", backend="egl", driver=driver, device=name, is_software=is_software(name)
         )
-        self._scene = Scene(model)
+        self._scene = Scene(model, shelf)
+        # A GPU draws the map in less time than it takes to read it.
+        self._shadow_shelf = shelf if self._info.is_software else NO_SHELF
         # The geom of each piece; the appended entry is found by piece id -1 (nothing).
         self._geom_of_piece = np.append(self._scene.geom_of_piece, -1).astype(np.int32)
         self._ids_program = gl.Program("positions.vert", "ids.frag")
@@ -178,7 +184,9 @@ class RasterRenderer:
         maps = None
         if lights.casts_shadows:
             # The maps take a hundred megabytes; nights and models without a sun need none.
-            self._shadows = self._shadows or SunShadows(self._model, self._scene)
+            self._shadows = self._shadows or SunShadows(
+                self._model, self._scene, self._shadow_shelf, f"{self._info.driver}\n{self._info.device}"
+            )
             maps = self._shadows.draw(stage, frustum, lights.towards[0, :3], spheres)
         self._scene.set_lights(lights, maps, frustum.position_world_m)
 

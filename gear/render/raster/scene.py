@@ -10,12 +10,13 @@ from OpenGL import GL  # type: ignore[import-untyped]
 from gear.contracts.rendering import Stage
 from gear.render.culling import Mask
 from gear.render.raster import gl
-from gear.render.raster.geometry import VERTEX, Geometry, geometry_of
+from gear.render.raster.geometry import VERTEX, Geometry, shelved_geometry
 from gear.render.raster.lights import MAX_LIGHTS, Environment, Lights, environment_of
 from gear.render.raster.materials import TEXTURE_ROLES, materials_of
 from gear.render.raster.shadow_cascades import ShadowMaps
 from gear.render.raster.split_sum import split_sum_table
 from gear.render.raster.textures import TextureStore, linear_cubes, sky_of
+from gear.values.array_shelf import NO_SHELF, ArrayShelf
 from gear.values.geometry import Array
 
 Selection = npt.NDArray[np.intp]
@@ -45,18 +46,19 @@ _FRAME = np.dtype(
 class Scene:
     """The triangles, textures and lights of one model in the current OpenGL context."""
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, shelf: ArrayShelf = NO_SHELF) -> None:
         """Uploads a model.
 
         Args:
             model: the compiled world.
+            shelf: shelf of this model, on which its triangles are kept.
 
         Raises:
             ValueError: a mesh has more than two million vertices.
         """
         self._materials = materials_of(model)
         drawn = (model.geom_group < _SEEN_GROUPS) & ~self._materials.is_invisible
-        geometry = geometry_of(model, drawn)
+        geometry = shelved_geometry(model, drawn, shelf)
         self._commands = geometry.commands
         self.geom_of_piece = geometry.geoms
         self._spheres = geometry.centres_m, geometry.radii_m

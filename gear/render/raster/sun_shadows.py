@@ -3,9 +3,13 @@
 Static geoms cast the same shadows in every picture, so one map of the whole town is drawn only once. Near the camera
 this map is too coarse. Two further maps are therefore drawn for each picture: one of all geoms near the camera, and
 one, reaching farther, of geoms that can move.
+
+On a CPU the map of a town takes a second, so it is kept on the world's shelf.
 """
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -17,6 +21,8 @@ from gear.render.pinhole import Frustum
 from gear.render.raster import gl
 from gear.render.raster.scene import Scene
 from gear.render.raster.shadow_cascades import CASCADE_ENDS_M, Cascade, ShadowMaps, town_cascade, view_cascades
+from gear.values.array_shelf import NO_SHELF, ArrayShelf, code_digest
+from gear.values.frames import FloatImage
 from gear.values.geometry import Array
 
 _NEAR_PX, _TOWN_PX = 2048, 4096
@@ -38,14 +44,17 @@ side, and 1 for the filter.
 class SunShadows:
     """Draws the shadow maps of the sun for one model."""
 
-    def __init__(self, model: mujoco.MjModel, scene: Scene) -> None:
+    def __init__(self, model: mujoco.MjModel, scene: Scene, shelf: ArrayShelf = NO_SHELF, device: str = "") -> None:
         """Allocates the texture of the shadow maps. The first call of `draw` draws the town's map.
 
         Args:
             model: the compiled world.
             scene: the same model on the graphics device.
+            shelf: shelf of this model, on which the town's map is kept.
+            device: names of the driver and of the device, whose maps differ in last bits.
         """
         self._model, self._scene = model, scene
+        self._shelf, self._device = shelf, device
         self._program = gl.Program("positions.vert", "depth_only.frag")
         self._texture = gl.shadow_map(*_SIZE_PX)
         self._target = gl.RenderTarget.create(*_SIZE_PX, None, depth=self._texture)
@@ -86,8 +95,27 @@ class SunShadows:
         stage = Stage(model=self._model, data=data)
         centres_m, _ = self._scene.spheres(stage)
         cascade = town_cascade(self._scene.sample_vertices(stage, ~self._can_move), towards_sun)
-        self._scene.set_poses(stage, cascade.centre_m)
-        self._draw(_PARTS_PX[2], cascade, cascade.centre_m, ~self._can_move, centres_m)
+        part = _PARTS_PX[2]
+        left, top, side = part
+        is_drawn = False
+
+        def draw() -> None:
+            self._scene.set_poses(stage, cascade.centre_m)
+            self._draw(part, cascade, cascade.centre_m, ~self._can_move, centres_m)
+
+        def drawn() -> tuple[FloatImage]:
+            nonlocal is_drawn
+            draw()
+            is_drawn = True
+            return (self._target.read_depth((left, top, side, side)),)
+
+        if self._shelf.folder is None:
+            draw()
+            return cascade
+        inputs = (_code(), self._device.encode(), cascade.matrix(cascade.centre_m).tobytes())
+        (depth,) = self._shelf.arrays("town-shadow", inputs, drawn)
+        if not is_drawn:
+            gl.upload_depth(self._texture, left, top, depth)
         return cascade
 
     def _draw(
@@ -112,6 +140,13 @@ class SunShadows:
             GL.glEnable(GL.GL_CULL_FACE)
             GL.glDisable(GL.GL_DEPTH_CLAMP)
             GL.glDisable(GL.GL_POLYGON_OFFSET_FILL)
+
+
+def _code() -> bytes:
+    """Hash of everything that draws a map of the town, beside the model."""
+    folder = Path(__file__).parent
+    files = sorted(path for path in folder.iterdir() if path.suffix in (".py", ".glsl"))
+    return code_digest(*map(str, (*files, folder.parent / "culling.py", folder.parent / "pinhole.py")))
 
 
 def _maps(cascades: tuple[Cascade, ...], camera_m: Array) -> ShadowMaps:

@@ -42,6 +42,7 @@ class CompiledWorld:
         classes: labels of the render model's geoms.
         slots: the pool of actors.
         faces: names of the faces that show patches, in patch order.
+        checksum: names the content of the files from which the world was loaded; "" if it was compiled.
     """
 
     model: mujoco.MjModel
@@ -49,6 +50,7 @@ class CompiledWorld:
     classes: GeomClasses
     slots: tuple[Slot, ...]
     faces: tuple[FaceNames, ...]
+    checksum: str = ""
 
     def save(self, folder: Path) -> None:
         """Writes the world into an empty folder: its two models and the data about them.
@@ -100,6 +102,7 @@ class CompiledWorld:
             classes=classes,
             slots=slots,
             faces=from_json(tuple[FaceNames, ...], facts["faces"]),
+            checksum=f"{facts['crc32'][_RENDER]:08x}-{facts['crc32'][_PLACEMENT]:08x}",
         )
 
 

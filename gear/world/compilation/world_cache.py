@@ -23,6 +23,7 @@ from pathlib import Path
 
 import mujoco
 
+from gear.values.array_shelf import NO_SHELF, ArrayShelf
 from gear.values.errors import GearError
 from gear.values.scene import Weather
 from gear.values.serial import Json, to_json
@@ -34,8 +35,8 @@ from gear.world.compilation.world_plan import WorldPlan, plan_world
 from gear.world.scene_spec import SceneSpec
 from gear.world.world import World
 
-CACHE_BYTES = 3 << 30
-"""Largest size of the cache, about sixteen towns; the least recently used entries are removed."""
+CACHE_BYTES = 4 << 30
+"""Largest size of the cache, about twelve towns with their shelves; the least recently used entries are removed."""
 
 NOT_CACHED_BELOW_BYTES = 4 << 20
 """Towns with fewer bytes of assets are not cached, because compiling them takes less time than starting a
@@ -70,17 +71,21 @@ def load_or_compile(
     """
     plan = plan_world(AssetLibrary.for_town(town), scene, weather)
     asset_bytes = sum(path.stat().st_size for path in asset_files(plan.assets.library).values())
+    shelf = NO_SHELF
     if cache_dir is None and asset_bytes < NOT_CACHED_BELOW_BYTES:
         compiled = compile_world(plan)
     else:
-        with _folder(cache_dir) as folder:
-            compiled = _from_cache(folder, plan)
-    return World.of(plan, scene_name, compiled)
+        with _folder(cache_dir) as (folder, is_kept):
+            compiled, entry = _from_cache(folder, plan)
+        # Once a temporary folder is removed, anybody could make a folder of its name.
+        if is_kept and compiled.checksum and entry.is_dir():
+            shelf = ArrayShelf(folder=entry, owner=compiled.checksum)
+    return World.of(plan, scene_name, compiled, shelf)
 
 
 @contextlib.contextmanager
-def _folder(cache_dir: Path | None) -> Iterator[Path]:
-    """The cache's folder; a temporary folder if the user's cache folder cannot be written."""
+def _folder(cache_dir: Path | None) -> Iterator[tuple[Path, bool]]:
+    """The cache's folder, and whether it stays; a temporary folder if the user's cache folder cannot be written."""
     try:
         folder = cache_dir or user_cache_folder() / "worlds"
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -88,23 +93,23 @@ def _folder(cache_dir: Path | None) -> Iterator[Path]:
     except (OSError, RuntimeError):
         usable = False
     if usable:
-        yield folder
+        yield folder, True
     else:
         with tempfile.TemporaryDirectory(prefix="gear-") as temporary:
-            yield Path(temporary)
+            yield Path(temporary), False
 
 
-def _from_cache(cache_dir: Path, plan: WorldPlan) -> CompiledWorld:
-    """Loads a world, or compiles it in a subprocess and stores it."""
+def _from_cache(cache_dir: Path, plan: WorldPlan) -> tuple[CompiledWorld, Path]:
+    """Loads a world, or compiles it in a subprocess and stores it. Returns the world, and the folder of its entry."""
     key = world_key(plan)
     entry = cache_dir / hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:32]
     compiled = _load(entry, plan)
     if compiled is not None:
-        return compiled
+        return compiled, entry
     with contextlib.suppress(OSError), _locked(entry):  # a full disk must not keep a world from being compiled
         compiled = _load(entry, plan)
         if compiled is not None:
-            return compiled
+            return compiled, entry
         with tempfile.TemporaryDirectory(prefix=_SCRATCH, dir=cache_dir, ignore_cleanup_errors=True) as name:
             scratch = Path(name) / "world"
             scratch.mkdir()
@@ -114,7 +119,7 @@ def _from_cache(cache_dir: Path, plan: WorldPlan) -> CompiledWorld:
                     if (scratch / MAY_CACHE).exists():
                         _store(scratch, entry)
     # If the subprocess failed, compiling here fails too, with an error that says why.
-    return compiled or compile_world(plan)
+    return compiled or compile_world(plan), entry
 
 
 def world_key(plan: WorldPlan) -> dict[str, Json]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from gear.values.array_shelf import NO_SHELF, ArrayShelf, code_digest
 from gear.values.errors import TownError
 from gear.values.frames import UInt8Image
 from gear.values.geometry import RigidTransform
@@ -16,6 +17,7 @@ from gear.values.scene import Pose, SurfaceRecord
 from gear.world.assets.geom_triangles import geom_triangles
 from gear.world.compilation.instances import FaceNames
 from gear.world.scene_spec import FACE_SIDE_M
+from gear.world.surfaces import face_texture
 from gear.world.surfaces.face_texture import SurfaceAlbedo, face_from_patch, srgb_from_linear, uniform_face
 from gear.world.surfaces.upright import texture_problem
 
@@ -79,7 +81,9 @@ class Face:
         return uniform_face(255 if albedo == "white" else 0)
 
 
-def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceNames], path: Path) -> tuple[Face, ...]:
+def find_faces(
+    model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceNames], path: Path, shelf: ArrayShelf = NO_SHELF
+) -> tuple[Face, ...]:
     """Measures the faces of a compiled model.
 
     Args:
@@ -87,6 +91,7 @@ def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceN
         data: MuJoCo data of the model with kinematics up to date.
         names: names of the faces' elements, in patch order.
         path: the town's file, for error messages.
+        shelf: shelf of the model, for the textures of faces without a patch.
 
     Returns:
         The faces in patch order.
@@ -95,10 +100,12 @@ def find_faces(model: mujoco.MjModel, data: mujoco.MjData, names: Sequence[FaceN
         TownError: a face is not flat in its `surface` frame, is smaller or larger than any board, or would not show a
             patch upright and whole.
     """
-    return tuple(_face(model, data, number, name, path) for number, name in enumerate(names))
+    return tuple(_face(model, data, number, name, path, shelf) for number, name in enumerate(names))
 
 
-def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNames, path: Path) -> Face:
+def _face(
+    model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNames, path: Path, shelf: ArrayShelf
+) -> Face:
     surface = f"surface_{number}"
     geom_id, site_id = model.geom(name.geom).id, model.site(name.site).id
     world_from_surface = RigidTransform.from_parts(
@@ -140,8 +147,16 @@ def _face(model: mujoco.MjModel, data: mujoco.MjData, number: int, name: FaceNam
         parent_from_surface=owner_from_surface if name.is_carried else world_from_surface,
         width_m=width_m,
         height_m=height_m,
-        neutral=_neutral(model, name.neutral_material),
+        neutral=_shelved_neutral(model, name.neutral_material, shelf, f"neutral-{number}"),
     )
+
+
+def _shelved_neutral(model: mujoco.MjModel, material: str, shelf: ArrayShelf, key: str) -> UInt8Image:
+    assert face_texture.__file__ is not None
+    inputs = (code_digest(__file__, face_texture.__file__), material.encode())
+    (texture,) = shelf.arrays(key, inputs, lambda: (_neutral(model, material),))
+    texture.setflags(write=False)
+    return texture
 
 
 def _neutral(model: mujoco.MjModel, material: str) -> UInt8Image:

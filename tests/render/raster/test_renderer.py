@@ -7,14 +7,20 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from gear.camera import response_for
 from gear.contracts.rendering import Quality, Renderer, Stage
 from gear.render import open_renderer
+from gear.render.glcontext import is_software
+from gear.render.probing import renderer_info
+from gear.render.raster import geometry, gl
+from gear.values.array_shelf import NO_SHELF, ArrayShelf
 from gear.values.geometry import RigidTransform
 from gear.values.scene import CameraRecord, Pose
 from gear.world.compilation.quiet_mjcf import mjcf
@@ -56,6 +62,40 @@ def street(weather: str) -> mujoco.MjModel:
     root = mjcf.from_xml_string(xml)
     apply_weather(root, PRESETS[weather])
     return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+
+
+def pictures_with(shelf: ArrayShelf, model: mujoco.MjModel, quality: Quality) -> list[bytes]:
+    """Colour, depth and ids of two pictures, the second from another place."""
+    renderer = open_renderer("raster", model, quality=quality, shelf=shelf)
+    try:
+        stage = Stage(model=model, data=posed(model))
+        views = [renderer.render(stage, (camera(160, 96, y_m=y_m),))[0] for y_m in (0.0, 1.5)]
+    finally:
+        renderer.close()
+    parts = [part for view in views for part in (view.linear_rgb, view.depth_m, view.geom_id)]
+    return [np.ascontiguousarray(part).tobytes() for part in parts]
+
+
+@pytest.mark.parametrize("quality", ["film", "fast"])
+def test_what_lies_on_the_shelf_makes_the_same_pictures(
+    quality: Quality, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draws_shadows_anew = not is_software(renderer_info("raster").device)  # as a GPU does
+    model = street("ClearSunset")
+    shelf = ArrayShelf(folder=tmp_path, owner="street")
+    expected = pictures_with(NO_SHELF, model, quality)
+    assert pictures_with(shelf, model, quality) == expected
+    uploaded: list[npt.NDArray[np.float32]] = []
+    upload = gl.upload_depth
+
+    def recorded(texture: int, left: int, top: int, depth: npt.NDArray[np.float32]) -> None:
+        uploaded.append(depth)
+        upload(texture, left, top, depth)
+
+    monkeypatch.setattr(gl, "upload_depth", recorded)
+    monkeypatch.setattr(geometry, "geometry_of", None)  # the triangles come from the shelf
+    assert pictures_with(shelf, model, quality) == expected
+    assert [(depth.min() < 1, depth.max() == 1) for depth in uploaded] == ([] if draws_shadows_anew else [(True, True)])
 
 
 @pytest.mark.parametrize("weather", ["ClearNoon", "CloudySunset"])

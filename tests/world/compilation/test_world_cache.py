@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import errno
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, build_tiny_world, tiny_scenes
+from gear.values.array_shelf import NO_SHELF
 from gear.values.errors import TownError
 from gear.values.scene import Weather
 from gear.world.assets.library import AssetLibrary
@@ -23,6 +25,7 @@ from gear.world.compilation import world_cache
 from gear.world.compilation.drop_bvh import without_mesh_bvh
 from gear.world.compilation.world_cache import load_or_compile
 from gear.world.compilation.world_plan import plan_world
+from gear.world.surfaces import patch_faces
 from gear.world.world import World
 
 SCENE = "truck"
@@ -192,3 +195,26 @@ def test_a_broken_town_says_what_is_wrong_with_it(tmp_path: Path, town: Path) ->
     with pytest.raises(TownError, match=r"tiny\.xml"):
         take(tmp_path, town)
     assert not worlds(tmp_path)
+
+
+def test_a_world_of_the_cache_has_a_shelf_beside_its_models(tmp_path: Path) -> None:
+    made, read = take(tmp_path), take(tmp_path)
+    (name,) = worlds(tmp_path)
+    assert made.shelf == read.shelf and read.shelf.folder == tmp_path / "cache" / name
+    assert made.shelf.owner != take(tmp_path, weather=dataclasses.replace(CLEAR, sun_altitude_deg=20.0)).shelf.owner
+
+
+def test_a_world_of_a_temporary_folder_has_no_shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Somebody else could make a folder of the same name."""
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert take(tmp_path).shelf == build_tiny_world(SCENE).shelf == NO_SHELF
+
+
+def test_faces_without_a_patch_look_the_same_from_the_shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    built, made = build_tiny_world(SCENE), take(tmp_path)
+    monkeypatch.setattr(patch_faces, "_neutral", never)
+    for world in (made, take(tmp_path)):
+        for face, other in zip(world.faces, built.faces, strict=True):
+            assert np.array_equal(face.neutral, other.neutral)
+            with pytest.raises(ValueError, match="read-only"):
+                face.neutral[0, 0] = 7
