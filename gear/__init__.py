@@ -14,6 +14,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from gear.values.triton_import import bind_triton_to_its_own_symbols
+
 if TYPE_CHECKING:
     from gear.collecting.run import CollectReport
     from gear.measuring.gap.report import GapReport
@@ -164,6 +166,8 @@ _HOME = {
     "write_town": "gear.verbs.towns.write",
     "write_view": "gear.view.write",
 }
+
+bind_triton_to_its_own_symbols()  # importing MuJoCo may load Mesa, and a training or a defense may import Triton
 
 
 def __getattr__(name: str) -> Any:

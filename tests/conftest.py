@@ -17,10 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("MUJOCO_GL", "egl")  # tests of assets draw without a display; read when mujoco is first imported
 
 import authoring
-from gear.render.triton_import import bind_triton_to_its_own_symbols
 from tests import compiled_worlds, shared
-
-bind_triton_to_its_own_symbols()  # with MUJOCO_GL=egl, MuJoCo loads Mesa as soon as it is imported
 
 assert authoring.KERNELS in os.environ
 

@@ -9,7 +9,6 @@ import ctypes
 import os
 from typing import Any
 
-from gear.render.triton_import import bind_triton_to_its_own_symbols
 from gear.values.errors import BackendError
 
 _NO_LIBRARY = "apt-get install libegl1 libopengl0 libegl-mesa0 libgl1-mesa-dri"
@@ -67,7 +66,6 @@ def open_context(backend: str, renderer: str) -> Any:
         BackendError: the driver is missing, or `MUJOCO_EGL_DEVICE_ID` is not the number of a device.
     """
     _silence_mesa()
-    bind_triton_to_its_own_symbols()
     try:
         if backend == "egl":
             from mujoco.egl import GLContext
@@ -106,7 +104,6 @@ def _cause(backend: str, error: Exception) -> tuple[str, str]:
 def egl_problem() -> tuple[str, str] | None:
     """The reason why EGL cannot be used without a display, and what to install; None if EGL can start a device."""
     _silence_mesa()
-    bind_triton_to_its_own_symbols()
     if not _loads("libEGL.so.1"):
         return "the EGL library libEGL.so.1 is not installed", _NO_LIBRARY
     devices = _egl_devices()

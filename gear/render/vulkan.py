@@ -5,8 +5,6 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 
-from gear.render.triton_import import bind_triton_to_its_own_symbols
-
 _CPU_DEVICE = 4
 _SUCCESS = 0
 _PROPERTIES_BYTES = 4096
@@ -60,7 +58,6 @@ def vulkan_devices() -> tuple[VulkanDevice, ...]:
     Raises:
         VulkanUnavailableError: there is no device.
     """
-    bind_triton_to_its_own_symbols()
     try:
         library = ctypes.CDLL("libvulkan.so.1")
     except OSError:

@@ -36,6 +36,7 @@ class FirstTexels(BaseCompositor):
 
     def _load(self, index: int, view: str, sizes: Sizes) -> Prepared:
         self._demand(sizes, 1)
+        self.sizes = sizes
         self.loaded += 1
         return self._prepare(picture(index, view), np.array(PIXELS[view]), 1 / (1 + index), 5)
 
@@ -90,6 +91,13 @@ def test_the_gradient_of_a_patch_is_that_of_the_pixels_that_show_it() -> None:
         shown = weights[:, :, place // WIDTH, place % WIDTH]
         wanted[:, number // 2, number % 2] = shown[0] + shown[1] / 2
     assert patch.grad is not None and torch.allclose(patch.grad, wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(3, 2, 5), (1, 3, 4, 2)])
+def test_samples_are_prepared_for_the_height_and_width_of_the_patches(shape: tuple[int, ...]) -> None:
+    one = compositor()
+    one.compose([torch.zeros(shape)], [0], "left")
+    assert one.sizes == (shape[-2:],)
 
 
 @pytest.mark.parametrize("shape", [(2, 2), (4, 2, 2), (1, 2, 3, 2, 2), (2, 4, 2, 2), (3, 3, 2, 2), (1, 3, 2, 2)])

@@ -3,6 +3,9 @@
 torch from PyPI brings Triton on Linux, and imports it with the first optimiser. Triton's library `libtriton` contains
 its own LLVM. Mesa's software driver makes the symbols of another LLVM, `libLLVM`, visible to the whole process, and
 `libtriton` would call these. With the flag RTLD_DEEPBIND of dlopen(3), `libtriton` prefers its own symbols.
+
+Renderers load Mesa, and with `MUJOCO_GL=egl` so may MuJoCo alone, before a training, an attack or a worker has opened a
+renderer of gear. Therefore the import of gear itself prepares the import of Triton.
 """
 
 from __future__ import annotations
@@ -41,9 +44,6 @@ class _Finder:
 
 
 def bind_triton_to_its_own_symbols() -> None:
-    """Makes a later import of Triton in this process safe; it does not import Triton.
-
-    It must be called before a driver of Mesa is loaded.
-    """
+    """Makes a later import of Triton in this process safe, whether Mesa is loaded or not; it imports no Triton."""
     if _Finder not in sys.meta_path:
         sys.meta_path.insert(0, _Finder)

@@ -13,7 +13,24 @@ from pathlib import Path
 import numpy._core._multiarray_umath as extension
 import pytest
 
-from gear.render import triton_import
+from gear.values import triton_import
+
+IMPORTED = """
+import sys
+import mujoco
+import gear.networks.network
+from gear.values.triton_import import _Finder
+assert sys.meta_path[0] is _Finder
+assert "gear.render" not in sys.modules
+"""
+
+AFTER_MUJOCO = """
+import mujoco
+context = mujoco.GLContext(1, 1)
+context.make_current()
+import gear
+import triton
+"""
 
 AFTER_OPENGL = """
 from gear.render.glcontext import choose_backend, open_context
@@ -55,6 +72,17 @@ def test_it_is_installed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sys.meta_path[0] is triton_import._Finder
 
 
+def run(code: str) -> None:
+    """Runs Python code in a process in which the import of MuJoCo loads Mesa."""
+    subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "MUJOCO_GL": "egl"})
+
+
+def test_the_import_of_any_module_of_gear_installs_it() -> None:
+    """A training whose renderer never starts has it, too."""
+    run(IMPORTED)
+
+
 @pytest.mark.skipif(find_spec("triton") is None, reason="this build of torch comes without Triton")
-def test_triton_can_be_imported_after_opengl() -> None:
-    subprocess.run([sys.executable, "-c", AFTER_OPENGL], check=True, capture_output=True, text=True)
+@pytest.mark.parametrize("code", [AFTER_MUJOCO, AFTER_OPENGL])
+def test_triton_can_be_imported_after_mesa(code: str) -> None:
+    run(code)
