@@ -17,8 +17,8 @@ import numpy.typing as npt
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
 from gear.dataset.json_text import load_json
 from gear.formats.picture_size import check_size
-from gear.formats.png_chunks import check_chunks
 from gear.formats.quiet_decoder import decode_quietly
+from gear.formats.whole_picture import check_whole
 from gear.networks.shipped import shipped_patches
 from gear.values.errors import DatasetError, PatchError
 from gear.values.frames import UInt8Image
@@ -132,10 +132,10 @@ def read_patch(path: Path) -> UInt8Image:
         raise PatchError(path, f"cannot be read: {error.strerror}") from error
     if len(data) > MAX_BYTES:
         raise PatchError(path, f"is larger than {MAX_BYTES >> 20} MiB")
-    no_picture = "is not a picture that can be read; use an 8-bit RGB PNG"
+    no_picture = "is not a picture, or a damaged one; use an 8-bit RGB PNG"
     try:
         check_size(data, least_px=SIDE_PX[0], most_px=SIDE_PX[1])
-        check_chunks(data)
+        check_whole(data)
         picture = decode_quietly(data)
     except ValueError as error:
         raise PatchError(path, str(error) if " px; sides of " in str(error) else no_picture) from error

@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gear.formats.picture_size import check_size
-from gear.formats.png_chunks import check_chunks
 from gear.formats.png_rows import decode_rows
+from gear.formats.whole_picture import check_whole
 from gear.values.frames import FloatImage, UInt8Image
 
 LABEL_PNG = [
@@ -94,7 +94,7 @@ def decode_plain(data: bytes) -> npt.NDArray[Any]:
 
 
 def _decode(data: bytes, mode: int) -> npt.NDArray[Any]:
-    check_chunks(data)
+    check_whole(data)
     try:
         picture = cv2.imdecode(np.frombuffer(data, np.uint8), mode) if data else None
     except cv2.error:  # of a header that promises more pixels than OpenCV takes

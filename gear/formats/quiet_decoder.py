@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 import threading
 from typing import Any
 
@@ -15,9 +16,16 @@ import numpy.typing as npt
 
 _LOCK = threading.Lock()
 
+DAMAGE = (b"Corrupt JPEG data", b"Premature end of JPEG", b"does not end with EOC")
+"""Messages of libjpeg and OpenJPEG about pictures whose missing parts they fill in."""
+
+READ_BYTES = 1 << 16
+"""Number of bytes of the messages that are searched."""
+
 
 def decode_quietly(data: bytes, flags: int = cv2.IMREAD_UNCHANGED) -> npt.NDArray[Any] | None:
-    """Decodes a picture with OpenCV. Lines that libjpeg, libtiff and OpenCV write to stderr are discarded.
+    """Decodes a picture with OpenCV. Lines that libjpeg, libtiff and OpenCV write to stderr are not shown. A picture of
+    which such a line says that a part is missing or damaged counts as one that cannot be decoded.
 
     Stderr of the whole process is redirected during the call, so the function is for single pictures such as patches,
     not for many pictures in threads.
@@ -33,14 +41,17 @@ def decode_quietly(data: bytes, flags: int = cv2.IMREAD_UNCHANGED) -> npt.NDArra
         return None
     with _LOCK:
         sys.stderr.flush()
-        kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-        try:
-            os.dup2(nothing, 2)
-            picture = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-        except cv2.error:
-            return None
-        finally:
-            os.dup2(kept, 2)
-            os.close(kept)
-            os.close(nothing)
-    return None if picture is None else np.asarray(picture)
+        with tempfile.TemporaryFile() as said:
+            kept = os.dup(2)
+            try:
+                os.dup2(said.fileno(), 2)
+                picture = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+            except cv2.error:
+                return None
+            finally:
+                os.dup2(kept, 2)
+                os.close(kept)
+            said.seek(0)
+            text = said.read(READ_BYTES)
+    is_damaged = any(message in text for message in DAMAGE)
+    return None if picture is None or is_damaged else np.asarray(picture)

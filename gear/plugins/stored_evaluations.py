@@ -22,6 +22,7 @@ from gear.dataset.files import inside, read_bytes, sha256
 from gear.dataset.json_text import load_json
 from gear.dataset.reading import Dataset
 from gear.formats.picture_size import check_size
+from gear.formats.whole_picture import check_whole
 from gear.metrics.object_changes import ObjectChange
 from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, FieldError
@@ -255,6 +256,7 @@ def read_defended(folder: Path, stored: Mapping[str, Any]) -> dict[str, UInt8Ima
         data = read_bytes(path)
         try:
             check_size(data)
+            check_whole(data)
             decoded = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
         except (ValueError, cv2.error) as error:
             raise DatasetError(path, f"cannot be read as a picture ({one_line(error)})") from error

@@ -9,7 +9,9 @@ import numpy as np
 
 from gear.contracts.tasks import Sidecar
 from gear.dataset.files import inside, read_bytes
+from gear.formats.picture_size import check_size
 from gear.formats.quiet_decoder import decode_quietly
+from gear.formats.whole_picture import check_whole
 from gear.values.errors import DatasetError
 from gear.values.frames import UInt8Image
 
@@ -35,6 +37,11 @@ def picture_file(root: Path, sidecar: Sidecar, pixels: UInt8Image) -> str | None
             try:
                 data = read_bytes(inside(root, relative))
             except DatasetError:
+                continue
+            try:
+                check_size(data)
+                check_whole(data)
+            except ValueError:
                 continue
             stored = decode_quietly(data, cv2.IMREAD_COLOR)
             if stored is not None and np.array_equal(stored[..., ::-1], pixels):

@@ -111,9 +111,17 @@ def test_what_is_no_patch_is_refused_in_one_line(tmp_path: Path, picture: np.nda
     save(tmp_path / "dot.png", picture[:1, :1])
     clear = np.dstack([picture, np.full(picture.shape[:2], 100, np.uint8)])
     save(tmp_path / "clear.png", clear)
+    photo = cv2.imencode(".jpg", np.tile(picture, (40, 40, 1)))[1].tobytes()
+    half = photo[: len(photo) // 2]
+    (tmp_path / "cut.jpg").write_bytes(half)
+    (tmp_path / "zeros.jpg").write_bytes(half + bytes(len(half)))
+    (tmp_path / "grey.jpg").write_bytes(half + b"\xff\xd9")
     for name, message in (
         ("text.png", "not a picture"),
         ("empty.png", "not a picture"),
+        ("cut.jpg", "not a picture, or a damaged one"),
+        ("zeros.jpg", "not a picture, or a damaged one"),
+        ("grey.jpg", "not a picture, or a damaged one"),
         ("dot.png", "is 1 x 1 px; sides of 2 to 8192"),
         ("clear.png", "transparent"),
         ("none.png", "is not there"),
