@@ -11,7 +11,8 @@ from gear.config.dump import to_plain
 from gear.config.overrides import with_overrides
 from gear.config.reader import read_node
 from gear.contracts.tasks import Sidecar
-from gear.dataset.files import inside, read_bytes, write_whole
+from gear.dataset.checks.exported_files import LISTED, export_list
+from gear.dataset.files import inside, read_bytes, sha256, write_whole
 from gear.dataset.free_space import check_free_space, tree_bytes
 from gear.dataset.guarded_paths import owned, remove_empty_folders, remove_files
 from gear.dataset.layout import GEAR, sidecar_path
@@ -51,8 +52,9 @@ def export(
     Args:
         dataset: root of a dataset whose splits are finished.
         layout: name of a layout, such as `coco`.
-        out: folder of the exported files; must be empty or new. An address of fsspec, such as `s3://bucket/folder`, is
-            filled directly; the file `gear-export.json`, which lists all other files, is written last.
+        out: folder of the exported files; must be empty or new. The hidden file `.gear-export.json` in it lists all
+            files with their hashes, with which `gear verify` checks them. An address of fsspec, such as
+            `s3://bucket/folder`, is filled directly; the file `gear-export.json`, the same list, is written last.
         settings: `KEY=VALUE` texts for the layout's options.
         progress: shows a progress bar.
         on_progress: called after every file with the number of samples of which a file was read, and of all samples.
@@ -73,11 +75,11 @@ def export(
         callbacks.part("reading the manifests")
         source = _Source.of(Path(dataset), layout, chosen)
         tree = chosen.tree(source.splits, source.read, options)
+        facts: dict[str, Json] = {"layout": layout, "options": to_plain(options), "splits": source.keys}
         if isinstance(out, str) and is_address(out):
-            facts: dict[str, Json] = {"layout": layout, "options": to_plain(options), "splits": source.keys}
             write_remote_tree(RemoteFolder(out), tree, facts, lambda: callbacks.on_progress(*source.counts()))
         else:
-            _write_folder(source, tree, local_path(out).resolve(), callbacks.on_progress)
+            _write_folder(source, tree, facts, local_path(out).resolve(), callbacks.on_progress)
     return source.counts()[1]
 
 
@@ -137,7 +139,7 @@ class _Source:
         return len(self.begun), sum(len(split.sidecars) for split in self.splits)
 
 
-def _write_folder(source: _Source, tree: Tree, target: Path, on_progress: Progress) -> None:
+def _write_folder(source: _Source, tree: Tree, facts: dict[str, Json], target: Path, on_progress: Progress) -> None:
     """Writes an export into a new folder.
 
     Raises:
@@ -150,7 +152,7 @@ def _write_folder(source: _Source, tree: Tree, target: Path, on_progress: Progre
     there = tree_bytes(unfinished)
     _check_disk(target, _size_of(source.root, source.hashes) - there)
     with whole_tree(target, "export"):
-        _write_tree(unfinished, _measured(source, tree, target, there, on_progress))
+        _write_tree(unfinished, _measured(source, tree, target, there, on_progress), facts)
 
 
 def _measured(source: _Source, tree: Tree, target: Path, there: int, on_progress: Progress) -> Tree:
@@ -208,22 +210,24 @@ def _size_of(root: Path, files: Iterable[str]) -> int:
     return sum(path.stat().st_size for path in paths if path.is_file())
 
 
-def _write_tree(root: Path, tree: Tree) -> None:
-    """Writes the missing files of an export, and deletes other files that an earlier, interrupted export wrote.
+def _write_tree(root: Path, tree: Tree, facts: dict[str, Json]) -> None:
+    """Writes the missing files of an export, and the list of all files with their hashes; deletes other files that an
+    earlier, interrupted export wrote.
 
     Raises:
         DatasetError: two samples would be in one file, or a file cannot be written.
     """
-    written: set[str] = set()
+    written: dict[str, Json] = {}
     for relative, data in tree:
         if relative in written:
             raise DatasetError(root, f"two samples of the dataset have the same name {relative!r} in this layout")
         path = owned(root, relative)
         if not (path.is_file() and read_bytes(path) == data):
             write_whole(root, relative, data)
-        written.add(relative)
+        written[relative] = {"bytes": len(data), "sha256": sha256(data)}
     there = [path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_symlink() or not path.is_dir()]
     remove_files(root, [relative for relative in there if relative not in written])
+    write_whole(root, LISTED, export_list(facts, written))
     for folder in root.iterdir():
         if folder.is_dir() and not folder.is_symlink():
             remove_empty_folders(root, folder.name)

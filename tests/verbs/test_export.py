@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from gear.cli.main import main
 from gear.collecting.run import CollectReport
 from gear.values.errors import DatasetError, GearError
 from gear.verbs import export as run
@@ -30,6 +31,37 @@ def test_exports_go_into_new_folders_and_fit_their_task(tmp_path: Path) -> None:
         export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
     with pytest.raises(DatasetError, match="the layout 'kitti' is for stereo3d"):
         export(tmp_path / "a", layout="kitti", out=tmp_path / "c")
+
+
+def test_an_export_can_be_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Every file in turn with one bit flipped, cut by a byte, and deleted; caches of other tools do not count."""
+    fill(tmp_path / "a", plan())
+    export(tmp_path / "a", layout="kitti-depth", out=tmp_path / "b")
+    (tmp_path / "b/labels.cache").write_text("of another tool")
+    files = sorted(path for path in (tmp_path / "b").rglob("*") if path.is_file() and path.name != "labels.cache")
+    listed = tmp_path / "b/.gear-export.json"
+    assert len(files) > 6 and listed in files
+    assert main(["verify", str(tmp_path / "b")]) == 0
+    assert f"{len(files) - 1} files, all as they were written" in capsys.readouterr().out
+    for path in files:
+        whole = path.read_bytes()
+        flipped = bytearray(whole)
+        flipped[len(whole) // 2] ^= 1
+        for data in (bytes(flipped), whole[:-1], None):
+            path.unlink()
+            if data is not None:
+                path.write_bytes(data)
+            code, (out, err) = main(["verify", str(tmp_path / "b")]), capsys.readouterr()
+            if path == listed:
+                assert code == 2 and len(err.splitlines()) == 1
+            else:
+                problem = "missing" if data is None else "damaged"
+                first, total = out.splitlines()
+                assert code == 1 and first == f"{problem:<10} {path.relative_to(tmp_path / 'b')}"
+                assert total.endswith(f"1 {problem} of {len(files) - 1} files")
+            path.write_bytes(whole)
+    assert main(["verify", str(tmp_path / "b"), "--repair"]) == 2
+    assert "is an export, of which only all files can be checked" in capsys.readouterr().err
 
 
 def test_an_export_that_does_not_fit_its_disk_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ EXAMPLE = """examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of `gear verify` to its argument parser."""
     parser.epilog = EXAMPLE
-    parser.add_argument("dataset", help="root of a dataset")
+    parser.add_argument("dataset", help="root of a dataset, or folder of an export")
     parser.add_argument("--split", help="split to check (all)")
     parser.add_argument("--repair", action="store_true", help="make damaged and missing samples again")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")

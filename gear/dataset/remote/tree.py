@@ -6,15 +6,12 @@ import tempfile
 from collections.abc import Callable, Iterable
 from pathlib import Path, PurePosixPath
 
+from gear.dataset.checks.exported_files import AT_ADDRESS, export_list
 from gear.dataset.files import sha256, write_whole
 from gear.dataset.json_text import dump_json
 from gear.dataset.remote.folder import RemoteFolder
-from gear.dataset.sealed_json import sealed_json
 from gear.values.errors import DatasetError
 from gear.values.serial import Json
-
-WHOLE = "gear-export.json"
-"""Name of the file that is written last. It lists all files of the tree; a tree without it is not complete."""
 
 BEGUN = "gear-export.begun.json"
 """Name of the file that is written first and removed at the end. It names the exported data, so that the same export
@@ -41,7 +38,7 @@ def write_remote_tree(
     """
     begun = dump_json(facts)
     names = folder.names()
-    if names and (WHOLE in names or folder.read(BEGUN) != begun):
+    if names and (AT_ADDRESS in names or folder.read(BEGUN) != begun):
         raise DatasetError(folder.address, "is not empty; export into a new folder")
     folder.write(BEGUN, begun)
     files: dict[str, Json] = {}
@@ -62,5 +59,5 @@ def write_remote_tree(
         for number, relative in enumerate(late):
             folder.write(relative, (spool / str(number)).read_bytes())
             on_file()
-    folder.write(WHOLE, sealed_json({"format": "gear-export", "version": 1, **facts, "files": files}))
+    folder.write(AT_ADDRESS, export_list(facts, files))
     folder.remove(BEGUN)

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from gear.collecting.devices import has_mixed_devices
 from gear.collecting.run import executor_of, run_job
+from gear.dataset.checks.exported_files import AGAIN, check_export, list_of_export
 from gear.dataset.checks.salvage import restored
 from gear.dataset.checks.verification import Finding, SplitCheck, check_split, splits_in, unexpected_files
 from gear.dataset.files import inside, read_bytes, write_whole
 from gear.dataset.finishing.cards import damaged_cards, own_cards, write_cards
 from gear.dataset.guarded_paths import refuse_links, remove_files
-from gear.dataset.layout import plan_path, sidecar_path, split_folder
+from gear.dataset.layout import GEAR, plan_path, sidecar_path, split_folder
 from gear.dataset.locks import dataset_lock, is_locked
 from gear.dataset.plan import read_plan, write_plan
 from gear.reporting.display import displayed
@@ -35,14 +36,14 @@ def verify(
     progress: bool = False,
     on_progress: Progress | None = None,
 ) -> VerifyReport:
-    """Checks that every file of a dataset has the bytes that gear wrote, and that no file is missing.
+    """Checks that every file of a dataset, or of an export, has the bytes that gear wrote, and that no file is missing.
 
     A repair makes damaged and missing files again: samples, indexes, manifest, plan and copies of patches. With the
     same versions, renderer and device, the repaired dataset has its original bytes. If other bytes would result,
     nothing is changed. Files that do not belong to the dataset are reported and not deleted.
 
     Args:
-        dataset: root of a dataset.
+        dataset: root of a dataset, or folder of `gear export`, which can be checked as a whole and not be repaired.
         split: the split to check; all by default.
         repair: whether damaged and missing files are made again.
         patch: for a repair, the patch in the pictures, if the dataset's copy of the patch is damaged.
@@ -64,7 +65,13 @@ def verify(
 def _verified(
     root: Path, split: str | None, sources: Sources | None, workers: int, callbacks: Callbacks
 ) -> VerifyReport:
-    """Checks a dataset, and repairs it if `sources` is not None."""
+    """Checks a dataset, and repairs it if `sources` is not None; an export is only checked."""
+    listed = None if (root / GEAR).is_dir() else list_of_export(root)
+    if listed is not None:
+        if split is not None or sources is not None:
+            raise DatasetError(root, f"is an export, of which only all files can be checked; if damaged, {AGAIN}")
+        count, damaged = check_export(root, listed, callbacks.part("checking files"))
+        return VerifyReport(root=root, files=count, findings=tuple(damaged))
     names = splits_in(root)
     if split is not None and split not in names:
         raise DatasetError(root, f"has no split {split!r}; there are: {', '.join(names)}")

@@ -28,8 +28,9 @@ def test_an_export_has_the_bytes_of_a_local_one(tmp_path: Path, remote: str) -> 
         tmp_path / "a", layout="kitti-depth", out=remote, on_progress=lambda *counts: seen.append(counts)
     ) == len(list((tmp_path / "b").rglob("groundtruth/**/*.png")))
     found = remote_tree(remote)
-    whole = json.loads(found.pop("gear-export.json"))
-    assert found == tree(tmp_path / "b")
+    listed = found.pop("gear-export.json")
+    whole = json.loads(listed)
+    assert found | {".gear-export.json": listed} == tree(tmp_path / "b")
     assert whole["files"] == {path: {"bytes": len(data), "sha256": sha256(data)} for path, data in found.items()}
     assert whole["layout"] == "kitti-depth" and len(seen) == len(found)
     assert seen == sorted(seen) and (seen[0], seen[-1]) == ((1, 3), (3, 3)), "samples, of a known number"
