@@ -11,10 +11,13 @@ import sysconfig
 import venv
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from gear.dataset.locks import dataset_lock
+from gear.reporting import display
+from gear.values.progress import Callbacks
 
 ROOT = Path(__file__).parents[1]
 
@@ -110,3 +113,32 @@ def few_files(further: int) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+class ClockedLines:
+    """The plain lines of a display without a terminal, by a clock that moves ten seconds with every report.
+
+    Attributes:
+        callbacks: callbacks for a verb.
+        seen: the line that the log would have after each report.
+    """
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, verb: str, unit: str = "sample") -> None:
+        self.seen: list[str] = []
+        self._now_s = 0.0
+        monkeypatch.setattr(display, "EVERY_S", 1000.0)
+        monkeypatch.setattr(display, "time", SimpleNamespace(monotonic=lambda: self._now_s))
+        self._lines = display._Lines(verb)
+        self.callbacks = Callbacks.of(
+            on_progress=lambda done, total: self._report("progress", unit, done, total),
+            on_part=lambda title, done, total: self._report(f"{display.PART}{title}", "", done, total),
+        )
+
+    def _report(self, channel: str, unit: str, done: int, total: int) -> None:
+        self._now_s += 10.0
+        self._lines.update(channel, unit, done, total)
+        self.seen.append(self._lines._line())
+
+    def counted(self, title: str) -> list[str]:
+        """The lines of the part `title` that say how many items of it are done."""
+        return [line for line in self.seen if f"{title}, " in line]

@@ -7,11 +7,13 @@ import traceback
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from gear.collecting.job import Job, resolve
 from gear.collecting.lookup import look_up
 from gear.collecting.patch_sources import PatchSet
 from gear.collecting.session import Session, open_session
+from gear.contracts.controllers import Action
 from gear.contracts.executors import MOST_FAILURES, Outcome, Report
 from gear.contracts.rendering import RendererInfo
 from gear.contracts.specs import TaskSpec
@@ -26,7 +28,7 @@ from gear.driving.drives import Cast, DriveRun, Drives
 from gear.driving.log import log_bytes, log_hash
 from gear.driving.loop import Sight, Watch, Wheel, drive
 from gear.driving.measures import Measures, measure
-from gear.driving.simulation import DriveSimulation
+from gear.driving.simulation import FRAME_S, DriveSimulation, Situation
 from gear.driving.start import Draw
 from gear.driving.video import Video
 from gear.measuring.calibration import NOTHING, opened_calibration
@@ -36,7 +38,8 @@ from gear.measuring.metric_json import known_json
 from gear.plugins.build import build
 from gear.plugins.text import one_line
 from gear.values.errors import DatasetError, GearError, PlacementError
-from gear.values.progress import NO_CALLBACKS, Callbacks
+from gear.values.frames import UInt8Image
+from gear.values.progress import NO_CALLBACKS, Callbacks, Progress
 from gear.values.serial import Json, from_json, to_json
 from gear.world.compilation.world_cache import load_or_compile
 from gear.world.scene_spec import SceneSpec
@@ -51,6 +54,9 @@ RESULT, LOG, VIDEO = "result.json", "log.jsonl", "video.mp4"
 DAMAGED = "is damaged; delete its folder and drive again"
 UNREADABLE = (LookupError, TypeError, ValueError, RecursionError)
 """Errors of reading JSON that gear did not write."""
+
+FIRST = "frames of the first drive"
+"""Title under which the frames of a worker's first drive are counted."""
 
 CLAIMS = "drives"
 """Name under which workers claim drives."""
@@ -104,7 +110,8 @@ class DriveWorker:
         place_key, place: what decides the open place, and the place; None before the first drive.
         open_places: closes the open place.
         model_key, model: driver whose network is loaded, and the network with its defense; None without one.
-        callbacks: callbacks that receive the progress of calibrations.
+        callbacks: callbacks that receive the progress of calibrations, and of the first drive.
+        has_driven: whether a drive is finished, so that the rate of drives is known.
     """
 
     drives: Drives
@@ -114,6 +121,7 @@ class DriveWorker:
     model_key: str = ""
     model: GuardedModel | None = None
     callbacks: Callbacks = NO_CALLBACKS
+    has_driven: bool = False
 
     def place_of(self, run: DriveRun) -> _Place:
         """World, simulation and renderer of a drive."""
@@ -245,7 +253,11 @@ def _made(worker: DriveWorker, run: DriveRun) -> bool:
     if read_result(drives.root, folder, identity, with_video=drives.has_video(run)) is not None:
         return False
     video = Video(run.caption) if drives.has_video(run) else None
-    done = drive_once(worker, run, patch, None if video is None else video.watch)
+    watch: Watch | None = None if video is None else video.watch
+    if not worker.has_driven:
+        watch = _counting(round(drives.scenario(run).duration_s / FRAME_S), worker.callbacks.part(FIRST), watch)
+    done = drive_once(worker, run, patch, watch)
+    worker.has_driven = True
     data = log_bytes(done.log)
     result = DriveResult(
         run=run,
@@ -262,6 +274,17 @@ def _made(worker: DriveWorker, run: DriveRun) -> bool:
     shown = {} if video is None else {VIDEO: video.mp4()}
     _write(drives.root, folder, {LOG: data, **shown, RESULT: content})
     return True
+
+
+def _counting(frames: int, on_progress: Progress, watch: Watch | None) -> Watch:
+    """A function that counts the frames of a drive of at most `frames` frames, and calls another one in each."""
+
+    def counted(situation: Situation, views: Mapping[str, UInt8Image], seen: Any, action: Action | None) -> None:
+        if watch is not None:
+            watch(situation, views, seen, action)
+        on_progress(min(situation.frame + 1, frames), frames)
+
+    return counted
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

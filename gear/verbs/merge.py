@@ -85,8 +85,9 @@ def merge(
 
 def _merged(roots: Sequence[Path], out: str | Path, callbacks: Callbacks) -> MergeReport:
     """Merges folders into a folder or into an address."""
-    callbacks.part("listing the samples of all folders")
-    parts = [find_parts(roots, split) for split in sorted({split for root in roots for split in splits_of(root)})]
+    listed = callbacks.part("listing the samples of all folders")
+    splits = sorted({split for root in roots for split in splits_of(root)})
+    parts = [find_parts(roots, split, listed) for split in splits]
     for one in parts:
         _check_versions(one)
         for root in roots:

@@ -22,7 +22,9 @@ from gear.cli.main import main
 from gear.collecting.run import CollectReport
 from gear.dataset.sharding.merging import estimated_bytes, find_parts
 from gear.values.errors import DatasetError, GearError
+from gear.verbs.merge import _merged
 from tests.dataset.splits import fill, plan, tree
+from tests.shared import ClockedLines
 from tests.verbs.collect.test_run import command
 from tests.verbs.conftest import Collected
 
@@ -44,6 +46,19 @@ def deal(whole: Path, folder: Path, count: int) -> list[Path]:
             shutil.copyfile(whole / file, root / file)
         roots.append(root)
     return roots
+
+
+def test_the_listing_of_a_merge_has_rate_and_time_left(
+    tmp_path: Path, collected: Collected, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parts = deal(collected("depth", samples=3, patch="random", probes=True), tmp_path, 3)
+    lines = ClockedLines(monkeypatch, "merge")
+    _merged(parts, tmp_path / "merged", lines.callbacks)
+    assert lines.counted("listing the samples of all folders") == [
+        "gear merge: listing the samples of all folders, 1 of 3, 6 per minute, 20 seconds left",
+        "gear merge: listing the samples of all folders, 2 of 3, 6 per minute, 10 seconds left",
+        "gear merge: listing the samples of all folders, 3 of 3, 6 per minute",
+    ]
 
 
 TASKS = ["depth", *(pytest.param(task, marks=pytest.mark.slow) for task in ("semseg", "detect2d", "stereo3d"))]

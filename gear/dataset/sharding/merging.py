@@ -55,12 +55,13 @@ class Parts:
         return self.plan.info.split
 
 
-def find_parts(roots: Sequence[Path], split: str) -> Parts:
+def find_parts(roots: Sequence[Path], split: str, on_progress: Progress | None = None) -> Parts:
     """Finds the folder of each sample of a split; the plans of the split must be equal in all folders.
 
     Args:
         roots: datasets, not all of which need to have the split.
         split: name of the split.
+        on_progress: called after every sample that is found with (found samples, samples of the split).
 
     Raises:
         DatasetError: two folders were made with different configurations, a run is writing into a folder, or a sample
@@ -79,6 +80,8 @@ def find_parts(roots: Sequence[Path], split: str) -> Parts:
         for path in folder.glob("*.json") if folder.is_dir() else ():
             if path.stem.isdecimal() and path.stem == f"{int(path.stem):06d}" and int(path.stem) < total:
                 homes.setdefault(int(path.stem), []).append(position)
+                if on_progress is not None:
+                    on_progress(len(homes), total)
     if len(homes) < total:
         first = next(index for index in range(total) if index not in homes)
         problem = f"{total - len(homes)} of {counted(total, 'sample')} of split {split!r} are in none of the folders"

@@ -20,14 +20,15 @@ from gear.dataset.claims import clear_claims
 from gear.dataset.disk_and_time_forecast import Forecast
 from gear.dataset.executors.engines import DEFAULT, open_executor
 from gear.dataset.executors.jobs import JobNotes, try_jobs
-from gear.dataset.files import clear_scratch, inside, write_whole
+from gear.dataset.files import clear_scratch, inside, read_bytes, write_whole
 from gear.dataset.free_space import tree_bytes
 from gear.dataset.guarded_paths import remove_empty_folders
 from gear.dataset.json_text import dump_json
 from gear.dataset.layout import split_folder
+from gear.dataset.own_output import check_own
 from gear.dataset.store import check_output
 from gear.driving.drives import RUNS, DriveRun, Drives, patches_of, plan_drives, read_drive_config
-from gear.driving.worker import CLAIMS, UNREADABLE, DriveResult, drive_all, read_log, read_result
+from gear.driving.worker import CLAIMS, RESULT, UNREADABLE, DriveResult, drive_all, read_log, read_result
 from gear.measuring.shown_size import focal_note
 from gear.plugins.build import find
 from gear.reporting.display import displayed
@@ -52,6 +53,9 @@ MOST_FIGURES = 12
 
 CONFIG = "drive.yml"
 """Name of the file with the config, with all defaults filled in."""
+
+HEAD = b"# written by gear drive\n"
+"""First line of that file, by which a folder of drives is recognised."""
 
 
 def drive(
@@ -124,6 +128,7 @@ def prepared(request: DriveRequest) -> Drives:
     """
     root = Path(request.out)
     check_output(root, "write the drives into a folder of their own")
+    check_own(root, CONFIG, _is_ours, "drives")
     return plan_drives(read_drive_config(request.config, request.settings), root.absolute(), request.device)
 
 
@@ -146,12 +151,11 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
             note = focal_note(cast.model, cast.task, cast.driver.options, f"driver {label}")
         if note is not None:
             callbacks.on_warning(note)
-    write_whole(drives.root, CONFIG, to_yaml(drives.config).encode())
+    write_whole(drives.root, CONFIG, HEAD + to_yaml(drives.config).encode())
     outcomes = _made(drives, executor, callbacks)
     clear_claims(drives.root, CLAIMS)
     remove_empty_folders(drives.root, split_folder(CLAIMS))
-    callbacks.part("writing tables, figures and videos")
-    results, failed = _gathered(drives, outcomes)
+    results, failed = _gathered(drives, outcomes, callbacks.part("reading the results of all drives"))
     if not results:
         raise GearError(f"{drives.root}: no drive could be made ({failed[0][1] if failed else 'there are none'})")
     report = DriveReport(
@@ -162,11 +166,14 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
         free=frozenset(name for name, one in drives.library.scenarios.items() if one.is_free),
         errors=frozenset(label for label, cast in drives.casts.items() if cast.task and _is_error(cast.task)),
     )
+    figures = _figures(drives, results, callbacks.part("drawing figures"))
+    videos = write_twin_videos(drives, results, callbacks.part("writing videos of twins"))
+    callbacks.part("writing tables and the report")
     for name, data in (
         ("drives.csv", _csv(report)),
         ("drive.json", dump_json(report.as_json())),
         ("table.txt", text(report).encode()),
-        ("report.html", page(report, _figures(drives, results), write_twin_videos(drives, results)).encode()),
+        ("report.html", page(report, figures, videos).encode()),
     ):
         write_whole(drives.root, name, data)
     clear_scratch(drives.root)
@@ -179,6 +186,13 @@ def run_drive(request: DriveRequest, callbacks: Callbacks) -> DriveReport:
             " run the same command again, which makes only what is missing"
         )
     return report
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether gear wrote the config `path` of a study. The first line is missing in older folders, which hold a result
+    of each drive.
+    """
+    return read_bytes(path).startswith(HEAD) or next(path.parent.glob(f"{RUNS}/*/*/{RESULT}"), None) is not None
 
 
 def _is_error(task: str) -> bool:
@@ -199,11 +213,11 @@ def _made(drives: Drives, executor: Executor, callbacks: Callbacks) -> dict[int,
         The last outcomes by index of the drive, without those of drives never begun.
     """
     patches = patches_of(drives, drives.runs)
-    missing = [
-        index
-        for index, (run, patch) in enumerate(zip(drives.runs, patches, strict=True))
-        if _stored(drives, run, patch, with_video=drives.has_video(run)) is None
-    ]
+    missing, checked = [], callbacks.part("checking existing drives")
+    for index, (run, patch) in enumerate(zip(drives.runs, patches, strict=True)):
+        if _stored(drives, run, patch, with_video=drives.has_video(run)) is None:
+            missing.append(index)
+        checked(index + 1, len(drives.runs))
     advice = "make fewer drives, without `video: true`, or give --out on another disk"
     forecast = Forecast(drives.root, len(missing), callbacks.on_warning, unit="drive", advice=advice)
     total = len(drives.runs)
@@ -228,7 +242,10 @@ def _stored(drives: Drives, run: DriveRun, patch: PatchSet, *, with_video: bool 
     return read_result(drives.root, drives.folder(run, patch), drives.identity(run, patch), with_video=with_video)
 
 
-def _gathered(drives: Drives, outcomes: dict[int, Outcome]) -> tuple[list[DriveResult], list[tuple[str, str]]]:
+def _gathered(
+    drives: Drives, outcomes: dict[int, Outcome], on_progress: Progress
+) -> tuple[list[DriveResult], list[tuple[str, str]]]:
+    """The results of all finished drives, and title and problem of the others."""
     results, failed = [], []
     for index, (run, patch) in enumerate(zip(drives.runs, patches_of(drives, drives.runs), strict=True)):
         result = _stored(drives, run, patch)
@@ -236,6 +253,7 @@ def _gathered(drives: Drives, outcomes: dict[int, Outcome]) -> tuple[list[DriveR
             results.append(result)
         else:
             failed.append((run.title, _problem(outcomes.get(index))))
+        on_progress(index + 1, len(drives.runs))
     return results, failed
 
 
@@ -250,15 +268,15 @@ def _problem(outcome: Outcome | None) -> str:
     return outcome.error or "another run is making it; run the command again"
 
 
-def _figures(drives: Drives, results: list[DriveResult]) -> list[tuple[str, bytes]]:
+def _figures(drives: Drives, results: list[DriveResult], on_progress: Progress) -> list[tuple[str, bytes]]:
     """Charts of the first situations of each driver, those whose twins ended differently first, each with a title."""
     groups: dict[tuple[str, tuple[str, str, str, float, int]], list[DriveResult]] = {}
     for one in results:
         groups.setdefault((one.run.driver, one.run.situation), []).append(one)
     several = [group for group in groups.values() if len(group) > 1]
     several.sort(key=lambda group: len({one.measures.is_crash for one in group}) == 1)
-    figures = []
-    for group in several[:MOST_FIGURES]:
+    figures, drawn_first = [], several[:MOST_FIGURES]
+    for group in drawn_first:
         run = group[0].run
         patches = patches_of(drives, [one.run for one in group])
         logs = {
@@ -273,6 +291,7 @@ def _figures(drives: Drives, results: list[DriveResult]) -> list[tuple[str, byte
                 f"holds a damaged log of {run.title}; delete the folder of the drive and drive again",
             ) from error
         figures.append((run.title.rsplit(",", 1)[0], drawn))
+        on_progress(len(figures), len(drawn_first))
     return figures
 
 

@@ -11,18 +11,22 @@ from gear.driving.drives import RUNS, Drives, patches_of
 from gear.driving.video import beside_each_other
 from gear.driving.worker import VIDEO, DriveResult
 from gear.values.errors import DatasetError
+from gear.values.progress import Progress
 
 VIDEOS = "videos"
 """Name of the folder of the videos of twins."""
 
 
-def write_twin_videos(drives: Drives, results: Sequence[DriveResult]) -> list[tuple[str, str]]:
+def write_twin_videos(
+    drives: Drives, results: Sequence[DriveResult], on_progress: Progress = lambda done, total: None
+) -> list[tuple[str, str]]:
     """Writes one video for each situation of each driver of which at least two twins have a video; a video that is
     there is not made again.
 
     Args:
         drives: the study.
         results: the finished drives.
+        on_progress: called after every video with the numbers of finished and of all videos.
 
     Returns:
         Title and path, relative to the folder of the study, of each video, in the order of the drives.
@@ -34,11 +38,11 @@ def write_twin_videos(drives: Drives, results: Sequence[DriveResult]) -> list[tu
     for one in results:
         if drives.has_video(one.run):
             groups.setdefault((one.run.driver, one.run.situation), []).append(one)
-    written = []
-    for group in groups.values():
-        if len(group) > 1:
-            title = group[0].run.title.rsplit(",", 1)[0]
-            written.append((title, _written(drives, group)))
+    written, several = [], [group for group in groups.values() if len(group) > 1]
+    for group in several:
+        title = group[0].run.title.rsplit(",", 1)[0]
+        written.append((title, _written(drives, group)))
+        on_progress(len(written), len(several))
     return written
 
 

@@ -173,19 +173,30 @@ def together(rows: Sequence[EvaluatedDataset]) -> Iterable[CombinedRow]:
     Args:
         rows: all evaluated datasets.
     """
-    labelled: dict[str, list[EvaluatedDataset]] = {}
+    for patch, members in labelled(rows).items():
+        one = as_one(patch, members)
+        yield CombinedRow(
+            patch=patch,
+            rows=tuple(row.name for row in members),
+            samples=len(one.results),
+            metrics=metrics_of(one),
+        )
+
+
+def labelled(rows: Sequence[EvaluatedDataset]) -> dict[str, list[EvaluatedDataset]]:
+    """The datasets that `together` combines, by the label of their patches.
+
+    Args:
+        rows: all evaluated datasets.
+    """
+    groups: dict[str, list[EvaluatedDataset]] = {}
     for row in rows:
-        labelled.setdefault(row.patch, []).append(row)
-    for patch, members in labelled.items():
-        first = members[0]
-        if len(members) > 1 and all(row.dataset.plan.options == first.dataset.plan.options for row in members):
-            one = as_one(patch, members)
-            yield CombinedRow(
-                patch=patch,
-                rows=tuple(row.name for row in members),
-                samples=len(one.results),
-                metrics=metrics_of(one),
-            )
+        groups.setdefault(row.patch, []).append(row)
+    return {
+        patch: members
+        for patch, members in groups.items()
+        if len(members) > 1 and all(row.dataset.plan.options == members[0].dataset.plan.options for row in members)
+    }
 
 
 def metrics_of(row: EvaluatedDataset) -> dict[str, dict[str, Estimate]]:
@@ -233,11 +244,23 @@ def compared(rows: Sequence[EvaluatedDataset], seed: int) -> Iterable[Difference
         rows: all evaluated datasets.
         seed: seed of the permutation tests.
     """
-    for row in rows:
-        for control in CONTROLS[: CONTROLS.index(row.patch) if row.patch in CONTROLS else len(CONTROLS)]:
-            for other in rows:
-                if other.patch == control and other.dataset.plan.twin_key == row.dataset.plan.twin_key:
-                    yield difference(row, other, seed)
+    for row, other in twin_pairs(rows):
+        yield difference(row, other, seed)
+
+
+def twin_pairs(rows: Sequence[EvaluatedDataset]) -> list[tuple[EvaluatedDataset, EvaluatedDataset]]:
+    """The datasets that `compared` compares: each with its twins without a patch and with a random patch.
+
+    Args:
+        rows: all evaluated datasets.
+    """
+    return [
+        (row, other)
+        for row in rows
+        for control in CONTROLS[: CONTROLS.index(row.patch) if row.patch in CONTROLS else len(CONTROLS)]
+        for other in rows
+        if other.patch == control and other.dataset.plan.twin_key == row.dataset.plan.twin_key
+    ]
 
 
 def difference(row: EvaluatedDataset, other: EvaluatedDataset, seed: int) -> Difference:

@@ -5,7 +5,7 @@ prediction and defended picture, next to picture and prediction of the twin (the
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +49,13 @@ CHANGE_COLOURS: dict[Change, tuple[int, int, int]] = {
 """Colours of the boxes of changed objects, RGB."""
 
 
-def write_sheets(root: Path, rows: Sequence[EvaluatedDataset], count: int, on_warning: Warn) -> dict[str, str]:
+def write_sheets(
+    root: Path,
+    rows: Sequence[EvaluatedDataset],
+    count: int,
+    on_warning: Warn,
+    done: Callable[[], None] = lambda: None,
+) -> dict[str, str]:
     """Writes one sheet for each dataset into the folder of the evaluation.
 
     Args:
@@ -57,6 +63,7 @@ def write_sheets(root: Path, rows: Sequence[EvaluatedDataset], count: int, on_wa
         rows: the evaluated datasets.
         count: number of samples on a sheet; 0 writes no sheets.
         on_warning: called with one line if a sheet cannot be drawn, because the code of another package fails.
+        done: called after every sheet.
 
     Returns:
         Path of each sheet relative to the folder, by the name of the dataset's row.
@@ -67,11 +74,13 @@ def write_sheets(root: Path, rows: Sequence[EvaluatedDataset], count: int, on_wa
             sheet = draw_sheet(root, row, twin_of(row, rows), count)
         except Exception as error:  # a third party's task
             on_warning(f"{row.dataset.root}: no pictures ({one_line(error)})")
+            done()
             continue
         relative = f"{PICTURES}/{row.name}.jpg"
         data = cv2.imencode(".jpg", sheet[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
         write_whole(root, relative, data)
         paths[row.name] = relative
+        done()
     return paths
 
 

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from gear.config.dump import to_plain
 from gear.dataset.executors.engines import DEFAULT
@@ -31,7 +31,15 @@ from gear.values.errors import DatasetError
 from gear.values.progress import Callbacks, PhaseProgress, Progress, Warn
 from gear.values.serial import Json
 from gear.verbs.evaluate.alarm_notes import alarm_notes
-from gear.verbs.evaluate.compare import EvaluatedDataset, compared, drive_note, row_report, together
+from gear.verbs.evaluate.compare import (
+    EvaluatedDataset,
+    compared,
+    drive_note,
+    labelled,
+    row_report,
+    together,
+    twin_pairs,
+)
 from gear.verbs.evaluate.distribute import FIT, measure_dataset, predict_in_workers, store_fit
 from gear.verbs.evaluate.page import PAGE, page
 from gear.verbs.evaluate.pictures import write_sheets
@@ -39,6 +47,8 @@ from gear.verbs.evaluate.pools import Pools, check_pools, pooled
 from gear.verbs.evaluate.report import EvaluateReport
 from gear.verbs.evaluate.request import EvaluateRequest
 from gear.verbs.evaluate.table import table
+
+T = TypeVar("T")
 
 INTERVALS = "95 %: jackknife over streets, Student's t corrected for skewness; exact where a share is 0 or 1"
 """The note in results.json on how the intervals are computed."""
@@ -175,10 +185,11 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
     with exclusive_lock(root, callbacks.on_warning):
         _begin(root, facts)
         rows = _measured(request, datasets, names, guarded, callbacks)
-        callbacks.part("computing metrics and intervals")
+        done = _counter(callbacks.part("computing metrics and intervals"), _results(request, rows))
         learnt_facts = _fit_facts(root, guarded, request, callbacks.on_warning)
-        sheets = write_sheets(root, rows, request.pictures, callbacks.on_warning)
-        reports = tuple(replace(row_report(row), pictures=sheets.get(row.name)) for row in rows)
+        sheets = write_sheets(root, rows, request.pictures, callbacks.on_warning, done)
+        made = _counted(map(row_report, rows), done)
+        reports = tuple(replace(one, pictures=sheets.get(one.name)) for one in made)
         alarms = alarm_notes(reports, learnt_facts)
         for line in alarms:
             callbacks.on_warning(line)
@@ -198,9 +209,9 @@ def run_evaluate(request: EvaluateRequest, callbacks: Callbacks) -> EvaluateRepo
             out=root,
             facts=facts | more,
             rows=reports,
-            together=tuple(together(rows)),
-            differences=tuple(compared(rows, request.seed)),
-            pools=tuple(pooled(rows, request.pools, request.seed)),
+            together=_counted(together(rows), done),
+            differences=_counted(compared(rows, request.seed), done),
+            pools=_counted(pooled(rows, request.pools, request.seed), done),
         )
         _end(root, found)
     return found
@@ -291,6 +302,23 @@ def _counter(on_progress: Progress, total: int) -> Callable[[], None]:
 
     on_progress(0, total)
     return done
+
+
+def _results(request: EvaluateRequest, rows: Sequence[EvaluatedDataset]) -> int:
+    """The number of results that are computed after all samples are measured: sheets, rows, combinations, comparisons
+    and pools.
+    """
+    sheets = len(rows) if request.pictures else 0
+    return sheets + len(rows) + len(labelled(rows)) + len(twin_pairs(rows)) + len(request.pools)
+
+
+def _counted(results: Iterable[T], done: Callable[[], None]) -> tuple[T, ...]:
+    """Computes results one after another; `done` is called after each."""
+    computed = []
+    for one in results:
+        computed.append(one)
+        done()
+    return tuple(computed)
 
 
 def _versions(guarded: GuardedModel) -> Json:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from gear.dataset.files import explained, write_whole
 from gear.dataset.guarded_paths import remove_file
+from gear.dataset.own_output import check_own
 from gear.leaderboard.board import Table, tables
 from gear.leaderboard.field_checks import LONGEST_TEXT, SHA256
 from gear.leaderboard.reading import Filed, limited, read_records
@@ -23,8 +24,14 @@ from gear.verbs.leaderboard.texts import board_json
 RECORDS = "records"
 """Name of the folder with the pages of the records."""
 
+BOARD = "board.json"
+"""Name of the file with all tables, which is written first, so that a later run recognises the folder."""
+
+MARK = b'"gear-leaderboard"'
+"""The format's name in `board.json`."""
+
 MOST_PAGE_BYTES = 64 << 20
-"""Largest size of a record's page."""
+"""Largest size of a record's page, and of `board.json`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -61,7 +68,7 @@ def build_leaderboard(
     """Makes static pages of a folder of records: `index.html`, `drives.html` about drives, one page per record, and
     `board.json`.
 
-    Pages of records that are no longer listed are removed.
+    Pages of records that are no longer listed are removed. A folder that holds files but no earlier pages is refused.
 
     Args:
         records: folder with records (`*.json`).
@@ -71,10 +78,11 @@ def build_leaderboard(
         commitment: salted hash of the withheld scenes, which the pages publish.
 
     Raises:
-        GearError: a folder cannot be read or written, or the commitment is no hash.
+        GearError: a folder cannot be read or written, `out` holds files of somebody else, or the commitment is no hash.
     """
     if commitment is not None and not SHA256.fullmatch(commitment):
         raise GearError("the commitment must be a SHA-256, as `gear leaderboard commit FILE` prints it")
+    check_own(Path(out), BOARD, _is_board, "pages")
     refused: list[str] = []
     filed: dict[str, Filed] = {}
     for one in read_records(Path(records)):
@@ -87,13 +95,18 @@ def build_leaderboard(
     report = BoardReport(out=Path(out), tables=found, refused=tuple(refused))
     with explained(report.out):
         report.out.mkdir(parents=True, exist_ok=True)
+    write_whole(report.out, BOARD, canonical(report.as_json()))
     for sha256, one in filed.items():
         write_whole(report.out, f"{RECORDS}/{sha256}.html", record_page(one, verdicts.get(sha256)).encode())
     _remove_old_pages(report.out, filed)
-    write_whole(report.out, "board.json", canonical(report.as_json()))
     write_whole(report.out, "drives.html", drives_page(drive_tables(found)).encode())
     write_whole(report.out, "index.html", index_page(found, refused, commitment).encode())
     return report
+
+
+def _is_board(path: Path) -> bool:
+    """Whether a file is a `board.json` that gear wrote."""
+    return MARK in limited(path, MOST_PAGE_BYTES)
 
 
 def _verdicts(folder: Path, refused: list[str]) -> dict[str, Verdict]:

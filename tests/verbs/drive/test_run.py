@@ -17,6 +17,7 @@ from gear.cli.machine_limits import OPEN_FILES
 from gear.cli.main import main
 from gear.collecting.patch_sources import digest_of
 from gear.contracts.executors import Outcome
+from gear.dataset.executors import calibrations
 from gear.dataset.guarded_paths import remove_tree
 from gear.driving import worker
 from gear.driving.drives import DriveRun
@@ -25,8 +26,8 @@ from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import GearError
 from gear.verbs.drive.report import DriveReport
 from gear.verbs.drive.request import DriveRequest
-from gear.verbs.drive.run import _problem
-from tests.shared import few_files
+from gear.verbs.drive.run import _problem, run_drive
+from tests.shared import ClockedLines, few_files
 
 TEXT = f"""
 drivers:
@@ -224,3 +225,42 @@ def test_a_study_that_does_not_fit_the_disk_is_refused_after_its_first_drives(
     ):
         gear.drive(config, out=tmp_path / "out")
     assert not (tmp_path / "out" / "drive.json").exists()
+
+
+def test_every_part_of_a_study_has_rate_and_time_left(
+    config: Path, report: DriveReport, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = ClockedLines(monkeypatch, "drive", "drive")
+    again = run_drive(DriveRequest(config=config, out=report.out), lines.callbacks)
+    assert hashes(again) == hashes(report)
+    assert lines.counted("checking existing drives")[2].endswith("3 of 6, 6 per minute, 30 seconds left")
+    assert lines.counted("reading the results of all drives")[2].endswith("3 of 6, 6 per minute, 30 seconds left")
+    monkeypatch.setattr(calibrations, "EVERY_S", 0.0)  # workers report every frame
+    settings = ("drivers={blind: {controller: blind}}", "scenarios={stopped_lead: [40]}", "twins=[none]")
+    fresh = run_drive(DriveRequest(config=config, out=tmp_path / "out", settings=settings), lines.callbacks)
+    frames = lines.counted("frames of the first drive")
+    assert frames[0] == "gear drive: frames of the first drive, 1 of 100, 6 per minute, 16 minutes left"
+    assert len(fresh.results) == 1 and hashes(fresh) == [
+        one.log_sha256 for one in report.results if (one.run.driver, one.run.scenario) == ("blind", "stopped_lead")
+    ]
+
+
+def test_files_of_somebody_else_are_not_replaced(
+    config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "drive.yml").write_text(TEXT)
+    (tmp_path / "report.html").write_text("mine")
+    assert main(["drive", str(tmp_path / "drive.yml"), "--out", str(tmp_path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "holds files that are no drives of gear's, such as 'drive.yml'; use another --out" in line
+    assert (tmp_path / "drive.yml").read_text() == TEXT and (tmp_path / "report.html").read_text() == "mine"
+
+
+def test_a_study_without_a_first_line_in_its_config_is_continued(
+    config: Path, report: DriveReport, tmp_path: Path
+) -> None:
+    shutil.copytree(report.out, tmp_path / "old")
+    own = tmp_path / "old/drive.yml"
+    own.write_bytes(own.read_bytes().split(b"\n", 1)[1])
+    assert hashes(gear.drive(config, out=tmp_path / "old")) == hashes(report)
+    assert own.read_bytes().startswith(b"# written by gear drive\n")

@@ -19,7 +19,9 @@ from gear.testing.tiny_town import TINY_SCENES, TINY_TOWN
 from gear.values.errors import DatasetError, GearError
 from gear.verbs.collect.run import collect
 from gear.verbs.evaluate.pools import check_pools
-from gear.verbs.evaluate.run import evaluate
+from gear.verbs.evaluate.request import EvaluateRequest
+from gear.verbs.evaluate.run import evaluate, run_evaluate
+from tests.shared import ClockedLines
 from tests.verbs.conftest import Install, Small, size_settings
 from tests.verbs.evaluate.conftest import Oracle, model_spec
 
@@ -47,6 +49,19 @@ def test_twins_are_compared_and_the_patch_can_be_left_out(tmp_path: Path, small:
     assert {name: (test["miou"].mean, test["miou"].p) for name, test in difference.paired.items()} == {
         "task": (0, 1), "outside_patch": (0, 1),
     }  # fmt: skip
+
+
+def test_the_closing_of_an_evaluation_has_rate_and_time_left(
+    tmp_path: Path, small: Small, install: Install, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two sheets, two rows and one comparison."""
+    roots = [small("semseg", "none"), small("semseg", "random")]
+    install(model_spec(lambda _: Oracle(roots), "semseg"))
+    lines = ClockedLines(monkeypatch, "evaluate")
+    run_evaluate(EvaluateRequest(data=tuple(roots), model="odd", out=tmp_path / "out"), lines.callbacks)
+    told = [line.partition("intervals, ")[2] for line in lines.counted("computing metrics and intervals")]
+    assert [line.partition(",")[0] for line in told] == [f"{done} of 5" for done in range(6)]
+    assert told[2] == "2 of 5, 6 per minute, 30 seconds left"
 
 
 def test_pools_are_datasets_that_count_as_one(tmp_path: Path, small: Small, install: Install) -> None:

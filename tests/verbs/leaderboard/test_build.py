@@ -146,3 +146,31 @@ def test_no_page_is_removed_through_a_link(tmp_path: Path) -> None:
     with pytest.raises(GearError, match="link"):
         build_leaderboard(tmp_path / "records", out=tmp_path / "two")
     assert len(list((tmp_path / "one/records").iterdir())) == 1
+
+
+@pytest.mark.parametrize("name", ["index.html", "board.json", "thesis.tex", "records/notes.txt"])
+def test_files_of_somebody_else_are_not_replaced(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put(tmp_path / "records", "a.json", encoded(record()))
+    mine = tmp_path / "site" / name
+    mine.parent.mkdir(parents=True)
+    mine.write_text("{}")
+    assert main(["leaderboard", "build", str(tmp_path / "records"), "--out", str(tmp_path / "site")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    shown = name.partition("/")[0]
+    assert f"holds files that are no pages of gear's, such as {shown!r}; use another --out" in line
+    assert [path.relative_to(tmp_path / "site").as_posix() for path in mine.parent.iterdir()] == [name]
+    assert mine.read_text() == "{}"
+
+
+def test_what_somebody_adds_to_finished_pages_stays(tmp_path: Path) -> None:
+    put(tmp_path / "records", "a.json", encoded(record()))
+    site = tmp_path / "site"
+    (site / ".git").mkdir(parents=True)
+    build_leaderboard(tmp_path / "records", out=site)
+    (site / "CNAME").write_text("board.example")
+    build_leaderboard(tmp_path / "records", out=site)
+    assert (site / "CNAME").read_text() == "board.example"
+    for name in ("index.html", "drives.html"):  # what a run that is killed after its first file leaves
+        (site / name).unlink()
+    build_leaderboard(tmp_path / "records", out=site)
+    assert (site / "index.html").exists()
