@@ -1,4 +1,4 @@
-"""What bounds streets: fences, walls, guard rails, bridge railings. All run along x, centred at the origin."""
+"""Barriers beside streets: fences, walls, guard rails, bridge railings. All run along x, centred at the origin."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from authoring.materials.registry import MATERIALS
 
 
 def fence(length_m: float, *, style: str = "bars", height_m: float = 1.4) -> list[Part]:
-    """A fence of `bars` (iron palings), `mesh` (crossed wire rods between posts) or `wood` (boards)."""
+    """Makes a fence of the style `bars` (iron palings), `mesh` (crossed wire rods between posts) or `wood` (boards)."""
     sink = Sink("fence")
     makers = {"bars": _bars, "mesh": _mesh, "wood": _boards}
     if style not in makers:
@@ -22,7 +22,7 @@ def fence(length_m: float, *, style: str = "bars", height_m: float = 1.4) -> lis
 
 
 def wall(length_m: float, *, material: str = "brick_red", height_m: float = 1.8, thick_m: float = 0.3) -> list[Part]:
-    """A free-standing wall of a tiling material with piers and a coping."""
+    """Makes a free-standing wall of a tiling material, with piers and a coping."""
     sink = Sink("wall")
     half_x, half_y = length_m / 2, thick_m / 2
     tile_m = MATERIALS[material].tile_m
@@ -43,7 +43,7 @@ def wall(length_m: float, *, material: str = "brick_red", height_m: float = 1.8,
 
 
 def seat_wall(length_m: float, *, height_m: float = 0.42) -> list[Part]:
-    """A low wall of ashlar with a slab to sit on, 0.45 m deep."""
+    """Makes a low wall of ashlar, 0.45 m deep, with a slab on top that serves as a seat."""
     sink = Sink("wall")
     half, tile_m = length_m / 2, MATERIALS["ashlar"].tile_m
     sink.tiled_box("ashlar", (-half, -0.18, 0), (half, 0.18, height_m), tile_m=tile_m, skip="zZ")
@@ -52,7 +52,7 @@ def seat_wall(length_m: float, *, height_m: float = 0.42) -> list[Part]:
 
 
 def guard_rail(length_m: float) -> list[Part]:
-    """A W-beam on posts, its face towards -y, 0.75 m high."""
+    """Makes a guard rail: a W-shaped steel beam on posts, 0.75 m high, with its face towards -y."""
     sink = Sink("guard_rail")
     half = length_m / 2
     outline = [
@@ -75,7 +75,7 @@ def guard_rail(length_m: float) -> list[Part]:
 
 
 def bridge_railing(length_m: float, *, height_m: float = 1.15) -> list[Part]:
-    """Steel posts, a broad handrail and upright bars on a concrete kerb; label bridge."""
+    """Makes a railing of steel posts, a broad handrail and upright bars on a concrete kerb; its label is `bridge`."""
     sink = Sink("bridge")
     half = length_m / 2
     sink.tiled_box("concrete", (-half, -0.18, 0), (half, 0.18, 0.22), tile_m=4.0, skip="z")
@@ -89,7 +89,7 @@ def bridge_railing(length_m: float, *, height_m: float = 1.15) -> list[Part]:
 
 
 def jersey_barrier(length_m: float) -> list[Part]:
-    """A concrete barrier of the New Jersey profile; label wall."""
+    """Makes a concrete barrier with the New Jersey profile; its label is `wall`."""
     sink = Sink("wall")
     half = length_m / 2
     outline = [
@@ -131,7 +131,7 @@ def _bars(sink: Sink, length_m: float, height_m: float) -> None:
 
 
 def _mesh(sink: Sink, length_m: float, height_m: float) -> None:
-    """Wire netting as rods that cross: thick enough to be seen, thin enough to see through."""
+    """Adds wire netting of crossing rods, which are thick enough to be visible, with gaps between them."""
     half, rod = length_m / 2, 0.006
     for x in _posts(length_m, 2.5):
         cylinder(sink, "galvanised", (x, 0, 0), 0.03, height_m + 0.05, segments=8)

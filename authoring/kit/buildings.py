@@ -1,4 +1,4 @@
-"""Buildings: any style, size and number of floors, in detail or as a textured box for the distance."""
+"""Makes buildings of any style, size and number of floors, in detail or as a textured box for large distances."""
 
 from __future__ import annotations
 
@@ -30,17 +30,19 @@ def building(
     lod: str = "near",
     covered_m: Mapping[str, float] | None = None,
 ) -> list[Part]:
-    """One building in its own frame: footprint centred at the origin, ground at z = 0, main facade facing -y.
+    """Makes one building in its own frame: the footprint is centred at the origin, the ground is at z = 0, and the main
+    facade faces -y.
 
     Args:
         style: of `STYLES`.
-        width_m: along x, at least 5.
-        depth_m: along y, at least 5.
-        floors: storeys, the ground floor included, at least 1.
-        rng: decides every detail; the same state gives the same building.
-        sides: which of `front` (-y), `right` (+x), `back` (+y), `left` (-x) face a street; the others are plain.
-        lod: `near` for 1.5 to 6 thousand triangles (more for the largest), `far` for under 200.
-        covered_m: up to which height neighbours stand before `left` and `right`: nothing is put there.
+        width_m: width along x in metres, at least 5.
+        depth_m: depth along y in metres, at least 5.
+        floors: number of storeys with the ground floor, at least 1.
+        rng: random generator of all details; the same state gives the same building.
+        sides: the sides that face a street, of `front` (-y), `right` (+x), `back` (+y) and `left` (-x); the others are
+            plain.
+        lod: level of detail: `near` for 1.5 to 6 thousand triangles (more for the largest), `far` for under 200.
+        covered_m: height in metres up to which neighbours hide the sides `left` and `right`; nothing is added there.
     """
     if style not in STYLES:
         raise ValueError(f"no building style named {style!r}; there are {', '.join(STYLES)}")
@@ -71,7 +73,7 @@ def _shop_row(
     rng: np.random.Generator,
     covered_m: Mapping[str, float],
 ) -> list[Part]:
-    """Narrow houses side by side, each of its own make and height."""
+    """Makes a row of narrow houses, each with its own materials and height."""
     count = max(1, round(width_m / float(rng.uniform(6.0, 8.0))))
     shares = rng.uniform(0.8, 1.25, count)
     widths = shares / shares.sum() * width_m

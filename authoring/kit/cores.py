@@ -12,24 +12,24 @@ from authoring.kit.facade import belt
 from authoring.kit.parts import Sink
 
 DEEP_M = 0.95
-"""From the walls to the core; the deepest recess, a shop's door, is 0.72 m deep."""
+"""Distance from the walls to the core, metres; the deepest recess, the door of a shop, is 0.72 m deep."""
 
 INSET_M = 0.05
-"""From the walls to the ceiling's rim, and from the roof down to the ceiling."""
+"""Distance from the walls to the rim of the ceiling, and from the roof down to the ceiling, metres."""
 
 SHEET_M = 0.03
-"""From the walls to the sheet behind the joint of walls and roof."""
+"""Distance from the walls to the sheet behind the joint of walls and roof, metres."""
 
 SWATCH = "concrete_dark"
 
 
 def core(sink: Sink, width_m: float, depth_m: float, top_m: float, *, ground_m: float, deep_m: float = DEEP_M) -> None:
-    """Close a building's inside.
+    """Adds a core and a ceiling, which close the inside of a building.
 
     Args:
-        sink: takes the faces.
-        width_m, depth_m: of the footprint, centred at the origin.
-        top_m: height of the walls.
+        sink: collects the faces.
+        width_m, depth_m: size of the footprint, which is centred at the origin, metres.
+        top_m: height of the walls, metres.
         ground_m: height of the ground floor, whose deep recesses leave no room for partitions.
         deep_m: from the walls to the core.
     """
@@ -57,12 +57,13 @@ def _partitions(sink: Sink, core_m: tuple[float, float], reach_m: float, low_m: 
 
 
 def sheet(sink: Sink, material: str, width_m: float, depth_m: float, low_m: float, high_m: float) -> None:
-    """A sheet around a building, just behind the outer faces of its walls, which closes a joint between two heights.
+    """Adds a sheet around a building, just behind the outer faces of its walls, which closes a joint between two
+    heights.
 
     Args:
-        sink: takes the faces.
+        sink: collects the faces.
         material: a tiling material or a palette swatch.
-        width_m, depth_m: of the footprint, centred at the origin.
-        low_m, high_m: where it begins and ends.
+        width_m, depth_m: size of the footprint, which is centred at the origin, metres.
+        low_m, high_m: heights at which the sheet begins and ends, metres.
     """
     belt(sink, material, width_m - 2 * SHEET_M, depth_m - 2 * SHEET_M, [(0.0, low_m), (0.0, high_m)])

@@ -1,4 +1,4 @@
-"""Where the foliage of a crown hangs: unequal masses on limbs, with gaps between them, never a ball."""
+"""Shapes of tree crowns: masses of foliage of different sizes on limbs, with gaps between them."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Crown:
     """The masses of a crown and the limbs that bear them, in metres.
 
     Attributes:
-        tips: (B, 3) where limbs end, the lowest first.
-        centres: (K, 3) of the masses.
-        radii: (K, 3) their half extents.
+        tips: (B, 3) ends of the limbs, the lowest first.
+        centres: (K, 3) centres of the masses.
+        radii: (K, 3) half extents of the masses along x, y and z.
     """
 
     tips: Array
@@ -41,18 +41,19 @@ def spreading(
     upright: float,
     rng: np.random.Generator,
 ) -> Crown:
-    """A broadleaf's crown: boughs of unequal size at unequal heights, each a few masses around the tip of its limb.
+    """Draws the crown of a broadleaf tree: boughs of different sizes at different heights, each with a few masses
+    around the end of its limb.
 
     Args:
-        across_m: half its breadth.
-        rise_m: half its height.
-        middle_m: how high its middle is.
-        boughs: how many, the one on top included.
-        bough_m: radius of a middling one.
-        masses: of each bough.
-        taper: how much the crown narrows upwards, 0 to 1.
-        upright: height of the masses over their breadth.
-        rng: decides all that differs from tree to tree.
+        across_m: half the width of the crown, metres.
+        rise_m: half the height of the crown, metres.
+        middle_m: height of the middle of the crown, metres.
+        boughs: number of boughs with the one on top.
+        bough_m: radius of an average bough, metres.
+        masses: number of masses of each bough.
+        taper: degree to which the crown narrows upwards, 0 to 1.
+        upright: height of a mass divided by its width.
+        rng: random generator of the differences between trees.
     """
     side = boughs - 1
     up = np.linspace(-0.85, 0.62, side) + rng.uniform(-0.16, 0.16, side)
@@ -73,7 +74,9 @@ def spreading(
 def tiered(
     across_m: float, rise_m: float, middle_m: float, *, tiers: int, masses: int, rng: np.random.Generator
 ) -> Crown:
-    """A conifer's crown: whorls of flat boughs, shorter upwards, each of its own length and with air between whorls."""
+    """Draws the crown of a conifer: whorls of flat boughs of different lengths, shorter upwards, with gaps between the
+    whorls.
+    """
     tips, radii = [], []
     foot, pitch = middle_m - rise_m, 2 * rise_m / tiers
     for tier in range(tiers):
@@ -97,7 +100,7 @@ def tiered(
 
 
 def _clusters(tips: Array, radius: Array, masses: int, squash: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Centres and half extents of the masses around each tip: one in its middle, smaller ones about it."""
+    """Returns centres and half extents of the masses around each tip: one at the tip, and smaller ones around it."""
     centres, radii = [], []
     for tip, size in zip(tips, radius, strict=True):
         centres.append(tip)

@@ -1,4 +1,4 @@
-"""What facades collect over the years: downpipes, air conditioners, flower boxes, fire escapes, oriels."""
+"""Additions to facades: downpipes, air conditioners, flower boxes, fire escapes, oriels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from authoring.kit.openings import WindowStyle, window
 
 
 def downpipe(facade: Facade, u: float, top_m: float, *, swatch: str = "zinc_roof") -> None:
-    """A rain pipe from the eaves to the ground, with brackets and a cast-iron foot."""
+    """Adds a rain pipe from the eaves to the ground, with brackets and a cast-iron foot."""
     half, near, far = 0.045, 0.03, 0.12
     facade.box(swatch, (u - half, u + half), (1.6, top_m), (near, far), skip="but")
     facade.box("cast_iron", (u - half - 0.01, u + half + 0.01), (0.0, 1.6), (near, far + 0.01), skip="bu")
@@ -22,7 +22,7 @@ def downpipe(facade: Facade, u: float, top_m: float, *, swatch: str = "zinc_roof
 
 
 def air_conditioner(facade: Facade, u: float, v: float) -> None:
-    """An outdoor unit on brackets below a window."""
+    """Adds the outdoor unit of an air conditioner, on brackets below a window."""
     facade.box("plastic_white", (u - 0.4, u + 0.4), (v - 0.72, v - 0.16), (0.08, 0.38), skip="")
     facade.box("anthracite", (u - 0.34, u + 0.08), (v - 0.66, v - 0.22), (0.38, 0.385), skip="b")
     facade.box("plastic_grey", (u + 0.14, u + 0.34), (v - 0.60, v - 0.30), (0.38, 0.385), skip="b")
@@ -31,7 +31,7 @@ def air_conditioner(facade: Facade, u: float, v: float) -> None:
 
 
 def flower_box(facade: Facade, opening: Opening, *, rng: np.random.Generator) -> None:
-    """A box of flowers on a window sill."""
+    """Adds a box of flowers on a window sill."""
     u0, u1, v = opening.u0 + 0.05, opening.u1 - 0.05, opening.v0
     facade.box(
         str(rng.choice(["terracotta", "dark_green", "anthracite"])),
@@ -54,7 +54,9 @@ def flower_box(facade: Facade, opening: Opening, *, rng: np.random.Generator) ->
 
 
 def fire_escape(facade: Facade, u0: float, u1: float, levels_m: list[float]) -> None:
-    """Iron platforms at each level, joined by steep stairs, with a ladder that ends above heads."""
+    """Adds a fire escape: iron platforms at each level, steep stairs between them, and a ladder that ends above the
+    heads of people.
+    """
     iron, deep = "black_paint", 1.05
     for index, level in enumerate(levels_m):
         facade.box(iron, (u0, u1), (level - 0.06, level), (0.0, deep), skip="b")
@@ -85,7 +87,7 @@ def oriel(
     style: WindowStyle,
     rng: np.random.Generator,
 ) -> None:
-    """A bay window with slanted cheeks through several floors, on a corbel, under a small roof."""
+    """Adds a bay window with slanted cheeks through several floors, on a corbel, under a small roof."""
     out, slant = 0.65, 0.5
     left, right = centre_m - width_m / 2, centre_m + width_m / 2
     plan = [(left, 0.0), (left + slant, out), (right - slant, out), (right, 0.0)]
@@ -126,7 +128,7 @@ def oriel(
 
 
 def _stair(facade: Facade, u0: float, u1: float, low: float, high: float, swatch: str, *, mirrored: bool) -> None:
-    """A flight between two platforms: two stringers and treads."""
+    """Adds a flight of stairs between two platforms: two stringers and treads."""
     first, last = (u1, u0) if mirrored else (u0, u1)
     steps = 9
     for index in range(steps):

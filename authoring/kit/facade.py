@@ -19,7 +19,7 @@ SIDES = ("front", "right", "back", "left")
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """A rectangular hole in a wall, metres along (u) and up (v) the facade."""
+    """A rectangular hole in a wall, in metres along the facade (u) and upwards (v)."""
 
     u0: float
     v0: float
@@ -49,7 +49,7 @@ class Facade:
         )
 
     def panel(self, material: str, u0: float, v0: float, u1: float, v1: float, *, d_m: float = 0.0) -> None:
-        """A flat rectangle of a tiling material that runs on seamlessly with its neighbours."""
+        """Adds a flat rectangle of a tiling material whose texture continues in its neighbours without a seam."""
         tile_m = MATERIALS[material].tile_m
         offset = float(self.origin @ self.right)
         uvs = [((u + offset) / tile_m, v / tile_m) for u, v in ((u0, v0), (u1, v0), (u1, v1), (u0, v1))]
@@ -67,17 +67,17 @@ class Facade:
         d_m: float = 0.0,
         tilt: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        """A flat rectangle that shows one rectangle of an atlas.
+        """Adds a flat rectangle that shows one rectangle of an atlas.
 
         Args:
             material: an atlas material.
-            rect: what of it.
+            rect: the rectangle of the atlas.
             u0: left edge, metres; v0 the lower, u1 the right, v1 the upper one.
             v0: see u0.
             u1: see u0.
             v1: see u0.
-            d_m: out of the wall.
-            tilt: how far its normal leans along (u, v), radians: no pane of glass mirrors quite what the next one does.
+            d_m: distance from the plane of the wall outwards, metres.
+            tilt: lean of its normal along (u, v), radians, because no two panes reflect the same place.
         """
         uvs = [(rect[0], rect[1]), (rect[2], rect[1]), (rect[2], rect[3]), (rect[0], rect[3])]
         normal = self.outward + tilt[0] * self.right + np.array([0.0, 0.0, tilt[1]])
@@ -86,7 +86,7 @@ class Facade:
         self.sink.triangles(material, corners, [(0, 1, 2), (0, 2, 3)], uvs=uvs, normals=normals)
 
     def swatch(self, name: str, u0: float, v0: float, u1: float, v1: float, *, d_m: float = 0.0) -> None:
-        """A flat rectangle of a plain colour."""
+        """Adds a flat rectangle of a plain colour."""
         self.sink.swatch_quad(name, self._rectangle(u0, v0, u1, v1, d_m))
 
     def box(
@@ -98,7 +98,7 @@ class Facade:
         *,
         skip: str = "b",
     ) -> None:
-        """A block on the wall; `skip` leaves out faces: l(eft) r(ight) u(nder) t(op) f(ront) b(ack).
+        """Adds a block on the wall; `skip` leaves out faces: l(eft) r(ight) u(nder) t(op) f(ront) b(ack).
 
         `material` is a tiling material or a palette swatch.
         """
@@ -117,14 +117,14 @@ class Facade:
                 self.surface(material, corners)
 
     def surface(self, material: str, corners: Sequence[Array]) -> None:
-        """A quad anywhere near the facade, of a tiling material or a palette swatch."""
+        """Adds a quadrilateral anywhere near the facade, of a tiling material or a palette swatch."""
         if material in MATERIALS:
             self.sink.quad(material, np.asarray(corners), tile_m=MATERIALS[material].tile_m)
         else:
             self.sink.swatch_quad(material, np.asarray(corners))
 
     def wall(self, material: str, u0: float, v0: float, u1: float, v1: float, openings: Sequence[Opening] = ()) -> None:
-        """The wall between two corners, less its openings (which must not overlap each other)."""
+        """Adds the wall between two corners without its openings, which must not overlap each other."""
         inside = [o for o in openings if o.v1 > v0 + 1e-6 and o.v0 < v1 - 1e-6]
         levels = sorted({v0, v1, *(min(max(v, v0), v1) for o in inside for v in (o.v0, o.v1))})
         for low, high in itertools.pairwise(levels):
@@ -136,7 +136,7 @@ class Facade:
                 start = max(start, right)
 
     def reveal(self, material: str, opening: Opening, depth_m: float, *, skip: str = "") -> None:
-        """The four cheeks of a recess behind an opening; `skip` leaves out l, r, u(pper) or s(ill)."""
+        """Adds the four cheeks of a recess behind an opening; `skip` leaves out some: l(eft), r(ight), u(pper), s(ill)."""
         o, d = opening, -depth_m
         at = self.at
         cheeks = {
@@ -183,15 +183,15 @@ def belt(
     *,
     sides: Sequence[str] = SIDES,
 ) -> None:
-    """A moulding around a box footprint, mitred where two sides of it meet and closed where it ends.
+    """Adds a moulding around a rectangular footprint, mitred where two sides meet and closed where it ends.
 
     Args:
-        sink: takes the faces.
+        sink: collects the faces.
         material: a tiling material or a palette swatch.
-        width_m: of the footprint along x.
-        depth_m: of the footprint along y.
-        profile: (d, v) points from below upwards: metres out of the wall and up from the ground.
-        sides: the sides that have it.
+        width_m: size of the footprint along x, metres.
+        depth_m: size of the footprint along y, metres.
+        profile: (d, v) points from below upwards: metres out of the wall, and metres above the ground.
+        sides: the sides that get the moulding.
     """
     walls = facades(sink, width_m, depth_m)
     for index, side in enumerate(SIDES):

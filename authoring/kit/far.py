@@ -1,4 +1,4 @@
-"""Buildings for the distance: a box whose storeys are strips of one texture."""
+"""Buildings for large distances: boxes whose storeys are strips of one texture."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _TRIMS = {"glass_office": "anthracite", "concrete_office": "concrete_light", "mo
 def far_building(
     sink: Sink, style: str, width_m: float, depth_m: float, floors: int, *, rng: np.random.Generator
 ) -> None:
-    """A box of at most forty drawn storeys with a coping, a roof and a stair head; under 200 triangles."""
+    """Adds a box of at most forty drawn storeys with a coping, a roof and a stair head; under 200 triangles."""
     floor_m, ground_m = _STOREYS_M.get(style, (3.2, 4.0))
     top_m = ground_m + (floors - 1) * floor_m
     material = str(rng.choice(["far_facades", "far_facades_warm", "far_facades_dark"]))

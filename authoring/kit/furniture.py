@@ -1,4 +1,4 @@
-"""Small things on the pavement. Each stands at the origin; what has a front shows it towards -y."""
+"""Small street furniture. Each piece stands at the origin; a piece with a front shows it towards -y."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands in and around gardens: fences, bins, letter boxes, sheds, a playground, clumps of far trees."""
+"""Objects of gardens: fences, bins, letter boxes, sheds, a playground, clumps of far trees."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def playground() -> list[Part]:
 
 
 def clump(sink: Sink, x: float, y: float, z: float, height_m: float, rng: np.random.Generator) -> None:
-    """A few far trees grown together: masses of foliage without leaves or trunks."""
+    """Adds a group of distant trees: masses of foliage without leaves or trunks."""
     foliage = str(rng.choice(["foliage_green", "foliage_dark"]))
     around = np.array([x, y, z])
     for index in range(3):

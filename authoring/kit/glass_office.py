@@ -24,7 +24,7 @@ FLOORS_PER_TILE = 4
 def glass_office(
     sink: Sink, width_m: float, depth_m: float, floors: int, sides: Sequence[str], *, rng: np.random.Generator
 ) -> None:
-    """A curtain-wall office; the sides without a street are glass too, without mullions."""
+    """Adds an office tower with a curtain wall; the sides without a street are of glass, too, but without mullions."""
     frame = str(rng.choice(["anthracite", "aluminium", "black_paint"]))
     deep = float(rng.choice([0.06, 0.12, 0.25]))
     top_m = LOBBY_M + (floors - 1) * FLOOR_M
@@ -45,7 +45,9 @@ def glass_office(
 
 
 def _panes(facade: Facade, floors: int, shift: int) -> None:
-    """One quad a floor; its UVs count panes and floors, so that the texture's panes meet the mullions."""
+    """Adds one quadrilateral per floor; its texture coordinates count panes and floors, so that the texture's panes
+    meet the mullions.
+    """
     count = max(1, round(facade.width_m / PANE_M))
     u0, u1 = shift / PANES_PER_TILE, (shift + count) / PANES_PER_TILE
     for floor in range(floors - 1):

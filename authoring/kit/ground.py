@@ -22,7 +22,7 @@ FRAMES = (
 
 
 def ground_floor(facade: Facade, style: Style, *, main: bool, rng: np.random.Generator) -> list[Opening]:
-    """Everything at street level; returns the holes that the wall has to leave."""
+    """Adds everything at street level, and returns the openings that the wall must leave."""
     makers = {"homes": _homes, "shops": _shops, "lobby": _lobby, "dock": _dock}
     return makers[style.ground](facade, style, main, rng)
 

@@ -1,4 +1,4 @@
-"""What makes a house front: bay windows, porches, front doors, garage doors."""
+"""Parts of the fronts of houses: bay windows, porches, front doors, garage doors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ DOORS = ("panel_green", "panel_brown", "panel_blue", "panel_black")
 
 
 def front_door(facade: Facade, u: float, base_m: float, *, trim: str, rng: np.random.Generator) -> Opening:
-    """A panelled door with a frame, a fanlight and two steps; returns the hole the wall has to leave."""
+    """Adds a panelled door with a frame, a fanlight and two steps, and returns the opening that the wall must leave."""
     hole = Opening(u - 0.5, base_m, u + 0.5, base_m + 2.4)
     facade.reveal(trim, hole, 0.16)
     facade.picture("shop_fronts", door_rect(str(rng.choice(DOORS))), u - 0.5, base_m, u + 0.5, base_m + 2.05, d_m=-0.16)
@@ -30,7 +30,7 @@ def front_door(facade: Facade, u: float, base_m: float, *, trim: str, rng: np.ra
 
 
 def porch(facade: Facade, u: float, base_m: float, *, style: str, tiles: str, trim: str) -> None:
-    """A roof over a front door: `lean` (a tiled slope on brackets) or `gable` (on two posts)."""
+    """Adds a roof over a front door: `lean` (a tiled slope on brackets) or `gable` (on two posts)."""
     top, deep, half = base_m + 2.75, 1.35, 1.15
     tile_m = MATERIALS[tiles].tile_m
     at = facade.at
@@ -78,7 +78,7 @@ def bay_window(
     storeys: int = 1,
     floor_m: float = 2.65,
 ) -> None:
-    """A rectangular bay 2.6 m wide in front of a wall, through one or two storeys, under a tiled lean-to."""
+    """Adds a rectangular bay 2.6 m wide in front of a wall, through one or two storeys, under a tiled lean-to."""
     half, deep = 1.3, 0.7
     top = base_m + storeys * floor_m - 0.25
     front = Facade(facade.sink, facade.at(u - half, 0.0, deep), facade.right, 2 * half)
@@ -118,7 +118,7 @@ def bay_window(
 
 
 def garage_door(facade: Facade, u: float, width_m: float, *, swatch: str, trim: str) -> Opening:
-    """An up-and-over door of four ribs; returns the hole the wall has to leave."""
+    """Adds an up-and-over door with four ribs, and returns the opening that the wall must leave."""
     hole = Opening(u - width_m / 2, 0.0, u + width_m / 2, 2.15)
     facade.reveal(trim, hole, 0.12, skip="s")
     for row in range(4):
@@ -135,5 +135,5 @@ def garage_door(facade: Facade, u: float, width_m: float, *, swatch: str, trim: 
 def wall_box(
     sink: Sink, material: str, low: tuple[float, float, float], high: tuple[float, float, float], *, skip: str = "zZ"
 ) -> None:
-    """Plain walls of a wing."""
+    """Adds the plain walls of a wing between two corners."""
     sink.tiled_box(material, low, high, tile_m=MATERIALS[material].tile_m, skip=skip)

@@ -16,7 +16,9 @@ SKIN_M = 0.14
 def gable(
     length_m: float, span_m: float, rise_m: float, *, tiles: str, wall: str, trim: str, ends: str = "xX"
 ) -> list[Part]:
-    """Two slopes with the ridge along x; `ends` names the gables that have a triangle of wall and a verge."""
+    """Makes a gable roof: two slopes with the ridge along x; `ends` names the gables with a triangle of wall and a
+    verge.
+    """
     sink = Sink("building")
     half, tile_m = span_m / 2, MATERIALS[tiles].tile_m
     low = -rise_m * EAVE_M / half
@@ -53,7 +55,7 @@ def gable(
 
 
 def hip(length_m: float, span_m: float, rise_m: float, *, tiles: str, trim: str) -> list[Part]:
-    """Four slopes over a rectangle at least as long as wide; the ridge runs along x."""
+    """Makes a hip roof: four slopes over a rectangle that is at least as long as wide; the ridge runs along x."""
     sink = Sink("building")
     tile_m = MATERIALS[tiles].tile_m
     half = span_m / 2
@@ -77,7 +79,7 @@ def hip(length_m: float, span_m: float, rise_m: float, *, tiles: str, trim: str)
 
 
 def chimney(sink: Sink, x: float, y: float, foot_m: float, top_m: float, *, brick: str, pots: int = 2) -> None:
-    """A stack through a roof, with a corbelled head and clay pots along y."""
+    """Makes a chimney through a roof, with a corbelled head and a row of clay pots along y."""
     half_x, half_y = 0.32, 0.22 + 0.16 * pots
     tile_m = MATERIALS[brick].tile_m
     sink.tiled_box(brick, (x - half_x, y - half_y, foot_m), (x + half_x, y + half_y, top_m), tile_m=tile_m, skip="z")

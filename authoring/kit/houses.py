@@ -1,4 +1,4 @@
-"""Houses of a suburb: detached, in rows and pairs, and simple ones for the distance."""
+"""Houses of a suburb: detached, in rows and pairs, and simple ones for large distances."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ FAR_ROOFS = ("tile_roof", "tile_roof_brown", "tile_roof_grey", "slate_roof")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """What one house is made of.
+    """The materials of one house.
 
     Attributes:
-        wall, upper: tiling materials of the ground floor and of what is above.
-        tiles: of the roof.
+        wall, upper: tiling materials of the ground floor and of the storeys above it.
+        tiles: material of the roof.
         trim: swatch of frames, boards and posts.
-        window: how its windows are made.
+        window: style of its windows.
     """
 
     wall: str
@@ -52,7 +52,7 @@ class Look:
 
 
 def look(rng: np.random.Generator) -> Look:
-    """Draw walls, roof and windows that go together."""
+    """Draws materials of walls, roof and windows that match."""
     wall, tiles, trim = LOOKS[int(rng.integers(len(LOOKS)))]
     upper = wall
     if wall.startswith("brick") and rng.random() < 0.35:
@@ -84,13 +84,13 @@ def detached(
     roof: str = "gable",
     garage: str = "",
 ) -> list[Part]:
-    """A house alone in its garden, facing -y, its main body centred at the origin.
+    """Makes a detached house that faces -y; its main body is centred at the origin.
 
     Args:
-        width_m: of the main body, along x.
-        depth_m: along y.
-        floors: 1 to 3.
-        rng: decides materials and details.
+        width_m: width of the main body along x, metres.
+        depth_m: depth along y, metres.
+        floors: number of storeys, 1 to 3.
+        rng: random generator of materials and details.
         roof: `gable` (ridge along the street), `cross` (gable to the street), `hip`.
         garage: `left`, `right` (as seen from the street) or none: a wing 3.3 m wide beside the main body.
     """
@@ -162,7 +162,7 @@ def row(count: int, unit_m: float, depth_m: float, floors: int, rng: np.random.G
 
 
 def far_house(rng: np.random.Generator) -> list[Part]:
-    """A house for the distance: walls, a roof and window pictures; about fifty triangles."""
+    """Makes a house for large distances: walls, a roof and pictures of windows; about fifty triangles."""
     sink = Sink("building")
     width, depth, floors = float(rng.uniform(8, 15)), float(rng.uniform(7.5, 9.5)), int(rng.integers(1, 4))
     top = 0.5 + 2.7 * floors
@@ -203,7 +203,7 @@ def far_house(rng: np.random.Generator) -> list[Part]:
 def _front(
     facade: Facade, made: Look, door_u: float, floors: int, top: float, *, roofed: bool, rng: np.random.Generator
 ) -> None:
-    """Door, with a porch where the eaves leave room, windows in bays, sometimes a bay window."""
+    """Adds the front: the door, a porch if there is room below the eaves, windows in bays, sometimes a bay window."""
     width, style = facade.width_m, made.window
     holes = [front_door(facade, door_u, BASE_M, trim=made.trim, rng=rng)]
     if roofed:
@@ -238,7 +238,9 @@ def _front(
 def _other(
     facade: Facade, made: Look, floors: int, top: float, *, back: bool, attached: bool, rng: np.random.Generator
 ) -> None:
-    """Sides and back: fewer windows, flush with the wall: no camera on the street comes near them."""
+    """Adds a side or the back, with fewer windows, flush with the wall, because no camera on the street comes near
+    them.
+    """
     count = max(2, round(facade.width_m / 3.4)) if back else 1 + int(rng.random() < 0.5)
     for floor in range(int(attached), floors):
         low = BASE_M + floor * FLOOR_M + 0.95
@@ -269,7 +271,7 @@ def _attic_window(facade: Facade, u: float, v: float, made: Look, *, rng: np.ran
 def _dormer(
     sink: Sink, x: float, depth_m: float, rise: float, top: float, made: Look, *, rng: np.random.Generator
 ) -> None:
-    """A small gabled dormer in the front slope."""
+    """Adds a small gabled dormer in the front slope of the roof."""
     y = -depth_m / 2 + 0.75
     low = top + rise * 0.75 / (depth_m / 2)
     high, half = low + 1.25, 0.75
@@ -286,7 +288,7 @@ def _dormer(
 
 
 def _garage(sink: Sink, made: Look, width_m: float, depth_m: float, side: str, *, rng: np.random.Generator) -> None:
-    """A wing beside the house, a little behind its front, with a door to the street."""
+    """Adds a wing beside the house, a little behind its front, with a door to the street."""
     wide, deep, high = GARAGE_M
     wing = Sink("building")
     swatch = str(rng.choice(["white_paint", "anthracite", "brown_paint", "dark_green", "grey_paint"]))

@@ -25,8 +25,9 @@ def warehouse(
     """A flat-roofed warehouse: clad walls over a concrete base, dock doors along its front, an office at one end.
 
     Args:
-        width_m, depth_m: footprint, at least 30 by 15.
-        height_m: to the parapet, at least 7.
+        width_m, depth_m: size of the footprint in metres, at least 30 by 15.
+        height_m: height of the parapet in metres, at least 7.
+        rng: random generator of the details.
         cladding: material of the walls.
     """
     sink = Sink("building")
@@ -159,7 +160,7 @@ def price_mast() -> list[Part]:
 
 
 def _docks(sink: Sink, x0: float, x1: float, front: float) -> None:
-    """Dock doors with rubber seals, bumpers and numbers, steps at one end and a canopy above."""
+    """Adds dock doors with rubber seals, bumpers and numbers, steps at one end and a canopy above."""
     count = max(1, int((x1 - x0) // DOCK_PITCH_M))
     for index in range(count):
         u = x0 + (index + 0.5) * (x1 - x0) / count
@@ -180,7 +181,7 @@ def _docks(sink: Sink, x0: float, x1: float, front: float) -> None:
 
 
 def _office(sink: Sink, x0: float, x1: float, front: float, top: float) -> None:
-    """Two rows of windows in a projecting box, a door under a slab."""
+    """Adds an office: two rows of windows in a projecting box, and a door under a slab."""
     sink.tiled_box("brick_brown", (x0, front - 1.5, 0), (x1, front, top), tile_m=2.0, skip="zY")
     face = front - 1.53
     count = max(2, int((x1 - x0) // 2.6))
@@ -217,7 +218,7 @@ def _door(sink: Sink, x0: float, x1: float, low: float, high: float, front: floa
 def _picture(
     sink: Sink, material: str, rect: Sequence[float], x0: float, x1: float, z0: float, z1: float, y: float
 ) -> None:
-    """A cell of an atlas upright at y, seen from -y."""
+    """Adds a cell of an atlas as an upright rectangle at y that faces -y."""
     u0, v0, u1, v1 = rect
     sink.polygon(
         material, [(x0, y, z0), (x1, y, z0), (x1, y, z1), (x0, y, z1)], [(u0, v0), (u1, v0), (u1, v1), (u0, v1)]
@@ -232,7 +233,7 @@ def _fascia(sink: Sink, index: int, x: float, y: float, z: float, width_m: float
 
 
 def _rim(sink: Sink, swatch: str, x: float, y: float, low: float, high: float) -> None:
-    """A parapet band around a roof, seen from outside, from above and from within."""
+    """Adds a parapet around a roof, with its outer, upper and inner faces."""
     sink.swatch_box(swatch, (-x, -y, low), (x, y, high), skip="zZ")
     wide = 0.25
     sink.swatch_box(swatch, (-x, -y, high - 0.02), (x, -y + wide, high), skip="z")

@@ -1,4 +1,4 @@
-"""Plant: silos, tanks, chimneys, pylons, cranes of a container terminal."""
+"""Industrial plant: silos, tanks, chimneys, pylons, cranes of a container terminal."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def pylon(height_m: float = 34.0) -> list[Part]:
 
 
 def wires(spans: list[tuple[Array, Array]], *, sag_m: float = 3.5) -> list[Part]:
-    """Power lines between pairs of points (3,), hanging through."""
+    """Makes power lines that sag between pairs of points (3,)."""
     sink = Sink("pole")
     for start, end in spans:
         share = np.linspace(0, 1, 9)[:, None]
@@ -139,7 +139,7 @@ def quay_crane(height_m: float = 62.0, *, swatch: str = "signal_blue", raised: b
 
 
 def strut(sink: Sink, start: Array, end: Array, thick_m: float, swatch: str = "galvanised") -> None:
-    """A square bar between two points (3,), its ends open."""
+    """Adds a square bar with open ends between two points (3,)."""
     along = (end - start) / np.linalg.norm(end - start)
     side = np.cross(along, (0.0, 0.0, 1.0))
     if np.linalg.norm(side) < 1e-3:

@@ -1,4 +1,4 @@
-"""What stands about in yards and along motorways: containers, netting, noise walls, gantries, direction signs."""
+"""Objects of yards and motorways: containers, netting, noise walls, gantries, direction signs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NET_PITCH_M = 0.5
 
 
 def container(sink: Sink, liner: int, x: float, y: float, z: float, *, short: bool = False) -> None:
-    """One container along x, its middle at (x, y), its floor at z, its doors towards +x."""
+    """Adds one container along x: its middle is at (x, y), its floor at z, and its doors face +x."""
     half_x, half_y = (SHORT_M if short else CONTAINER_M[0]) / 2, CONTAINER_M[1] / 2
     faces = box_faces((x - half_x, y - half_y, z), (x + half_x, y + half_y, z + CONTAINER_M[2]))
     for face in "yYxXZ":
@@ -33,7 +33,7 @@ def container(sink: Sink, liner: int, x: float, y: float, z: float, *, short: bo
 
 
 def container_stack(rows: int, columns: int, rng: np.random.Generator, *, highest: int = 4) -> list[Part]:
-    """A block of stacked containers: `rows` across y, `columns` along x, each stack of its own height."""
+    """A block of stacked containers: `rows` across y, `columns` along x, with a random height of each stack."""
     sink = Sink("static")
     long, wide, tall = CONTAINER_M
     height = int(rng.integers(2, highest + 1))
@@ -53,7 +53,7 @@ def container_stack(rows: int, columns: int, rng: np.random.Generator, *, highes
 
 
 def pallets(rng: np.random.Generator) -> list[Part]:
-    """Goods left in a yard: stacks of pallets, crates under film, liquid containers in their cages, drums."""
+    """Makes goods in a yard: stacks of pallets, crates under film, liquid containers in their cages, drums."""
     sink = Sink("static")
     for column in range(int(rng.integers(3, 6))):
         x, y = column * 1.6 - 3.0, float(rng.uniform(-0.4, 0.4))
@@ -85,7 +85,7 @@ def pallets(rng: np.random.Generator) -> list[Part]:
 
 
 def chain_link(length_m: float, *, height_m: float = 2.2) -> list[Part]:
-    """Wire netting along x on posts with outriggers and barbed wire: wires thick enough to be seen."""
+    """Makes wire netting along x on posts with outriggers and barbed wire; the wires are thick enough to be visible."""
     sink = Sink("fence")
     half, wire = length_m / 2, 0.006
     count = max(1, round(length_m / 3.0))

@@ -1,4 +1,4 @@
-"""Foliage: lumpy masses with a leafy texture inside, and sprays of leaves, geometry too, that stand out of them."""
+"""Foliage: dented masses with a texture of leaves, and sprays of leaves around them, which are geometry, too."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 
 TRIALS = 4
 HIDDEN = 0.85
-"""What lies deeper than this share of another mass's radius is in it."""
+"""Share of the radius of a mass; points that lie deeper than this in another mass count as inside it."""
 
 
 def lump(
@@ -28,19 +28,19 @@ def lump(
     detail: int,
     rng: np.random.Generator,
 ) -> Array:
-    """One mass of foliage: a dented ball that is shaded as a part of the crown around `around`; returns its faces.
+    """Adds one mass of foliage: a dented ellipsoid that is shaded as a part of the crown around `around`.
 
     Args:
-        sink: takes the faces.
+        sink: collects the faces.
         material: a foliage material.
-        centre: (3,) of the mass.
-        radii_m: (3,) half extents.
-        around: (3,) the crown's middle: normals lean away from it, so that the crown is lit as one.
-        detail: subdivisions of an icosahedron: 0 is 20 faces, 1 is 80.
-        rng: dents it.
+        centre: (3,) centre of the mass, metres.
+        radii_m: (3,) half extents, metres.
+        around: (3,) middle of the crown; normals point away from it, so that the crown is shaded as a whole.
+        detail: subdivisions of an icosahedron: 0 gives 20 faces, 1 gives 80.
+        rng: random generator of the dents.
 
     Returns:
-        (F, 3, 3) the corners of the faces.
+        (F, 3, 3) corners of the faces.
     """
     ball = trimesh.creation.icosphere(subdivisions=detail)
     unit = np.asarray(ball.vertices, np.float64)
@@ -69,15 +69,16 @@ def lump(
 def on_masses(
     masses: Sequence[Array], centres: Array, radii_m: Array, *, count: int, around: Array, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """Where sprays grow on foliage masses that overlap: spread evenly over what is seen of them from outside.
+    """Draws the places of sprays on overlapping masses of foliage, evenly over the surface that is visible from
+    outside.
 
     Args:
-        masses: (F, 3, 3) the faces of each, as `lump` returns them.
-        centres: (K, 3) of the masses.
-        radii_m: (K, 3) half extents of the masses.
-        count: points in all.
-        around: (3,) the middle of the crown.
-        rng: chooses them.
+        masses: (F, 3, 3) faces of each mass, as `lump` returns them.
+        centres: (K, 3) centres of the masses, metres.
+        radii_m: (K, 3) half extents of the masses, metres.
+        count: number of points.
+        around: (3,) middle of the crown.
+        rng: random generator of the places.
 
     Returns:
         (count, 3) points on the faces, and (count, 3) unit vectors away from mass and crown.
@@ -109,17 +110,17 @@ def scatter_leaves(
     lift: float = 1.0,
     breadth: float = 1.0,
 ) -> None:
-    """Sprays of leaves on foliage masses: one pointed triangle each, seen from both sides, with leaves drawn on it.
+    """Adds sprays of leaves: each is one pointed triangle, visible from both sides, with a texture of leaves.
 
     Args:
-        sink: takes the faces.
+        sink: collects the faces.
         material: a foliage material.
-        feet: (N, 3) where they grow.
+        feet: (N, 3) places where the sprays begin, metres.
         outward: (N, 3) unit vectors out of the foliage.
-        length_m: of a spray; the texture keeps its own scale, so that a long spray shows several leaves.
-        rng: turns them.
-        lift: how much of the way out sprays keep: at 0 they lie on their mass like shingles, at 1 they stand off it.
-        breadth: of a spray, 1 for a slender one.
+        length_m: length of a spray in metres; the texture keeps its own scale, so a long spray shows several leaves.
+        rng: random generator of the directions.
+        lift: 0 for sprays that lie flat on their mass, 1 for sprays that point straight out of it.
+        breadth: factor on the width of a spray; 1 for a slender one.
     """
     count = len(feet)
     along = _unit(_unit(rng.normal(size=(count, 3))) + 0.75 * outward - (0, 0, 0.25))

@@ -22,18 +22,18 @@ from authoring.materials.atlas import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WindowStyle:
-    """How a style's windows are made.
+    """The windows of an architectural style.
 
     Attributes:
         kind: row of the window atlas.
-        width_m, height_m: of the opening.
-        sill_m: above the floor.
-        recess_m: how deep the glass sits behind the wall.
+        width_m, height_m: size of the opening, metres.
+        sill_m: height of the sill above the floor, metres.
+        recess_m: distance of the glass behind the face of the wall, metres.
         reveal: material of the cheeks.
-        surround: a frame on the wall around the opening, None for none.
-        lintel: a beam over it, None for none.
-        ledge: the sill's swatch, None for none.
-        shutters: swatch of open shutters beside it, None for none.
+        surround: material of a frame on the wall around the opening; None for no frame.
+        lintel: material of a beam above the opening; None for no beam.
+        ledge: swatch of the sill; None for no sill.
+        shutters: swatch of open shutters beside the opening; None for no shutters.
     """
 
     kind: str
@@ -49,7 +49,7 @@ class WindowStyle:
 
 
 def window(facade: Facade, opening: Opening, style: WindowStyle, *, rng: np.random.Generator) -> None:
-    """One window: cheeks, pane, sill, and what the style adds around it."""
+    """Adds one window: cheeks, pane, sill, and the frame, beam and shutters of its style."""
     o = opening
     facade.reveal(style.reveal, o, style.recess_m, skip="s" if style.ledge else "")
     rect = window_rect(style.kind, int(rng.integers(WINDOW_COLUMNS)))
@@ -73,7 +73,7 @@ def window(facade: Facade, opening: Opening, style: WindowStyle, *, rng: np.rand
 
 
 def door(facade: Facade, opening: Opening, name: str, *, surround: str, recess_m: float = 0.35) -> None:
-    """An entrance: recessed door, frame, step and a small canopy where the door is a glass one."""
+    """Adds an entrance: a recessed door, a frame, a step, and a small canopy above a glass door."""
     o = opening
     facade.reveal(surround, o, recess_m)
     facade.picture("shop_fronts", door_rect(name), o.u0, o.v0, o.u1, o.v1, d_m=-recess_m)
@@ -97,10 +97,10 @@ def shop_front(
     awning: int | None,
     rng: np.random.Generator,
 ) -> Opening:
-    """A shop between two piers: stall riser, windows, door, fascia with a sign, awning or blade sign.
+    """Adds the front of a shop between two piers: stall riser, windows, door, fascia with a sign, awning or blade sign.
 
     Returns:
-        the hole that the wall has to leave for it.
+        The opening that the wall must leave.
     """
     fascia_m, riser_m, recess_m = 0.62, 0.45, 0.22
     top = height_m - fascia_m
@@ -142,7 +142,7 @@ def shop_front(
 
 
 def balcony(facade: Facade, u0: float, u1: float, v: float, depth_m: float, *, railing: str, slab: str) -> None:
-    """A slab with a railing: `bars`, `glass` or `solid`."""
+    """Adds a slab with a railing: `bars`, `glass` or `solid`."""
     facade.box(slab, (u0, u1), (v - 0.18, v), (0.0, depth_m), skip="b")
     height, d0, d1 = 1.05, depth_m - 0.06, depth_m - 0.02
     if railing == "solid":
@@ -168,7 +168,7 @@ def balcony(facade: Facade, u0: float, u1: float, v: float, depth_m: float, *, r
 
 
 def _bar(facade: Facade, u: float, d: float, v0: float, v1: float) -> None:
-    """A square bar that shows the street an edge: two faces, where a flat front would need three."""
+    """Adds a square bar with an edge towards the street; two faces are visible, and a flat front would need three."""
     half = 0.0127
     left, tip, right = ((u - half, d), (u, d + half), (u + half, d))
     for (ua, da), (ub, db) in ((left, tip), (tip, right)):

@@ -1,4 +1,4 @@
-"""What a generator hands out: meshes sorted by material and label, and the sink that collects them."""
+"""The result of a generator: meshes by material and label, and the sink that collects them."""
 
 from __future__ import annotations
 

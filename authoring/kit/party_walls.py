@@ -1,4 +1,4 @@
-"""Party walls: sides without a street, on which a town leaves its traces once the neighbour is lower or gone."""
+"""Party walls: sides without a street, which are visible where the neighbour is lower or missing."""
 
 from __future__ import annotations
 
@@ -35,16 +35,17 @@ def party_wall(
     covered_m: float,
     rng: np.random.Generator,
 ) -> None:
-    """A wall with flues, a few small or blind windows, and perhaps an advert or the outline of a house that was there.
+    """Adds a wall with flues, a few small or bricked-up windows, and perhaps an advert or the outline of a demolished
+    house.
 
     Args:
-        facade: the side.
-        style: of the building.
-        floors: storeys, the ground floor included.
-        top_m: height of the walls.
-        ridge_m: how far the roof or its parapet rises over them here.
-        covered_m: up to where a neighbour stands before it.
-        rng: decides which details the wall has.
+        facade: the side of the building.
+        style: style of the building.
+        floors: number of storeys with the ground floor.
+        top_m: height of the walls, metres.
+        ridge_m: height of the roof or its parapet above the walls on this side, metres.
+        covered_m: height up to which a neighbour hides the wall, metres.
+        rng: random generator of the details.
     """
     width = facade.width_m
     kind = str(rng.choice(["house", "advert", "render", "plain"], p=[0.3, 0.2, 0.3, 0.2]))
@@ -80,7 +81,7 @@ def party_wall(
 def _windows(
     width: float, style: Style, floors: int, taken: list[Box], *, rng: np.random.Generator
 ) -> tuple[list[Opening], list[Opening]]:
-    """Windows of stairs and bathrooms one over another, and which of them have been walled up."""
+    """Draws columns of windows of stairs and bathrooms, and which of these windows are bricked up."""
     openings: list[Opening] = []
     blind: list[Opening] = []
     columns = np.arange(1.7, width - 1.6, 3.4)
@@ -105,7 +106,9 @@ def _windows(
 def _flue(
     facade: Facade, wall: str, top_m: float, ridge_m: float, taken: list[Box], *, rng: np.random.Generator
 ) -> Box:
-    """A chimney breast up the wall, drawn in above the roof to a stack with pots; returns what it covers."""
+    """Adds a chimney breast that ends above the roof in a stack with pots, and returns the part of the wall that it
+    covers.
+    """
     half, deep = FLUE_M[0] / 2, FLUE_M[1]
     material = wall if wall not in ("ashlar", "concrete") and rng.random() < 0.7 else "brick_red"
     middle = facade.width_m * float(rng.choice([0.28, 0.5, 0.7]))
@@ -123,7 +126,9 @@ def _flue(
 
 
 def _former_house(facade: Facade, render: str, top_m: float, *, rng: np.random.Generator) -> Box:
-    """What a lower house has left: its rooms' plaster under the line of its roof, its floors, its fireplaces."""
+    """Adds the traces of a lower house: the plaster of its rooms below the line of its roof, its floors, its
+    fireplaces.
+    """
     wide = min(float(rng.uniform(6.5, 8.5)), facade.width_m - 0.6)
     left = 0.3 if rng.random() < 0.5 else facade.width_m - 0.3 - wide
     eave = min(float(rng.uniform(4.6, 6.6)), top_m - 4.0)
@@ -143,7 +148,7 @@ def _former_house(facade: Facade, render: str, top_m: float, *, rng: np.random.G
 
 
 def _advert(facade: Facade, top_m: float, *, rng: np.random.Generator) -> Box:
-    """A mural high on the wall, or a painted advert: a field with a frame, an emblem and a name."""
+    """Adds a mural high on the wall, or a painted advert: a field with a frame, an emblem and a name."""
     if rng.random() < 0.5:
         high = min(facade.width_m - 1.6, (top_m - 4.0) / 1.5) * 1.5
         wide = min(high, 9.5) / 1.5
@@ -167,7 +172,7 @@ def _advert(facade: Facade, top_m: float, *, rng: np.random.Generator) -> Box:
 
 
 def _ties(facade: Facade, style: Style, floors: int, taken: list[Box]) -> None:
-    """Iron plates at the ends of the rods that hold floors and wall together."""
+    """Adds iron plates at the ends of the rods that hold floors and wall together."""
     for floor in range(1, floors):
         v = style.ground_m + (floor - 1) * style.floor_m
         for u in np.arange(0.9, facade.width_m - 0.6, 3.6):
@@ -178,7 +183,9 @@ def _ties(facade: Facade, style: Style, floors: int, taken: list[Box]) -> None:
 
 
 def _field(facade: Facade, material: str, outline: list[tuple[float, float]], d_m: float) -> None:
-    """A convex polygon of (u, v) on the wall, counter-clockwise from outside, of a tiling material or a swatch."""
+    """Adds a convex polygon of (u, v) points on the wall, counter-clockwise as seen from outside, of a tiling material
+    or a swatch.
+    """
     corners = np.stack([facade.at(u, v, d_m) for u, v in outline])
     if material in MATERIALS:
         offset = float(facade.origin @ facade.right)

@@ -122,7 +122,7 @@ def planter(kind: str, rng: np.random.Generator) -> list[Part]:
 
 
 def _hedge_leaves(sink: Sink, length_m: float, height_m: float, depth_m: float, rng: np.random.Generator) -> None:
-    """Leaves all over a clipped box, thickest along its top."""
+    """Adds leaves on all faces of a clipped box, most of them along its top."""
     count = int(length_m * (2 * height_m + depth_m) * 55)
     half = np.array([length_m / 2, depth_m / 2, height_m / 2])
     at = rng.uniform(-1, 1, (count, 3)) * (half - 0.03)

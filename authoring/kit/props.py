@@ -32,7 +32,7 @@ SIGNS = ("stop", "yield", "priority", "no_entry", "speed_30", "speed_50", "one_w
 
 
 def _makers() -> dict[str, Maker]:
-    """Every prop by its file's name."""
+    """Returns the generator of every prop, by the name of its file."""
     makers: dict[str, Maker] = {
         "bench_wood": lambda rng: bench(),
         "bench_stone": lambda rng: bench(style="stone"),
@@ -117,7 +117,7 @@ def write_prop(name: str, folder: Path) -> None:
 
 
 def _solid(parts: list[Part]) -> tuple[Array, Array]:
-    """Centre and half size of the box around what can be bumped into: of a tree its trunk, not its crown."""
+    """Returns centre and half size of the box around the solid parts: the trunk of a tree, but not its crown."""
     hard = [p for p in parts if not p.material.startswith("foliage")] or parts
     points = np.concatenate([part.mesh.vertices for part in hard])
     low_points = points[points[:, 2] < REACH_M]

@@ -1,4 +1,4 @@
-"""What closes a building at the top: flat roofs with their machinery, slate mansards, gables."""
+"""Roofs of buildings: flat roofs with their machinery, slate mansards, gable roofs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def flat_roof(
     parapet_m: float = 0.7,
     thickness_m: float = 0.25,
 ) -> None:
-    """Gravel behind a parapet whose outer face continues the wall."""
+    """Adds a flat roof of gravel behind a parapet whose outer face continues the wall."""
     belt(sink, wall, width_m, depth_m, [(0.0, top_m), (0.0, top_m + parapet_m)])
     sheet(sink, wall, width_m, depth_m, top_m - 0.3, top_m + parapet_m + 0.08)
     cap = 0.05
@@ -53,7 +53,7 @@ def flat_roof(
 def roof_machinery(
     sink: Sink, width_m: float, depth_m: float, top_m: float, *, rng: np.random.Generator, water_tank: bool = False
 ) -> None:
-    """Stair head, air conditioners, ducts, chimneys, aerials, perhaps a wooden water tank."""
+    """Adds stair head, air conditioners, ducts, chimneys, aerials, and perhaps a wooden water tank."""
     half_w, half_d = width_m / 2 - 1.2, depth_m / 2 - 1.2
     if half_w < 1.5 or half_d < 1.5:
         return
@@ -118,7 +118,7 @@ def mansard(
     rng: np.random.Generator,
     height_m: float = 3.0,
 ) -> None:
-    """A steep slate roof with dormers towards the streets, chimneys on the ridge walls."""
+    """Adds a steep slate roof with dormers towards the streets and chimneys on the walls at the ends."""
     lean = 0.9
     for side, wall in facades(sink, width_m, depth_m).items():
         low = [wall.at(0, top_m), wall.at(wall.width_m, top_m)]
@@ -145,7 +145,7 @@ def mansard(
 
 
 def gable_roof(sink: Sink, width_m: float, depth_m: float, top_m: float, *, wall: str, rise_m: float) -> None:
-    """Tiles sloping to the front and the back, triangles of wall at the ends."""
+    """Adds two slopes of tiles to the front and the back, and triangles of wall at the ends."""
     eave = 0.35
     x, y = width_m / 2, depth_m / 2
     low = top_m - rise_m * eave / y
@@ -163,7 +163,7 @@ def gable_roof(sink: Sink, width_m: float, depth_m: float, top_m: float, *, wall
 
 
 def chimneys(sink: Sink, width_m: float, depth_m: float, top_m: float, *, rng: np.random.Generator) -> None:
-    """One or two brick stacks with clay pots."""
+    """Adds one or two chimneys of brick with clay pots."""
     for sign in (-1, 1)[: int(rng.integers(1, 3))]:
         x, y = sign * (width_m / 2 - 1.3), float(rng.uniform(-0.2, 0.4)) * depth_m
         low = top_m - 1.2

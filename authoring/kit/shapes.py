@@ -1,4 +1,4 @@
-"""Round things in palette colours: cylinders, tubes along a path, domes, discs."""
+"""Round shapes in palette colours: cylinders, tubes along a path, domes, discs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def cylinder(
     cap: bool = True,
     label: str | None = None,
 ) -> None:
-    """An upright cylinder or cone frustum that stands on `foot`; `cap` closes its top."""
+    """Adds an upright cylinder or cone frustum that stands on `foot`; `cap` closes its top."""
     x, y, z = foot
     tube(
         sink,
@@ -49,7 +49,9 @@ def cylinder(
 def turned(
     sink: Sink, swatch: str, profile: Sequence[tuple[float, float]], *, segments: int = 12, label: str | None = None
 ) -> None:
-    """A profile of (radius, height) points turned about z, its outside to the right of its course upwards."""
+    """Adds the surface of revolution of a profile of (radius, height) points about z; with the profile from below
+    upwards, the outside is on its right.
+    """
     angle = np.arange(segments) * 2 * np.pi / segments
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(segments)], 1)
     for (r0, z0), (r1, z1) in itertools.pairwise(profile):
@@ -90,7 +92,7 @@ def tube(
     caps: bool = False,
     label: str | None = None,
 ) -> None:
-    """A round tube along a path (K, 3), smooth around, its ring kept from twisting."""
+    """Adds a round tube along a path (K, 3), with smooth normals and without twist."""
     rings, normals = sweep(path, radii_m, segments=segments)
     sink.swatch_mesh(
         swatch, rings.reshape(-1, 3), ring_faces(len(rings), segments), normals.reshape(-1, 3), label=label
@@ -109,7 +111,7 @@ def tube(
 def sweep(
     path: Sequence[Sequence[float]] | Array, radii_m: Sequence[float] | Array | float, *, segments: int
 ) -> tuple[Array, Array]:
-    """Rings (K, segments, 3) around a path (K, 3) and their outward unit normals."""
+    """Returns rings of points (K, segments, 3) around a path (K, 3), and their outward unit normals."""
     points = np.asarray(path, np.float64)
     radii = np.broadcast_to(np.asarray(radii_m, np.float64), (len(points),))
     tangents = np.gradient(points, axis=0)
@@ -130,7 +132,7 @@ def sweep(
 
 
 def ring_faces(rings: int, segments: int) -> npt.NDArray[np.int64]:
-    """Faces between consecutive rings of `segments` vertices."""
+    """Returns the faces between consecutive rings of `segments` vertices."""
     ring, step = np.meshgrid(np.arange(rings - 1), np.arange(segments), indexing="ij")
     a = ring * segments + step
     b = ring * segments + (step + 1) % segments
@@ -151,7 +153,7 @@ def dome(
     rings: int = 4,
     label: str | None = None,
 ) -> None:
-    """The upper half of an ellipsoid (a cone with one ring) on `centre`."""
+    """Adds the upper half of an ellipsoid (a cone with one ring) on `centre`."""
     angle = np.arange(segments) * 2 * np.pi / segments
     vertices: list[Array] = []
     for ring in range(rings):

@@ -130,7 +130,7 @@ def _walker(sink: Sink, centre: Sequence[float], name: str) -> None:
 
 
 def _visor(sink: Sink, centre: Sequence[float]) -> None:
-    """A hood over the upper three quarters of a lens, seen from in- and outside."""
+    """Adds a hood around the upper three quarters of a lens, with its inner and outer faces."""
     angle = np.radians(np.linspace(-35, 215, 11))
     circle = np.stack([np.cos(angle), np.zeros(11), np.sin(angle)], 1)
     rear = circle * (LENS_M + 0.015) + centre

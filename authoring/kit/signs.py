@@ -19,7 +19,7 @@ def _ring(sides: int, first_deg: float) -> Array:
 
 
 def _rounded_triangle(corners: list[tuple[float, float]]) -> Array:
-    """A triangle whose tips are cut round, as sheet metal is."""
+    """Returns the outline of a triangle with rounded corners."""
     tips = np.asarray(corners)
     centre = tips.mean(0)
     angle = np.radians((-50, 0, 50))
@@ -49,18 +49,18 @@ OUTLINES: dict[str, tuple[Array, float]] = {
 
 
 BACK = "traffic_sign_back"
-"""Of rims and backs: only the side that says something is a traffic sign, as we understand Cityscapes' classes."""
+"""Label of rims and backs; in the classes of Cityscapes, only the printed side is a traffic sign."""
 
 
 def traffic_sign(*names: str, post_m: float = 2.2) -> list[Part]:
-    """A post with one sign, or several from the top down, faces towards -y.
+    """Makes a post with one sign, or with several signs from the top downwards, which face -y.
 
     Args:
-        names: of `authoring.materials.atlas.TRAFFIC_SIGNS`.
-        post_m: height of the lowest sign's lower edge above the ground.
+        names: names of signs in `authoring.materials.atlas.TRAFFIC_SIGNS`.
+        post_m: height of the lower edge of the lowest sign above the ground, metres.
 
     Returns:
-        the post (label pole), the signs (label traffic_sign, or stop_sign for the octagon), their backs.
+        The post (label `pole`), the signs (label `traffic_sign`, or `stop_sign` for the octagon) and their backs.
     """
     unknown = sorted(set(names) - set(TRAFFIC_SIGNS))
     if unknown or not names:
@@ -102,7 +102,7 @@ def _plate(
     flip: int = 1,
     back: bool = True,
 ) -> None:
-    """One plate: picture, rim and grey back. Only the picture is a sign: see `BACK`."""
+    """Adds one plate: picture, rim and grey back. Only the picture has the label of a sign (see `BACK`)."""
     label = "stop_sign" if name == "stop" else "traffic_sign"
     u0, v0, u1, v1 = traffic_sign_rect(name)
     uvs = np.array([(u0 + u1) / 2, (v0 + v1) / 2]) + outline * ((u1 - u0) / 2, (v1 - v0) / 2)

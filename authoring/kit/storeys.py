@@ -29,7 +29,7 @@ def storeyed_building(
     rng: np.random.Generator,
     covered_m: Mapping[str, float] | None = None,
 ) -> None:
-    """Walls, windows, ground floor, ornament and roof of one building; see `building` for what they are made from."""
+    """Adds walls, windows, ground floor, ornament and roof of one building; the arguments are those of `building`."""
     top_m, low_m = style.ground_m + (floors - 1) * style.floor_m, covered_m or {}
     for side, facade in facades(sink, width_m, depth_m).items():
         if side in sides:
@@ -52,14 +52,14 @@ def storeyed_building(
 
 
 def _ridge_m(style: Style, depth_m: float) -> float:
-    """How far the roof rises over the walls where it meets a party wall."""
+    """Returns the height of the roof above the walls at a party wall, metres."""
     if style.roof == "mansard":
         return 3.0
     return min(3.6, depth_m * 0.3) if style.roof == "gable" and depth_m < 16 else 0.8
 
 
 def bays(width_m: float, bay_m: float, margin_m: float) -> list[float]:
-    """The centres of as many bays as fit, spread evenly."""
+    """Returns the centres of as many bays as fit into a facade, evenly spaced, metres from its left end."""
     usable = width_m - 2 * margin_m
     count = max(1, int(usable / bay_m))
     pitch = usable / count
@@ -122,7 +122,7 @@ def _street_side(
 
 
 def _bay_kinds(style: Style, count: int, floors: int, pitch: float, *, rng: np.random.Generator) -> list[str]:
-    """What each column of windows is: plain, or with balconies, an oriel, a fire escape."""
+    """Draws the kind of each column of windows: plain, with balconies, with an oriel, or with a fire escape."""
     kinds = ["balcony" if rng.random() < style.balconies else "plain" for _ in range(count)]
     if style.oriels and floors > 2 and pitch > 2.2:
         for index in range(int(rng.integers(0, 2)), count, int(rng.integers(2, 4))):
@@ -141,7 +141,7 @@ def _window_extras(facade: Facade, opening: Opening, style: Style, *, rng: np.ra
 
 
 def _pilaster(facade: Facade, u: float, style: Style, top_m: float) -> None:
-    """A flat column from the first floor to the cornice, with base and capital."""
+    """Adds a flat column from the first floor to the cornice, with base and capital."""
     low = style.ground_m + 0.1
     facade.box(style.trim, (u - 0.2, u + 0.2), (low + 0.35, top_m - 0.3), (0.0, 0.07), skip="but")
     facade.box(style.trim, (u - 0.26, u + 0.26), (low, low + 0.35), (0.0, 0.11), skip="b")
@@ -149,7 +149,7 @@ def _pilaster(facade: Facade, u: float, style: Style, top_m: float) -> None:
 
 
 def _plain_side(facade: Facade, style: Style, floors: int, top_m: float, *, rng: np.random.Generator) -> None:
-    """A courtyard side: few windows, no ornament."""
+    """Adds a side towards a courtyard, with few windows and no ornament."""
     width = facade.width_m
     openings = []
     if width > 8 and rng.random() < 0.7:

@@ -1,4 +1,4 @@
-"""What distinguishes the architectural styles: storey heights, walls, windows, ornament, ground floors, roofs."""
+"""The architectural styles of buildings: storey heights, walls, windows, ornament, ground floors, roofs."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from authoring.kit.openings import WindowStyle
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Style:
-    """One building's choices, drawn from its style's family.
+    """The features of one building, drawn at random for its style.
 
     Attributes:
         wall, base: tiling materials of the upper floors and of the ground floor.
         trim: swatch or material of belts, copings and cornices.
-        floor_m, ground_m: storey heights.
-        bay_m: wished spacing of the windows.
-        window: how windows are made.
+        floor_m, ground_m: heights of an upper storey and of the ground floor, metres.
+        bay_m: preferred distance between the windows, metres.
+        window: style of the windows.
         cornice: `none`, `simple`, `bracket` or `classic`.
-        string_courses: a belt at every floor, at the first floor only, or nowhere: `all`, `first`, `none`.
+        string_courses: floors with a belt: `all`, `first` or `none`.
         roof: `flat`, `mansard` or `gable`.
         ground: `homes`, `shops`, `lobby` or `dock`.
-        balconies: share of bays with a balcony, and what railing they have.
+        balconies: share of bays with a balcony, and the kind of their railing.
         door: name of the entrance door.
-        quoins: blocks of trim up the corners.
-        water_tank: a wooden one on the roof.
-        fins: vertical fins between the bays.
-        pilasters: flat columns between the bays.
-        oriels: bay windows through all upper floors; else `escapes`: a fire escape on one bay.
-        downpipes: at both ends of the facade.
+        quoins: whether the corners have blocks of trim.
+        water_tank: whether a wooden water tank stands on the roof.
+        fins: whether there are vertical fins between the bays.
+        pilasters: whether there are flat columns between the bays.
+        oriels: whether bay windows go through all upper floors; otherwise `escapes` adds a fire escape to one bay.
+        downpipes: whether there are rain pipes at both ends of the facade.
         clutter: share of windows with an air conditioner or a flower box.
     """
 

@@ -17,19 +17,19 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Species:
-    """A tree's habit, lengths as shares of its height.
+    """The shape of a kind of tree; lengths are shares of its height.
 
     Attributes:
         foliage: material of the leaves.
-        crown: half extents of the crown (across, up).
-        centre: height of the crown's middle.
-        boughs: limbs with foliage of their own; of a conifer, whorls of them.
-        bough: radius of the foliage on one.
-        leaves: sprays of leaves on a near tree.
-        leaf_m: length of a spray on a tree of 8 m.
-        trunk: radius at the foot.
-        taper: how much the crown narrows upwards: 0 ellipsoid, 1 cone.
-        upright: height of a mass of foliage over its breadth.
+        crown: half the width and half the height of the crown.
+        centre: height of the middle of the crown.
+        boughs: number of limbs with foliage of their own; for a conifer, number of whorls.
+        bough: radius of the foliage on a limb.
+        leaves: number of sprays of leaves on a near tree.
+        leaf_m: length of a spray on a tree of 8 m, metres.
+        trunk: radius of the trunk at the ground.
+        taper: degree to which the crown narrows upwards: 0 for an ellipsoid, 1 for a cone.
+        upright: height of a mass of foliage divided by its width.
     """
 
     foliage: str
@@ -103,11 +103,11 @@ SPECIES: dict[str, Species] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layer:
-    """A part of a crown's sprays.
+    """A part of the sprays of a crown.
 
     Attributes:
-        share: of the habit's number of leaves.
-        size: of the habit's spray.
+        share: share of the species' number of sprays.
+        size: factor on the species' length of a spray.
         lift, breadth: as `scatter_leaves` takes them.
     """
 
@@ -124,17 +124,18 @@ NEAR = (
     Layer(share=0.75, size=0.8, lift=1.0, breadth=0.9),
 )
 FAR = (Layer(share=0.06, size=2.1, lift=0.6, breadth=1.3),)
-"""Shingles that cover the masses, and small sprays that make the outline; from afar a few large ones do."""
+"""Layers by level of detail: flat sprays that cover the masses and small ones at the outline; from afar few large ones.
+"""
 
 
 def tree(species: str, height_m: float, rng: np.random.Generator, *, lod: str = "near") -> list[Part]:
-    """One tree on the ground at the origin, all of it labelled vegetation.
+    """Makes one tree on the ground at the origin; all its parts have the label `vegetation`.
 
     Args:
-        species: of `SPECIES`.
-        height_m: to the top of the crown, at least 2.
-        rng: decides branches and leaves.
-        lod: `near` for about 3 to 4 thousand triangles, `far` for about 300.
+        species: a key of `SPECIES`.
+        height_m: height of the top of the crown in metres, at least 2.
+        rng: random generator of branches and leaves.
+        lod: level of detail: `near` for about 3 to 4 thousand triangles, `far` for about 300.
     """
     if species not in SPECIES:
         raise ValueError(f"no tree species named {species!r}; there are {', '.join(SPECIES)}")
@@ -171,7 +172,7 @@ def tree(species: str, height_m: float, rng: np.random.Generator, *, lod: str = 
 
 
 def _crown(habit: Species, height_m: float, rng: np.random.Generator, *, near: bool) -> Crown:
-    """The crown's masses; far trees have one where near ones have a handful."""
+    """Draws the masses of a crown; a far tree has one mass per bough, a near tree several."""
     across, rise, middle = habit.crown[0] * height_m, habit.crown[1] * height_m, habit.centre * height_m
     if habit.taper == 1.0:
         return tiered(across, rise, middle, tiers=habit.boughs if near else 4, masses=4 if near else 2, rng=rng)
@@ -189,7 +190,9 @@ def _crown(habit: Species, height_m: float, rng: np.random.Generator, *, near: b
 
 
 def _wood(sink: Sink, habit: Species, height_m: float, tips: Array, *, near: bool, rng: np.random.Generator) -> None:
-    """Trunk and limbs; the trunk of a near tree continues in the topmost bough, and limbs leave it below the crown."""
+    """Adds trunk and limbs; the trunk of a near tree continues in the topmost bough, and limbs branch off below the
+    crown.
+    """
     top = tips[-1, 2] if near else habit.centre * height_m
     levels = np.array([0.0, 0.04, 0.3, 0.62, 1.0]) if near else np.array([0.0, 1.0])
     sway = rng.uniform(-1, 1, (len(levels), 2)) * habit.trunk * height_m * np.minimum(levels * 3, 1)[:, None]

@@ -1,4 +1,4 @@
-"""The body: stations of every limb, and the parts of it that can be seen bare. Garments are the same limbs, larger."""
+"""The body: stations (cross-sections) of every limb, and its bare parts. Garments are the same limbs, enlarged."""
 
 from __future__ import annotations
 
@@ -75,14 +75,16 @@ SHIN: list[Station] = [
 def sized(
     stations: Sequence[Station], build: Build, *, girth: float = 1.0, ease: float = 0.0, length: float = 1.0
 ) -> list[Station]:
-    """Stations of a build: all by its height, girths by a factor too, then `ease` metres all around."""
+    """Returns the stations of a build: scaled by its height, in girth also by a factor, and enlarged by `ease` metres."""
     s = build.scale
     wide = s * girth
     return [(z * s * length, x * wide, y * wide, d * wide + ease, w * wide + ease) for z, x, y, d, w in stations]
 
 
 def torso(skeleton: Skeleton, *, ease: Sequence[float], folds: Sequence[Fold] = (), low: float = -0.085) -> Field:
-    """Pelvis and chest with cloth `ease` metres around (hips, waist, chest, shoulders); `low` is its lowest station."""
+    """Returns the field of pelvis and chest, with cloth `ease` metres around (hips, waist, chest, shoulders); `low` is
+    its lowest station.
+    """
     build = skeleton.build
     hips, waist, chest, shoulders = ease
     lower = [row for row in PELVIS if row[0] >= low]
@@ -128,7 +130,9 @@ def _widened(stations: Sequence[Station], build: Build, marks: Sequence[tuple[fl
 
 
 def arm_field(skeleton: Skeleton, side: str, *, ease: Sequence[float] = (0.0, 0.0, 0.0), folds: bool = False) -> Field:
-    """Upper arm and forearm with `ease` at shoulder, elbow and wrist; `folds` wrinkle the elbow."""
+    """Returns the field of upper arm and forearm, enlarged by `ease` metres at shoulder, elbow and wrist; `folds` are
+    the wrinkles at the elbow.
+    """
     build = skeleton.build
     shoulder, elbow, wrist = ease
     upper = sized(UPPER_ARM, build, girth=build.limbs)
@@ -159,7 +163,9 @@ def leg_field(
     folds: float = 0.0,
     past_ankle_m: float = 0.0,
 ) -> Field:
-    """Thigh and shin with `ease` at hip, knee and ankle; `folds` metres of wrinkles; cloth may reach past the ankle."""
+    """Returns the field of thigh and shin, enlarged by `ease` metres at hip, knee and ankle, with wrinkles of `folds`
+    metres; cloth may reach `past_ankle_m` below the ankle.
+    """
     build = skeleton.build
     hip, knee, ankle = ease
     girth = build.limbs
@@ -187,7 +193,7 @@ def leg_field(
 
 
 def hand_field(skeleton: Skeleton, side: str) -> Field:
-    """A relaxed hand: palm, four curled fingers and a thumb."""
+    """Returns the field of a relaxed hand: palm, four curled fingers and a thumb."""
     build = skeleton.build
     k = build.scale * (0.86 if build.female else 0.95)
     inwards = -1.0 if side == "left" else 1.0
@@ -217,7 +223,7 @@ def hand_field(skeleton: Skeleton, side: str) -> Field:
 
 
 def bare_arms(skeleton: Skeleton, *, arms: bool) -> list[Piece]:
-    """Hands, and the arms above them where no sleeve covers them."""
+    """Returns the pieces of the hands, and of the arms if no sleeve covers them."""
     pieces = []
     for side in SIDES:
         hand = hand_field(skeleton, side)
@@ -235,5 +241,5 @@ def bare_arms(skeleton: Skeleton, *, arms: bool) -> list[Piece]:
 
 
 def bare_legs(skeleton: Skeleton, *, tint: str = "skin", group: str = "skin") -> list[Piece]:
-    """Legs without trousers."""
+    """Returns the pieces of bare legs."""
     return [Piece(group=group, field=leg_field(skeleton, side), faces=260, cell_m=0.013, tint=tint) for side in SIDES]

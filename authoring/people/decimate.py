@@ -1,4 +1,4 @@
-"""Fewer triangles, same shape: quadric edge collapse (Garland and Heckbert), many independent edges a round."""
+"""Reduces the number of triangles by quadric edge collapse (Garland and Heckbert), many independent edges per round."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _MIN_TURN_COS = 0.2
 
 
 def decimate(vertices: Array, faces: Faces, target: int, weight: Array | None = None) -> tuple[Array, Faces]:
-    """Collapse edges until at most `target` faces are left (or nothing can go without folding the surface).
+    """Collapses edges until at most `target` faces are left, or until every further collapse would fold the surface.
 
     Args:
-        vertices: (V, 3), a closed surface.
-        faces: (F, 3).
-        target: the number of faces wanted.
-        weight: (V,) how dear each vertex is; 1 if not given.
+        vertices: (V, 3) vertices of a closed surface.
+        faces: (F, 3) indices of the vertices of each face.
+        target: largest number of faces of the result.
+        weight: (V,) factors on the error at each vertex; 1 if not given.
     """
     weights = np.ones(len(vertices)) if weight is None else weight.copy()
     quadrics = _quadrics(vertices, faces, weights)
@@ -88,7 +88,7 @@ def _best_places(vertices: Array, quadrics: Array, edges: Faces) -> tuple[Array,
 
 
 def _independent(edges: Faces, cost: Array, count: int) -> Faces:
-    """Edges that are cheapest within two rings of themselves, so that no face is touched twice."""
+    """Returns edges with the smallest cost within two rings of neighbours, so that no face is changed twice."""
     rank = np.empty(len(edges))
     rank[np.argsort(cost, kind="stable")] = np.arange(len(edges))
     nearest = np.full(count, np.inf)
@@ -104,7 +104,7 @@ def _independent(edges: Faces, cost: Array, count: int) -> Faces:
 def _keeps_the_surface(
     vertices: Array, faces: Faces, edges: Faces, chosen: Faces, place: Array
 ) -> npt.NDArray[np.bool_]:
-    """Whether each chosen collapse keeps the surface closed and turns no face over."""
+    """Returns whether each chosen collapse keeps the surface closed and turns no face over."""
     count = len(vertices)
     ends = np.concatenate([edges, edges[:, ::-1]])
     near = sparse.csr_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))

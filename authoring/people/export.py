@@ -1,4 +1,4 @@
-"""People as MJCF: one file a pose, with its meshes and textures in the person's folder."""
+"""Writes people as MJCF: one file per pose, with meshes and textures in the folder of the person."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ _CAPSULE_RADIUS_M = 0.27
 
 
 def person_xml(person: Person, pose: Pose, groups: Iterable[str], key_points: KeyPoints) -> str:
-    """The MJCF text of a person in a pose that has the given groups of meshes and key points."""
+    """Returns the MJCF text of a person in a pose, with the given groups of meshes and key points."""
     groups = list(groups)
     classes = sorted({f"person.{_CLASSES.get(group, group)}" for group in groups})
     first = " ".join(f"{value:g}" for value in person.palette[0][:3])
@@ -80,7 +80,7 @@ def person_xml(person: Person, pose: Pose, groups: Iterable[str], key_points: Ke
 
 
 def write_textures(out: Path, person: Person) -> None:
-    """Write a person's two textures into their folder."""
+    """Writes the two textures of a person into the person's folder."""
     folder = out / person.name
     folder.mkdir(parents=True, exist_ok=True)
     write_atlas(folder / "cloth.png", person.atlas)
@@ -88,7 +88,7 @@ def write_textures(out: Path, person: Person) -> None:
 
 
 def write_person(out: Path, person: Person, pose: Pose) -> None:
-    """Write one pose of a person: meshes and MJCF."""
+    """Writes the meshes and the MJCF file of one pose of a person."""
     folder = out / person.name
     folder.mkdir(parents=True, exist_ok=True)
     figure = model_person(person, pose)

@@ -1,4 +1,4 @@
-"""Shoes, and what people carry."""
+"""Shoes, and the objects that people carry."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _SOLE_M = 0.026
 
 
 def _along(frame: Frame) -> Frame:
-    """The frame whose z runs along the foot and whose x is up."""
+    """Returns the frame whose z axis points along the foot and whose x axis points upwards."""
     return Frame(frame.origin, frame.figure_from_local @ np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]]))
 
 
 def shoes(skeleton: Skeleton, *, high: float = 0.0, sole_m: float = _SOLE_M) -> list[Piece]:
-    """A pair of shoes; `high` metres of shaft over the ankle make boots."""
+    """Returns a pair of shoes; `high` is the height of the shaft above the ankle in metres, as of boots."""
     return [_shoe(skeleton, side, high, sole_m) for side in SIDES]
 
 
@@ -84,7 +84,7 @@ def _shoe(skeleton: Skeleton, side: str, high: float, sole_m: float) -> Piece:
 
 
 def backpack(skeleton: Skeleton) -> list[Piece]:
-    """A rucksack with its straps."""
+    """Returns a rucksack with its straps."""
     chest, s = skeleton["chest"], skeleton.build.scale
     bag = rounded_box(chest, (-0.225 * s, 0.0, 0.15 * s), (0.092, 0.145, 0.215), 0.055)
     pocket = rounded_box(chest, (-0.315 * s, 0.0, 0.07 * s), (0.04, 0.115, 0.095), 0.03)
@@ -107,7 +107,7 @@ def backpack(skeleton: Skeleton) -> list[Piece]:
 
 
 def shoulder_bag(skeleton: Skeleton) -> list[Piece]:
-    """A handbag at the left hip with a strap over the shoulder."""
+    """Returns a handbag at the left hip with a strap over the shoulder."""
     chest, s = skeleton["chest"], skeleton.build.scale
     bag = rounded_box(chest, (-0.02, 0.235 * s, -0.12 * s), (0.135, 0.045, 0.105), 0.028)
     top = (-0.012 * s, 0.128 * s, 0.368 * s)
@@ -123,14 +123,14 @@ def shoulder_bag(skeleton: Skeleton) -> list[Piece]:
 
 
 def phone(skeleton: Skeleton) -> list[Piece]:
-    """A telephone in the right hand."""
+    """Returns a telephone in the right hand."""
     hand = skeleton["hand_right"]
     body = rounded_box(hand, (0.0, 0.022, -0.095), (0.037, 0.006, 0.076), 0.004)
     return [Piece(group="extra", field=body, faces=44, cell_m=0.006, tint="black")]
 
 
 def briefcase(skeleton: Skeleton) -> list[Piece]:
-    """A briefcase in the right hand."""
+    """Returns a briefcase in the right hand."""
     hand = skeleton["hand_right"]
     frame = Frame(hand.at(0.0, 0.0, -0.11), np.eye(3))
     case = rounded_box(frame, (0.0, 0.0, -0.19), (0.205, 0.045, 0.145), 0.012)

@@ -1,4 +1,4 @@
-"""Signed distance fields: the soft shapes that bodies and clothes are made of. Negative is inside; metres."""
+"""Signed distance fields: the shapes of bodies and clothes. Distances are in metres, and negative inside."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SAMPLES = 96
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """A bone's place: `figure_from_local` is (3, 3), its columns the bone's x (front), y (left), z (up) axes."""
+    """The frame of a bone: `figure_from_local` is (3, 3), its columns the bone's x (front), y (left), z (up) axes."""
 
     origin: Array
     figure_from_local: Array
@@ -41,7 +41,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Fold:
-    """Cloth that bunches around a place of a loft: waves along z, strongest at `z`, bent around the limb."""
+    """Wrinkles of cloth on a loft: waves along z, highest at `z`, curved around the limb."""
 
     z: float
     spread: float
@@ -58,12 +58,13 @@ def loft(
     power: float = 2.0,
     folds: Sequence[Fold] = (),
 ) -> Field:
-    """A tapered limb: ellipses (`power` 2) or rounder boxes (more) along the frame's z axis.
+    """Returns a tapered limb with cross-sections along the z axis of a frame: ellipses (`power` 2) or rounder boxes
+    (more) along the frame's z axis.
 
     Args:
-        frame: where it is.
-        stations: rows of (z, centre x, centre y, half-depth x, half-width y), in any order of z.
-        cap: how far the rounded ends reach past the lowest and the highest station.
+        frame: frame of the limb.
+        stations: rows of (z, centre x, centre y, half depth along x, half width along y), metres, in any order of z.
+        cap: length of the rounded ends beyond the lowest and the highest station, metres.
         power: the exponent of the cross section.
         folds: waves of the surface.
     """
@@ -94,7 +95,7 @@ def loft(
 
 
 def ellipsoid(frame: Frame, centre: Sequence[float], radii: Sequence[float]) -> Field:
-    """An ellipsoid in a frame's axes."""
+    """Returns an ellipsoid along the axes of a frame."""
     middle, size = np.array(centre, dtype=np.float64), np.array(radii, dtype=np.float64)
 
     def distance(points: Array) -> Array:
@@ -109,7 +110,7 @@ def ellipsoid(frame: Frame, centre: Sequence[float], radii: Sequence[float]) -> 
 def capsule(
     frame: Frame, start: Sequence[float], end: Sequence[float], radius: float, end_radius: float = 0.0
 ) -> Field:
-    """A rod with round ends; `end_radius` (if not 0) tapers it."""
+    """Returns a rod with round ends; it narrows to `end_radius` if that is not 0."""
     a, b = frame.at(*start), frame.at(*end)
     last = end_radius or radius
 
@@ -122,7 +123,7 @@ def capsule(
 
 
 def rounded_box(frame: Frame, centre: Sequence[float], half: Sequence[float], radius: float) -> Field:
-    """A box with rounded edges; `half` are its outer half sizes."""
+    """Returns a box with rounded edges; `half` are its outer half sizes."""
     middle, size = np.array(centre, dtype=np.float64), np.array(half, dtype=np.float64) - radius
 
     def distance(points: Array) -> Array:
@@ -134,7 +135,7 @@ def rounded_box(frame: Frame, centre: Sequence[float], half: Sequence[float], ra
 
 
 def below(frame: Frame, z: float, slope: Sequence[float] = (0.0, 0.0)) -> Field:
-    """The half-space under a frame's plane z = `z` + slope · (x, y)."""
+    """Returns the half-space below the plane z = `z` + slope · (x, y)."""
     normal = np.array([-slope[0], -slope[1], 1.0])
     length = float(np.linalg.norm(normal))
 
@@ -145,7 +146,7 @@ def below(frame: Frame, z: float, slope: Sequence[float] = (0.0, 0.0)) -> Field:
 
 
 def blend(fields: Sequence[Field], radius: float) -> Field:
-    """All shapes as one, their joints filled smoothly within `radius`."""
+    """Returns the union of all shapes with smooth transitions of width `radius`, metres."""
 
     def distance(points: Array) -> Array:
         result = fields[0](points)
@@ -159,7 +160,9 @@ def blend(fields: Sequence[Field], radius: float) -> Field:
 
 
 def attach(body: Field, limb: Field, joint: Array, *, radius: float, reach: float) -> Field:
-    """`limb` joined to `body` smoothly near `joint` only: a hand that hangs at a hip does not melt into it."""
+    """Returns the union of `body` and `limb`, with a smooth transition near `joint` only, so that a hand beside the hip
+    does not merge with it.
+    """
 
     def distance(points: Array) -> Array:
         a, b = body(points), limb(points)
@@ -172,7 +175,7 @@ def attach(body: Field, limb: Field, joint: Array, *, radius: float, reach: floa
 
 
 def cut(shape: Field, removed: Field, radius: float = 0.012) -> Field:
-    """`shape` without `removed`, the new edge rounded."""
+    """Returns `shape` without `removed`; the new edge is rounded with `radius`, metres."""
 
     def distance(points: Array) -> Array:
         a, b = shape(points), -removed(points)
@@ -183,7 +186,7 @@ def cut(shape: Field, removed: Field, radius: float = 0.012) -> Field:
 
 
 def union(fields: Sequence[Field]) -> Field:
-    """All shapes, unblended."""
+    """Returns the union of all shapes with sharp edges."""
 
     def distance(points: Array) -> Array:
         return np.asarray(np.minimum.reduce([field(points) for field in fields]))
@@ -192,7 +195,7 @@ def union(fields: Sequence[Field]) -> Field:
 
 
 def gradient(field: Field, points: Array, step: float = 1e-3) -> Array:
-    """(N, 3) central differences."""
+    """Returns the gradient of a field at (N, 3) points, by central differences of length `step`, metres."""
     columns = []
     for axis in np.eye(3) * step:
         columns.append(field(points + axis) - field(points - axis))

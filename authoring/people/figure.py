@@ -1,4 +1,4 @@
-"""A person in a pose: skeleton, clothes and skin become at most six meshes."""
+"""Models a person in a pose: skeleton, clothes and skin become at most six meshes."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class Person:
     """A person to model.
 
     Attributes:
-        name: of the files.
-        build: proportions.
-        face: what is painted on it; its hair colour is the hair's.
+        name: name of the files.
+        build: proportions of the body.
+        face: features that are painted on the face; its hair colour is also that of the hair.
         wear: garments, hair, shoes and bags.
-        palette: (r, g, b, weight) rows, linear albedo, of what a sample may colour.
-        colours: linear albedo of the rest by the names that the garments use.
-        poses: the poses to make.
-        bare: which limbs show skin: `arms`, `legs`.
+        palette: rows of (r, g, b, weight), linear albedo of the garment whose colour a sample draws.
+        colours: linear albedo of all other parts, by the names that the garments use.
+        poses: the poses to model.
+        bare: limbs without clothes, of `arms` and `legs`.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Person:
 
     @property
     def atlas(self) -> dict[str, Colour]:
-        """All colours of the cloth atlas by name; `paint` is white and takes the geom's colour."""
+        """All colours of the atlas of cloth by name; `paint` is white, so that it shows the colour of the geom."""
         fixed: dict[str, Colour] = {
             "paint": (1.0, 1.0, 1.0),
             "hair": self.face.hair,
@@ -66,7 +66,7 @@ def _lowest(skeleton: Skeleton, side: str) -> float:
 
 
 def stand_on_both_feet(build: Build, pose: Pose) -> Pose:
-    """Bend the knee of the longer-reaching leg until both soles touch one ground."""
+    """Returns the pose with the knee of the lower leg bent until both soles are at the same height."""
     if not pose.grounded:
         return pose
     heights = {side: _lowest(pose_skeleton(build, pose), side) for side in SIDES}
@@ -88,7 +88,7 @@ def _bent(pose: Pose, side: str, bend: float) -> Pose:
 
 
 def pieces_of(person: Person, skeleton: Skeleton) -> list[Piece]:
-    """Every piece of a posed person."""
+    """Returns all pieces of a person in a pose."""
     pieces = [head_piece(skeleton), *bare_arms(skeleton, arms="arms" in person.bare)]
     if "legs" in person.bare:
         pieces += bare_legs(skeleton)
@@ -110,7 +110,7 @@ class Figure:
     key_points: KeyPoints
 
     def translated(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Figure:
-        """The person at another place; metres."""
+        """Returns the person moved by (x, y, z) metres."""
         return Figure(
             meshes={group: mesh.translated(x, y, z) for group, mesh in self.meshes.items()},
             key_points={name: point + np.array([x, y, z]) for name, point in self.key_points.items()},
@@ -118,7 +118,7 @@ class Figure:
 
 
 def model_person(person: Person, pose: Pose) -> Figure:
-    """A person in a pose, standing on z = 0 with the pelvis over the origin."""
+    """Models a person in a pose, who stands on z = 0 with the pelvis above the origin."""
     skeleton = pose_skeleton(person.build, stand_on_both_feet(person.build, pose))
     pieces = pieces_of(person, skeleton)
     if pose.telephone:
@@ -130,7 +130,7 @@ def model_person(person: Person, pose: Pose) -> Figure:
 
 
 def meshes_of(skins: Sequence[Skin], person: Person, skeleton: Skeleton) -> dict[str, Mesh]:
-    """The meshes of the triangles of all pieces of a person, by group, in the figure's frame."""
+    """Returns the meshes of all pieces of a person, by group, in the frame of the figure."""
     head = skeleton["head"]
 
     def uv_of(skin: Skin) -> np.ndarray:

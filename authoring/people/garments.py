@@ -1,4 +1,4 @@
-"""Clothes: each garment turns a posed skeleton into pieces; its parameters are bound with `functools.partial`."""
+"""Clothes: each function returns the pieces of a garment for a posed skeleton; `functools.partial` sets its parameters."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Garment = Callable[[Skeleton], list[Piece]]
 
 
 def work_jacket(skeleton: Skeleton) -> list[Piece]:
-    """A high-visibility jacket: a loose shirt with two bright bands around it."""
+    """Returns a high-visibility jacket: a loose shirt with two bright bands around it."""
     pieces = shirt(skeleton)
     pelvis, s = skeleton["pelvis"], skeleton.build.scale
     trunk = torso(skeleton, ease=(0.022, 0.022, 0.016, 0.011), folds=TORSO_FOLDS, low=-0.075)
@@ -37,7 +37,7 @@ def work_jacket(skeleton: Skeleton) -> list[Piece]:
 
 
 def t_shirt(skeleton: Skeleton, *, tint: Tint = "paint", loose: float = 0.016, sleeve: float = 0.27) -> list[Piece]:
-    """A T-shirt over the trousers."""
+    """Returns a T-shirt over the trousers."""
     body = torso(skeleton, ease=(loose + 0.014, loose + 0.012, loose, 0.010), folds=TORSO_FOLDS, low=-0.07)
     body = to_hem(skeleton, body, -0.035)
     body = sleeved(skeleton, body, ease=(0.012, 0.02, 0.02), sleeve=sleeve, folds=False)
@@ -50,7 +50,7 @@ def t_shirt(skeleton: Skeleton, *, tint: Tint = "paint", loose: float = 0.016, s
 
 
 def shirt(skeleton: Skeleton, *, tint: Tint = "paint", tucked: bool = False, sleeve: float = 0.97) -> list[Piece]:
-    """A shirt with collar and long sleeves (or rolled to `sleeve`)."""
+    """Returns a shirt with collar and long sleeves (or rolled to `sleeve`)."""
     low = 0.055 if tucked else -0.055
     body = torso(skeleton, ease=(0.022, 0.022, 0.016, 0.011), folds=TORSO_FOLDS, low=-0.075)
     body = to_hem(skeleton, body, low)
@@ -64,7 +64,7 @@ def shirt(skeleton: Skeleton, *, tint: Tint = "paint", tucked: bool = False, sle
 
 
 def hoodie(skeleton: Skeleton, *, tint: Tint = "paint") -> list[Piece]:
-    """A thick jumper with its hood on the shoulders and ribbed hems."""
+    """Returns a thick jumper with ribbed hems, whose hood lies on the shoulders."""
     body = torso(skeleton, ease=(0.030, 0.040, 0.026, 0.016), folds=TORSO_FOLDS, low=-0.06)
     body = cut(body, below(skeleton["pelvis"], -0.02 * skeleton.build.scale), 0.03)
     body = sleeved(skeleton, body, ease=(0.020, 0.024, 0.018), sleeve=0.98, folds=True)
@@ -89,7 +89,9 @@ def hoodie(skeleton: Skeleton, *, tint: Tint = "paint") -> list[Piece]:
 def jacket(
     skeleton: Skeleton, *, tint: Tint = "paint", inner: Tint = "white", long_m: float = 0.0, tie: bool = False
 ) -> list[Piece]:
-    """An open-necked jacket over a shirt; `long_m` below the hips makes it a coat; `tie` makes it business."""
+    """Returns an open jacket over a shirt; `long_m` is its length below the hips in metres, as of a coat, and `tie`
+    adds a tie.
+    """
     s = skeleton.build.scale
     vee = 0.20 if tie else 0.13
     body = torso(skeleton, ease=(0.034, 0.034, 0.028, 0.020), folds=TORSO_FOLDS, low=-0.085)
@@ -151,7 +153,7 @@ def jacket(
 def dress(
     skeleton: Skeleton, *, tint: Tint = "paint", hem_m: float = 0.46, flare: float = 0.07, sleeve: float = 0.22
 ) -> list[Piece]:
-    """A dress to the knees."""
+    """Returns a dress to the knees."""
     body = torso(skeleton, ease=(0.018, 0.010, 0.010, 0.008), folds=TORSO_FOLDS[:1])
     body = blend([body, skirt_field(skeleton, hem_m=hem_m * skeleton.build.scale, ease=0.02, flare=flare)], 0.04)
     body = sleeved(skeleton, body, ease=(0.012, 0.018, 0.016), sleeve=sleeve, folds=sleeve > 0.6)
@@ -160,7 +162,7 @@ def dress(
 
 
 def skirt(skeleton: Skeleton, *, tint: Tint = "skirt", hem_m: float = 0.40, flare: float = 0.04) -> list[Piece]:
-    """A skirt from the waist to the knees."""
+    """Returns a skirt from the waist to the knees."""
     waist = cut(torso(skeleton, ease=(0.014, 0.008, 0.0, 0.0)), below(skeleton["pelvis"], -0.06))
     waist = cut(waist, above(skeleton["pelvis"], 0.13 * skeleton.build.scale))
     field = blend([waist, skirt_field(skeleton, hem_m=hem_m * skeleton.build.scale, ease=0.016, flare=flare)], 0.03)
@@ -170,7 +172,7 @@ def skirt(skeleton: Skeleton, *, tint: Tint = "skirt", hem_m: float = 0.40, flar
 def trousers(
     skeleton: Skeleton, *, tint: Tint = "trousers", ease: Sequence[float] = (0.014, 0.018, 0.034), faces: int = 900
 ) -> list[Piece]:
-    """Long trousers; `ease` at hip, knee and ankle makes them slim or wide."""
+    """Returns long trousers; `ease` is the distance of the cloth at hip, knee and ankle, metres."""
     s = skeleton.build.scale
     seat = torso(skeleton, ease=(0.012, 0.010, 0.0, 0.0))
     seat = cut(seat, above(skeleton["pelvis"], 0.125 * s))
@@ -181,7 +183,7 @@ def trousers(
 
 
 def shorts(skeleton: Skeleton, *, tint: Tint = "trousers", leg_m: float = 0.34) -> list[Piece]:
-    """Shorts to above the knees."""
+    """Returns shorts to above the knees."""
     s = skeleton.build.scale
     seat = torso(skeleton, ease=(0.014, 0.012, 0.0, 0.0))
     seat = cut(seat, above(skeleton["pelvis"], 0.125 * s))

@@ -10,7 +10,7 @@ from authoring.people.skeleton import Skeleton
 
 
 def _strands(field: Field, frame: Frame, depth: float, wavelength: float = 0.022) -> Field:
-    """Hair's texture: grooves that run from the crown down."""
+    """Adds the relief of hair to a field: grooves that run downwards from the crown."""
 
     def distance(points: Array) -> Array:
         local = frame.to_local(points)
@@ -22,7 +22,9 @@ def _strands(field: Field, frame: Frame, depth: float, wavelength: float = 0.022
 
 
 def _cap_field(skeleton: Skeleton, thick: float, *, nape: float, ears: float, fringe: float) -> Field:
-    """Hair close to the skull: down to `nape` behind, to `ears` at the sides and `fringe` over the forehead (z, m)."""
+    """Returns the field of hair close to the skull, which ends at `nape` at the back, at `ears` at the sides and at
+    `fringe` above the forehead (z in the frame of the head, metres).
+    """
     head, k = skeleton["head"], skeleton.build.head
     shell = ellipsoid(
         head,
@@ -48,24 +50,24 @@ def _hair(field: Field, faces: int, cell_m: float = 0.01) -> Piece:
 
 
 def short_hair(skeleton: Skeleton) -> list[Piece]:
-    """Short all around, ears free."""
+    """Returns short hair that leaves the ears free."""
     return [_hair(_cap_field(skeleton, 0.013, nape=-0.075, ears=0.012, fringe=0.066), 420)]
 
 
 def crop(skeleton: Skeleton) -> list[Piece]:
-    """Clipped to a centimetre."""
+    """Returns hair of one centimetre."""
     return [_hair(_cap_field(skeleton, 0.006, nape=-0.06, ears=0.016, fringe=0.068), 340)]
 
 
 def thinning(skeleton: Skeleton) -> list[Piece]:
-    """An old man's: bald on top, a wreath around."""
+    """Returns the hair of an old man: bald on top, with a wreath of hair around."""
     field = _cap_field(skeleton, 0.009, nape=-0.07, ears=0.006, fringe=0.075)
     top = ellipsoid(skeleton["head"], (0.025, 0.0, 0.115), (0.105, 0.062, 0.075))
     return [_hair(cut(field, top, 0.012), 320)]
 
 
 def bob(skeleton: Skeleton) -> list[Piece]:
-    """Chin-long, with a fringe."""
+    """Returns hair down to the chin, with a fringe."""
     return [
         _hair(
             union(
@@ -77,7 +79,7 @@ def bob(skeleton: Skeleton) -> list[Piece]:
 
 
 def long_hair(skeleton: Skeleton) -> list[Piece]:
-    """Past the shoulders."""
+    """Returns hair that reaches below the shoulders."""
     return [
         _hair(
             union(
@@ -89,7 +91,7 @@ def long_hair(skeleton: Skeleton) -> list[Piece]:
 
 
 def ponytail(skeleton: Skeleton) -> list[Piece]:
-    """Pulled back and tied."""
+    """Returns hair that is pulled back into a ponytail."""
     head = skeleton["head"]
     tail = loft(
         head,
@@ -110,7 +112,7 @@ def ponytail(skeleton: Skeleton) -> list[Piece]:
 
 
 def bun(skeleton: Skeleton) -> list[Piece]:
-    """Tied into a knot at the back."""
+    """Returns hair that is tied into a knot at the back."""
     knot = ellipsoid(skeleton["head"], (-0.118, 0.0, 0.045), (0.034, 0.040, 0.036))
     return [
         _hair(
@@ -126,7 +128,7 @@ def bun(skeleton: Skeleton) -> list[Piece]:
 
 
 def curls(skeleton: Skeleton) -> list[Piece]:
-    """A round head of curls."""
+    """Returns curly hair, round the whole head."""
     head = skeleton["head"]
     base = _cap_field(skeleton, 0.042, nape=-0.075, ears=-0.012, fringe=0.058)
 
@@ -138,7 +140,7 @@ def curls(skeleton: Skeleton) -> list[Piece]:
 
 
 def _curtain(skeleton: Skeleton, low: float, thick: float) -> Field:
-    """Hair that hangs behind the face, from the crown down to `low` (z in the head's frame)."""
+    """Returns the field of hair that hangs behind the face, from the crown down to `low` (z in the head's frame)."""
     head, k = skeleton["head"], skeleton.build.head
     hang = loft(
         head,

@@ -13,7 +13,7 @@ from authoring.people.skeleton import Skeleton
 
 
 def baseball_cap(skeleton: Skeleton) -> list[Piece]:
-    """A cap with a peak, over short hair."""
+    """Returns a cap with a peak, and short hair below it."""
     head, k = skeleton["head"], skeleton.build.head
     dome = ellipsoid(head, (-0.012 * k, 0.0, 0.045 * k), (0.112 * k, 0.091 * k, 0.092 * k))
     low = Frame(head.origin, head.figure_from_local)
@@ -25,7 +25,7 @@ def baseball_cap(skeleton: Skeleton) -> list[Piece]:
 
 
 def brimmed_hat(skeleton: Skeleton) -> list[Piece]:
-    """A felt hat with a brim all around and a ribbon."""
+    """Returns a felt hat with a brim all around and a ribbon."""
     head, k = skeleton["head"], skeleton.build.head
     crown = loft(
         head,
@@ -55,7 +55,7 @@ def _over(frame: Frame, z: float, points: Array) -> Array:
 
 
 def beanie(skeleton: Skeleton) -> list[Piece]:
-    """A knitted cap with a turned-up edge."""
+    """Returns a knitted cap with a turned-up edge."""
     head, k = skeleton["head"], skeleton.build.head
     dome = ellipsoid(head, (-0.016 * k, 0.0, 0.045 * k), (0.112 * k, 0.091 * k, 0.098 * k))
     dome = cut(dome, rounded_box(head, (0.0, 0.0, -0.09 * k), (0.3, 0.3, 0.125 * k), 0.004), 0.006)

@@ -16,16 +16,16 @@ EAR = (-0.006, 0.078, -0.006)
 
 
 def nose_tip(*, soft: bool) -> tuple[float, float, float]:
-    """The middle of the ball at the tip of the nose, in the same frame.
+    """Returns the centre of the ball at the tip of the nose, (3,) metres, in the frame of the head.
 
     Args:
-        soft: whether the face is a softer one, such as a woman's.
+        soft: whether the face has softer features, such as those of a woman.
     """
     return (0.106 if soft else 0.109, 0.0, -0.036)
 
 
 def face_field(skeleton: Skeleton) -> Field:
-    """Skull, face and neck."""
+    """Returns the field of skull, face and neck."""
     build, head = skeleton.build, skeleton["head"]
     k = build.head
     frame = Frame(head.origin, head.figure_from_local * k)
@@ -93,7 +93,7 @@ def _ear(unit: Frame, side: float, k: float) -> Frame:
 
 
 def neck_field(skeleton: Skeleton) -> Field:
-    """Neck and the part of the upper chest that a neckline shows."""
+    """Returns the field of the neck and the part of the upper chest that a neckline shows."""
     build = skeleton.build
     s = build.scale
     girth = (0.88 if build.female else 1.0) * min(1.08, 0.5 + 0.5 * build.limbs) * (0.5 + 0.5 * s)
@@ -114,7 +114,7 @@ def neck_field(skeleton: Skeleton) -> Field:
 
 
 def head_piece(skeleton: Skeleton) -> Piece:
-    """Head and neck; the face is dear to the thinning."""
+    """Returns the piece of head and neck; the face keeps more triangles than the rest."""
     head = skeleton["head"]
     field = attach(
         face_field(skeleton), neck_field(skeleton), skeleton["neck"].at(0.0, 0.0, 0.09), radius=0.03, reach=0.12

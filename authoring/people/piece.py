@@ -1,4 +1,4 @@
-"""Pieces: closed shapes of one colour scheme that end up in one geom, and their triangles."""
+"""Pieces: closed shapes, each with its colours, that belong to one geom, and their triangles."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from authoring.people.field import Array, Field
 from authoring.people.polygonise import Faces, normals, polygonise, project
 
 Tint = str | Callable[[Array], list[str]]
-"""A colour's name, or a function from (F, 3) places to F names."""
+"""Name of a colour, or a function that maps (F, 3) positions to F names."""
 
 MAX_FACES = 4150
-"""Of all pieces together; what others cover is taken off later, a tenth at least."""
+"""Largest number of faces of all pieces together; covered faces, at least a tenth, are removed afterwards."""
 
 _SCOUT_CELL_M = 0.09
 _CREASE_COS = 0.6
@@ -26,16 +26,16 @@ _OCCLUSION_STRENGTH = 0.62
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Piece:
-    """One closed shape.
+    """A closed shape of a person, such as a shoe.
 
     Attributes:
-        group: the geom it belongs to (`paint`, `cloth`, `skin`, `hair`, `shoes`, `extra`).
-        field: its surface, in the figure's frame.
-        faces: how many triangles it may have.
-        cell_m: how fine it is sampled before it is thinned.
+        group: name of its geom (`paint`, `cloth`, `skin`, `hair`, `shoes`, `extra`).
+        field: signed distance of its surface, in the frame of the figure.
+        faces: largest number of triangles.
+        cell_m: size of the sampling grid, metres, from which triangles are removed afterwards.
         tint: its colours.
-        dear: (N, 3) places to a factor of how much detail they deserve.
-        borders: where colours change: triangles are split along the zeros of these.
+        dear: function that maps (N, 3) positions to factors on their number of triangles.
+        borders: fields whose zeros are borders between colours; triangles are split there.
     """
 
     group: str
@@ -59,7 +59,7 @@ class Skin:
 
 
 def mesh_pieces(pieces: Sequence[Piece]) -> list[Skin]:
-    """Triangles of all pieces, without what others cover, with the light that reaches each vertex."""
+    """Returns the triangles of all pieces without the covered ones, with the light that reaches each vertex."""
     share = min(1.0, MAX_FACES / sum(piece.faces for piece in pieces))
     raw = [_triangles(piece, int(share * piece.faces)) for piece in pieces]
     skins = []
@@ -89,7 +89,7 @@ def _triangles(piece: Piece, count: int) -> tuple[Array, Faces]:
 
 
 def _split(vertices: Array, faces: Faces, level: Array) -> tuple[Array, Faces]:
-    """Split triangles along the zeros of `level` (V,), the same new vertex for both sides of an edge."""
+    """Splits triangles along the zeros of `level` (V,); the faces on both sides of an edge share the new vertex."""
     level = np.where(np.abs(level) < 5e-4, 5e-4, level)
     above = level > 0
     lone = np.where(above[faces].sum(axis=1) == 1, above[faces].T, ~above[faces].T).T
@@ -113,7 +113,7 @@ def _bounds(field: Field) -> tuple[Array, Array]:
 
 
 def _corner_normals(field: Field, vertices: Array, faces: Faces) -> Array:
-    """The field's normals, but the face's own where an edge is too sharp for shading across it."""
+    """Returns normals at the corners: those of the field, or that of the face at sharp edges."""
     smooth = normals(field, vertices)[faces]
     corners = vertices[faces]
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -123,7 +123,7 @@ def _corner_normals(field: Field, vertices: Array, faces: Faces) -> Array:
 
 
 def _light(pieces: Sequence[Piece], vertices: Array, outward: Array) -> Array:
-    """How open the surroundings are: 1 in the open, less in armpits, folds and under chins."""
+    """Returns the ambient light at each vertex: 1 without occlusion, less in armpits, in folds and below the chin."""
     loss = np.zeros(len(vertices))
     for tap in _OCCLUSION_TAPS_M:
         probes = vertices + tap * outward
@@ -133,7 +133,7 @@ def _light(pieces: Sequence[Piece], vertices: Array, outward: Array) -> Array:
 
 
 def combine(skins: Sequence[Skin], uv_of: Callable[[Skin], Array]) -> Mesh:
-    """One mesh of several pieces; `uv_of` gives (F, 3, 2) texture coordinates at the corners."""
+    """Joins several pieces into one mesh; `uv_of` gives (F, 3, 2) texture coordinates at the corners."""
     vertices = np.concatenate([skin.vertices[skin.faces].reshape(-1, 3) for skin in skins])
     corner_normals = np.concatenate([skin.corner_normals.reshape(-1, 3) for skin in skins])
     uvs = np.concatenate([uv_of(skin).reshape(-1, 2) for skin in skins])

@@ -1,4 +1,4 @@
-"""From a distance field to triangles: surface nets, then a pull of every vertex onto the surface."""
+"""Converts a distance field to triangles by surface nets, and moves every vertex onto the surface."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NEAR_CELLS = 11.0
 
 
 def polygonise(field: Field, low: Array, high: Array, cell_m: float) -> tuple[Array, Faces]:
-    """Triangles of the zero level inside the box `low`..`high`.
+    """Returns the triangles of the zero level inside the box `low`..`high`.
 
     Returns:
         (V, 3) vertices in metres and (F, 3) faces, counter-clockwise seen from outside.
@@ -30,7 +30,7 @@ def polygonise(field: Field, low: Array, high: Array, cell_m: float) -> tuple[Ar
 
 
 def _sample(field: Field, axes: list[Array], cell_m: float) -> Array:
-    """Values on the grid: exact near the surface, far from it only of the right sign."""
+    """Returns the field on a grid: exact near the surface; elsewhere only the sign is correct."""
     coarse = [axis[::_STRIDE] for axis in axes]
     points = np.stack(np.meshgrid(*coarse, indexing="ij"), axis=-1)
     far = field(points.reshape(-1, 3)).reshape(points.shape[:3])
@@ -43,7 +43,7 @@ def _sample(field: Field, axes: list[Array], cell_m: float) -> Array:
 
 
 def project(field: Field, points: Array, *, limit: float, rounds: int = 3) -> Array:
-    """Move (V, 3) points along the gradient onto the zero level, at most `limit` a round."""
+    """Moves (V, 3) points along the gradient onto the zero level, at most `limit` metres per round."""
     for _ in range(rounds):
         slope = gradient(field, points)
         square = np.maximum((slope**2).sum(axis=1), 0.05)
@@ -54,7 +54,7 @@ def project(field: Field, points: Array, *, limit: float, rounds: int = 3) -> Ar
 
 
 def normals(field: Field, points: Array) -> Array:
-    """(V, 3) unit normals of the field, pointing out."""
+    """Returns the (V, 3) outward unit normals of a field at (V, 3) points."""
     slope = gradient(field, points, step=2e-3)
     return np.asarray(slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9))
 

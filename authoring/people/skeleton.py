@@ -16,16 +16,16 @@ SIDES = ("left", "right")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Build:
-    """Proportions. Lengths are shares of the height, girths factors on a slim adult's.
+    """The proportions of a body: lengths as shares of the height, girths as factors on those of a slim adult.
 
     Attributes:
         height_m: standing height without shoes.
-        head: factor on the head's size; 1 is a head of 1/7.6 of 1.76 m whatever the height.
+        head: factor on the size of the head; 1 is 1/7.6 of 1.76 m for people of any height.
         shoulders, chest, waist, hips, limbs: factors on widths.
-        belly_m, bust_m: how far these stand out.
-        leg: factor on the legs' share of the height.
-        stoop_deg: how far the upper back leans forward.
-        female: hips and neck of a woman, softer face.
+        belly_m, bust_m: how far belly and bust project, metres.
+        leg: factor on the share of the legs in the height.
+        stoop_deg: forward lean of the upper back, degrees.
+        female: whether hips, neck and face are those of a woman.
     """
 
     height_m: float
@@ -43,7 +43,7 @@ class Build:
 
     @property
     def scale(self) -> float:
-        """Height over that of the adult whose numbers the code is written in (1.76 m)."""
+        """The height divided by 1.76 m, the height of the adult to whom the lengths in the code refer."""
         return self.height_m / 1.76
 
 
@@ -72,17 +72,17 @@ class Leg:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pose:
-    """A whole pose, degrees.
+    """A pose of the whole body; angles are in degrees.
 
     Attributes:
-        name: of the files.
+        name: name of the files.
         kind: `walk` or `stand`.
-        lean, twist: of the chest against the pelvis.
-        pelvis: how far the pelvis leans forward.
-        head_pitch, head_yaw: of the head, down and to the left.
+        lean, twist: lean and twist of the chest relative to the pelvis.
+        pelvis: forward lean of the pelvis.
+        head_pitch, head_yaw: turn of the head downwards and to the left.
         grounded: whether both feet stand on the ground.
-        telephone: whether the right hand holds one.
-        arms, legs: by side.
+        telephone: whether the right hand holds a telephone.
+        arms, legs: angles by side.
     """
 
     name: str
@@ -132,12 +132,12 @@ UPPER_ARM_M, FOREARM_M = 0.298, 0.252
 
 
 def leg_lengths(build: Build) -> tuple[float, float]:
-    """Thigh and shin, metres."""
+    """Returns the lengths of thigh and shin, metres."""
     return THIGH_M * build.scale * build.leg, SHIN_M * build.scale * build.leg
 
 
 def pose_skeleton(build: Build, pose: Pose) -> Skeleton:
-    """Place every bone; the pelvis' joint centre is at the origin (the figure is set on the ground afterwards)."""
+    """Places every bone; the centre of the pelvis is at the origin, and the figure is moved onto the ground afterwards."""
     s = build.scale
     frames: dict[str, Frame] = {"pelvis": Frame(np.zeros(3), turn_y(pose.pelvis))}
     pelvis = frames["pelvis"]

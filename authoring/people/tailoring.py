@@ -1,4 +1,4 @@
-"""What garments are sewn from: sleeves, necklines, collars, hems, sheets and skirts as distance fields."""
+"""Parts of garments as distance fields: sleeves, necklines, collars, hems, sheets and skirts."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ TORSO_FOLDS = (
     Fold(0.02, 0.10, 0.004, 0.07, 0.6),
     Fold(0.26, 0.10, 0.0025, 0.09, 2.2),
 )
-"""How cloth wrinkles at the waist and over the chest."""
+"""Wrinkles of cloth at the waist and on the chest."""
 
 
 def sleeved(skeleton: Skeleton, body: Field, *, ease: Sequence[float], sleeve: float, folds: bool) -> Field:
-    """`body` with sleeves that end at a share of the arm: 0.5 at the elbow, 1 at the wrist; 0 for none."""
+    """Returns `body` with sleeves; `sleeve` is their length as a share of the arm: 0.5 ends at the elbow, 1 at the
+    wrist, and 0 is no sleeve.
+    """
     for side in SIDES:
         arm = arm_field(skeleton, side, ease=ease, folds=folds)
         upper, fore = skeleton[f"upper_arm_{side}"], skeleton[f"forearm_{side}"]
@@ -34,7 +36,7 @@ def sleeved(skeleton: Skeleton, body: Field, *, ease: Sequence[float], sleeve: f
 
 
 def neckline(skeleton: Skeleton, *, deep_m: float, wide_m: float) -> Field:
-    """The hole for the neck; `deep_m` below its root in front."""
+    """Returns the opening for the neck, which reaches `deep_m` metres below the root of the neck in front."""
     s = skeleton.build.scale
     neck = skeleton["neck"]
     hole = loft(
@@ -54,7 +56,7 @@ def neckline(skeleton: Skeleton, *, deep_m: float, wide_m: float) -> Field:
 
 
 def collar_ring(skeleton: Skeleton, *, radius_m: float, height_m: float, open_m: float) -> Field:
-    """A standing collar, open in front by `open_m`."""
+    """Returns a standing collar with a gap of `open_m` metres in front."""
     s = skeleton.build.scale
     neck = skeleton["neck"]
     k = 0.5 + 0.5 * s
@@ -70,7 +72,7 @@ def collar_ring(skeleton: Skeleton, *, radius_m: float, height_m: float, open_m:
 
 
 def band(base: Field, frame: Frame, z: float, *, half_m: float, thick_m: float) -> Field:
-    """A strip of cloth around `base` at a height of the frame."""
+    """Returns a strip of cloth around `base` at a height of the frame."""
 
     def distance(points: Array) -> Array:
         skin = base(points)
@@ -81,7 +83,7 @@ def band(base: Field, frame: Frame, z: float, *, half_m: float, thick_m: float) 
 
 
 def sheet(frame: Frame, base: Field, rows: Sequence[tuple[float, float, float]], *, thick_m: float) -> Field:
-    """Cloth that lies on the front of `base`: rows of (z, distance from the middle, half-width), on both sides."""
+    """Returns cloth that lies on the front of `base`: rows of (z, distance from the middle, half-width), on both sides."""
     table = np.array(sorted(rows))
 
     def distance(points: Array) -> Array:
@@ -95,7 +97,7 @@ def sheet(frame: Frame, base: Field, rows: Sequence[tuple[float, float, float]],
 
 
 def dear_neck(skeleton: Skeleton) -> Callable[[Array], Array]:
-    """Detail for necklines, collars and lapels."""
+    """Returns the function `Piece.dear` that gives necklines, collars and lapels more triangles."""
     chest = skeleton["chest"]
     high = 0.25 * skeleton.build.scale
 
@@ -108,13 +110,17 @@ def dear_neck(skeleton: Skeleton) -> Callable[[Array], Array]:
 
 
 def to_hem(skeleton: Skeleton, body: Field, low: float) -> Field:
-    """`body` widened over the trousers' hips and cut at `low` (over the hip joints, of an adult)."""
+    """Returns `body`, widened around the hips of the trousers, and cut off at `low` (metres above the hip joints, for
+    an adult).
+    """
     legs = [leg_field(skeleton, side, ease=(0.036, 0.04, 0.04)) for side in SIDES]
     return cut(blend([body, *legs], 0.05), below(skeleton["pelvis"], low * skeleton.build.scale))
 
 
 def skirt_field(skeleton: Skeleton, *, hem_m: float, ease: float, flare: float, top_m: float = 0.1) -> Field:
-    """Cloth around both legs from `top_m` over the hip joints to `hem_m` below them, wide enough for the stride."""
+    """Returns cloth around both legs from `top_m` over the hip joints to `hem_m` below them, wide enough for the
+    stride.
+    """
     s = skeleton.build.scale
     chains = [np.stack([skeleton[f"{bone}_{side}"].origin for bone in ("thigh", "shin", "foot")]) for side in SIDES]
     hips = skeleton["pelvis"].origin[2]
@@ -142,5 +148,5 @@ def skirt_field(skeleton: Skeleton, *, hem_m: float, ease: float, flare: float, 
 
 
 def above(frame: Frame, z: float) -> Field:
-    """The half-space over a frame's plane."""
+    """Returns the half-space above the plane z of a frame."""
     return lambda points: -below(frame, z)(points)

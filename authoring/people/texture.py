@@ -14,9 +14,9 @@ from authoring.people.field import Array, Frame
 from authoring.people.piece import Skin
 
 Colour = tuple[float, float, float]
-"""Linear albedo."""
+"""A colour: red, green and blue, linear albedo 0..1."""
 Tone = Callable[[Array, Array], None]
-"""Mixes a colour into a picture by an amount a pixel."""
+"""A function that mixes a colour into a picture, by an amount for each pixel."""
 
 _ATLAS_PX, _SWATCH_PX, _ROW = 64, 16, 4
 _SKIN_PX = 256
@@ -27,7 +27,7 @@ _DARKEST = 0.25
 
 
 def _ramp(width: int) -> Array:
-    """Light along a swatch, flat at both ends so that neighbours never bleed in."""
+    """Returns the brightness along a swatch; it is constant at both ends, so that neighbouring swatches never mix in."""
     margin = width // 8
     return np.clip((np.arange(width) + 0.5 - margin) / (width - 2 * margin), 0.0, 1.0) * (1.0 - _DARKEST) + _DARKEST
 
@@ -43,7 +43,7 @@ def _write(path: Path, linear_rgb: Array) -> None:
 
 
 def write_atlas(path: Path, colours: Mapping[str, Colour]) -> None:
-    """Write the swatches, each a ramp from shade to full light, in the mapping's order."""
+    """Writes the swatches in the order of the mapping; each is a ramp from shadow to full light."""
     image = np.full((_ATLAS_PX, _ATLAS_PX, 3), 0.2)
     for number, colour in enumerate(colours.values()):
         row, column = divmod(number, _ROW)
@@ -54,7 +54,7 @@ def write_atlas(path: Path, colours: Mapping[str, Colour]) -> None:
 
 
 def atlas_uv(skin: Skin, colours: Mapping[str, Colour]) -> Array:
-    """(F, 3, 2) texture coordinates (v up) of a piece's corners in the atlas."""
+    """Returns the (F, 3, 2) texture coordinates of the corners of a piece in the atlas, v upwards."""
     order = list(colours)
     if len(order) > _ROW * _ROW:
         raise ValueError(f"an atlas holds {_ROW * _ROW} colours, got {len(order)}")
@@ -70,12 +70,14 @@ def atlas_uv(skin: Skin, colours: Mapping[str, Colour]) -> Array:
 
 
 def swatch_uv(number: int) -> Array:
-    """(2,) texture coordinates (v up) of a colour of the atlas in full light."""
+    """Returns the (2,) texture coordinates of a colour of the atlas in full light, v upwards."""
     return np.array([(number % _ROW + 7 / 8) / _ROW, 1.0 - (number // _ROW + 0.5) / _ROW])
 
 
 def skin_uv(skin: Skin, head: Frame, size: float) -> Array:
-    """(F, 3, 2) texture coordinates (v up): the face's map in front, the plain ramp elsewhere."""
+    """Returns the (F, 3, 2) texture coordinates of skin, v upwards: the map of the face in front, the plain ramp
+    elsewhere.
+    """
     local = head.to_local(skin.vertices) / size
     azimuth = np.arctan2(local[:, 1], local[:, 0] + 0.005)
     u = (0.5 - azimuth / (2.0 * _FACE_HALF_RAD)) * _FACE_SHARE
@@ -93,12 +95,12 @@ def skin_uv(skin: Skin, head: Frame, size: float) -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Face:
-    """What is painted on a face.
+    """The features that are painted on a face.
 
     Attributes:
         skin, hair, iris: linear albedo.
-        lips: how red the lips are, 0..1.
-        beard: how dark the shadow of a beard is, 0..1.
+        lips: redness of the lips, 0..1.
+        beard: darkness of the shadow of a beard, 0..1.
         age: 0 for a child, 1 for deep lines.
     """
 
@@ -111,13 +113,13 @@ class Face:
 
 
 def _blob(y: Array, z: Array, centre: tuple[float, float], radii: tuple[float, float], hard: float = 1.0) -> Array:
-    """A soft spot: 1 in its middle, falling off faster for larger `hard`."""
+    """Returns a soft spot: 1 in its middle, with a steeper edge for larger `hard`."""
     distance = ((y - centre[0]) / radii[0]) ** 2 + ((z - centre[1]) / radii[1]) ** 2
     return np.asarray(np.exp(-(distance**hard)))
 
 
 def write_skin(path: Path, face: Face) -> None:
-    """Write the skin's texture: the face unrolled around the head's axis, and the plain ramp beside it."""
+    """Writes the texture of skin: the face, unrolled around the axis of the head, and a plain ramp beside it."""
     width = round(_SKIN_PX * _FACE_SHARE)
     azimuth = (0.5 - (np.arange(width) + 0.5) / width) * 2.0 * _FACE_HALF_RAD
     z = _FACE_TOP_M - (np.arange(_SKIN_PX) + 0.5) / _SKIN_PX * (_FACE_TOP_M - _FACE_BOTTOM_M)

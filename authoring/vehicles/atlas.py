@@ -1,7 +1,7 @@
-"""Parts of textures shared by all vehicles: where each one is, and the drawing of them.
+"""Textures that all vehicles share: the positions of their parts, and the drawing.
 
 `details.png` dresses trim, in 4 × 4 cells (plastic, grilles). `lamps.png` has all lights, in 4 × 4 cells. `plates.png`
-has 3 × 12 number plates: one of its own a vehicle, and some that all of them share.
+has 3 × 12 number plates: one for each vehicle, and some that all vehicles share.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class Cell:
     """A rectangle of a texture.
 
     Attributes:
-        left, top, width, height: shares of the texture, top down.
-        margin: shares of its width and height that are left over at each end, so that neighbours never bleed in.
+        left, top, width, height: position and size as shares of the texture, from its upper left corner.
+        margin: shares of width and height that stay free at each edge, so that neighbouring cells never mix in.
     """
 
     left: float
@@ -43,7 +43,7 @@ class Cell:
 
 
 def _grid(names: dict[str, tuple[int, int]]) -> dict[str, Cell]:
-    """Cells of 4 × 4, by (column, row)."""
+    """Returns the cells of a grid of 4 × 4 by their names."""
     return {name: Cell(column / 4, row / 4, 1 / 4, 1 / 4) for name, (column, row) in names.items()}
 
 
@@ -64,7 +64,7 @@ LAMPS = _grid(_LAMPS)
 
 
 def plate_cells(name: str) -> list[Cell]:
-    """The plates that instances of a vehicle have by turns: its own, then some of those that all share."""
+    """Returns the plates that the instances of a vehicle have in turn: its own, then some of the shared plates."""
     own = list(PLATES).index(name)
     shared = [len(PLATES) + (5 * own + k) % len(SHARED_PLATES) for k in range(_PLATES_EACH - 1)]
     margin = (_PLATE_MARGIN_PX / _PLATE[0], _PLATE_MARGIN_PX / _PLATE[1])
@@ -75,7 +75,7 @@ def plate_cells(name: str) -> list[Cell]:
 
 
 def cell_uvs(cell: Cell, unit: Floats) -> Floats:
-    """Texture coordinates of (N, 2) positions in a cell: 0 to 1, right and up."""
+    """Returns the texture coordinates of (N, 2) positions in a cell; positions are 0 to 1, rightwards and upwards."""
     margin = np.array(cell.margin)
     inner = margin + np.clip(unit, 0, 1) * (1 - 2 * margin)
     u = cell.left + inner[:, 0] * cell.width
@@ -83,7 +83,7 @@ def cell_uvs(cell: Cell, unit: Floats) -> Floats:
 
 
 def flat(mesh: Mesh, cell: Cell) -> Mesh:
-    """The mesh in the one colour of a cell's middle."""
+    """Returns the mesh with the colour in the middle of a cell."""
     return mesh.with_uvs(cell_uvs(cell, np.array([[0.5, 0.5]]))[0])
 
 
@@ -95,7 +95,7 @@ def write_atlases(folder: Path) -> None:
 
 
 class _Cell:
-    """A picture of one cell, drawn with coordinates 0 to 1, right and down, the margin outside."""
+    """A picture of one cell; coordinates are 0 to 1, rightwards and downwards, without the margin."""
 
     def __init__(self, ground: tuple[int, int, int]) -> None:
         self._side = _CELL * _OVER
@@ -129,7 +129,7 @@ def _sheet(cells: dict[str, _Cell], places: dict[str, tuple[int, int]]) -> Image
 
 
 def _plates() -> Image.Image:
-    """All plates, each with its edge's colour in the margin round it."""
+    """Draws all plates; the margin around each has the colour of its edge."""
     image = Image.new("RGB", (_SIZE * _OVER,) * 2, (20, 20, 20))
     wide, high = (_OVER * (side - 2 * _PLATE_MARGIN_PX) for side in _PLATE)
     for k, text in enumerate((*PLATES.values(), *SHARED_PLATES)):

@@ -1,4 +1,4 @@
-"""What makes a bus of a body: doors, mirrors on arms, displays, marker lamps, and an inside behind its panes."""
+"""The equipment of a bus: doors, mirrors on arms, displays, marker lamps, and an inside behind its panes."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ __all__ = ["fit_bus"]
 
 _KERB_Y = -1.274
 _DOORS = ((4.72, 1.25), (0.35, 1.35), (-4.55, 1.2))
-"""Where on the kerb side (the right), and how wide."""
+"""Positions x and widths of the doors on the right side, metres."""
 
 _BAYS_LEFT, _BAYS_RIGHT = (0, 3, 1, 2, 0, 1, 2), (2, 1, 0, 3, 1, 0, 3)
-"""Which of the pictures is seen in which bay, front to rear."""
+"""Number of the picture in each bay of windows, from front to rear."""
 
 
 def fit_bus(spec: CarSpec, parts: Parts, body: Shell, cabin: Shell) -> None:
-    """Bolts on what a bus has and lets its panes be looked through."""
+    """Adds the equipment of a bus, and puts pictures of its inside on its panes."""
     front_x, rear_x = cabin.side.patch.evaluate(np.array([[u, 0.3] for u in cabin.corners]))[:, 0]
     parts.meshes["glass"] = [_seen_through(mesh, spec, front_x, rear_x) for mesh in parts.meshes["glass"]]
     for x, width in _DOORS:
@@ -59,7 +59,7 @@ def _add_door(parts: Parts, x: float, width: float) -> None:
 
 
 def _add_mirrors(parts: Parts) -> None:
-    """Mirrors that hang before the corners, on arms from the roof's edge."""
+    """Adds mirrors that hang in front of the corners, on arms from the edge of the roof."""
     arm = tube([(5.72, 1.04, 2.96), (5.98, 1.22, 2.97), (6.12, 1.38, 2.88), (6.13, 1.41, 2.66)], 0.025, 6)
     parts.add("trim", flat(arm, DETAILS["plastic"]), both_sides=True)
     at = (6.13, 1.41, 2.38)
@@ -70,7 +70,7 @@ def _add_mirrors(parts: Parts) -> None:
 
 
 def _seen_through(mesh: Mesh, spec: CarSpec, front_x: float, rear_x: float) -> Mesh:
-    """One side's glass, each pane with its picture."""
+    """Returns the glass of one side with a picture on each pane."""
     middle = mesh.vertices[mesh.faces].mean(axis=1)
     left = float(middle[:, 1].mean()) > 0
     posts = sorted((x for x, _ in spec.glass_posts), reverse=True)
@@ -94,7 +94,7 @@ def _seen_through(mesh: Mesh, spec: CarSpec, front_x: float, rear_x: float) -> M
 
 
 def _rounded(mesh: Mesh) -> Mesh:
-    """A box whose lid is smaller than its foot."""
+    """Returns a box whose upper face is smaller than its lower face."""
     low, high = mesh.bounds
     v = mesh.vertices.copy()
     top = v[:, 2] > (low[2] + high[2]) / 2

@@ -27,7 +27,7 @@ DRIVER = Pane(0, 320, 128, 192, _SIZE)
 
 
 def write_bus_inside(path: Path) -> None:
-    """Draws what is seen through all panes of a bus."""
+    """Draws the inside that is visible through all panes of a bus."""
     rng = derive_rng(0, "authoring", "bus windows")
     pictures = [(pane, _bay(pane, k, rng)) for k, pane in enumerate(BAYS)]
     pictures += [(pane, _door(pane, rng, k)) for k, pane in enumerate(DOORS)]
@@ -36,7 +36,7 @@ def write_bus_inside(path: Path) -> None:
 
 
 def _bay(pane: Pane, kind: int, rng: np.random.Generator) -> Picture:
-    """One of the side's panes, 1.4 m by 1.3 m: two rows of seats on either side of the aisle."""
+    """Draws one of the panes of the side, 1.4 m by 1.3 m: two rows of seats on either side of the aisle."""
     picture = Picture(pane, _DARK, 1.36 / 1.32)
     picture.rect(-0.1, -0.1, 1.1, 0.07, _CEILING)
     picture.rect(-0.1, 0.02, 1.1, 0.045, (150, 150, 142))
@@ -59,7 +59,7 @@ def _bay(pane: Pane, kind: int, rng: np.random.Generator) -> Picture:
 
 
 def _door(pane: Pane, rng: np.random.Generator, kind: int) -> Picture:
-    """A leaf of a door, 0.6 m by 2 m: step, pole, the far side."""
+    """Draws a leaf of a door, 0.6 m by 2 m: step, pole, the far side."""
     picture = Picture(pane, _DARK, 0.6 / 1.96)
     picture.rect(-0.1, -0.1, 1.1, 0.06, _CEILING)
     picture.street(-0.1, 0.10, 1.1, 0.46)
@@ -75,7 +75,7 @@ def _door(pane: Pane, rng: np.random.Generator, kind: int) -> Picture:
 
 
 def _screen(rng: np.random.Generator) -> Picture:
-    """The windscreen, 2.5 m by 1.55 m, as seen from before the bus: the driver sits on the right of the picture."""
+    """Draws the windscreen, 2.5 m by 1.55 m, as seen from before the bus: the driver sits on the right of the picture."""
     picture = Picture(SCREEN, _DARK, 2.45 / 1.55)
     _aisle(picture, 0.46, 0.44)
     for k, x in enumerate((0.30, 0.60)):
@@ -91,7 +91,7 @@ def _screen(rng: np.random.Generator) -> Picture:
 
 
 def _rear(rng: np.random.Generator) -> Picture:
-    """The rear window, 2.2 m by 1 m: the last row's riders from behind."""
+    """Draws the rear window, 2.2 m by 1 m, with the riders of the last row from behind."""
     picture = Picture(REAR, _DARK, 2.2 / 1.02)
     _aisle(picture, 0.5, 0.46)
     for x in (0.22, 0.66):
@@ -102,7 +102,7 @@ def _rear(rng: np.random.Generator) -> Picture:
 
 
 def _aisle(picture: Picture, x: float, y: float) -> None:
-    """The inside, along the bus: panes to both sides run towards (x, y), where the other end's pane is."""
+    """Draws the inside along the bus: the panes of both sides run towards (x, y), the pane at the other end."""
     near, far = (0.16, 0.70), (y - 0.10, y + 0.10)
     for side, end in ((0.0, x - 0.12), (1.0, x + 0.12)):
         for k in range(4):
@@ -118,7 +118,7 @@ def _aisle(picture: Picture, x: float, y: float) -> None:
 
 
 def _driver(rng: np.random.Generator) -> Picture:
-    """The driver's own window, 0.9 m by 1.3 m, as seen from the left: the bus's front is on the left."""
+    """Draws the window of the driver, 0.9 m by 1.3 m, as seen from the left: the bus's front is on the left."""
     picture = Picture(DRIVER, _DARK, 0.9 / 1.32)
     picture.street(-0.1, 0.12, 0.24, 0.62)
     picture.rect(0.62, -0.1, 1.1, 1.1, (44, 46, 48))
@@ -130,7 +130,7 @@ def _driver(rng: np.random.Generator) -> Picture:
 
 
 def _rider(picture: Picture, x: float, top: float, high: float, rng: np.random.Generator, facing: float = 0.25) -> None:
-    """Head and shoulders, `high` from the crown down to the chest; `facing` shifts the face."""
+    """Draws head and shoulders; `high` is the height from the crown down to the chest, and `facing` shifts the face."""
     coat, skin, hair = (colours[rng.integers(len(colours))] for colours in (_COATS, _SKINS, _HAIRS))
     width = 0.62 * high / picture.wide
     picture.rect(x - width / 2, top + 0.42 * high, x + width / 2, top + 1.3 * high, coat, 0.3)

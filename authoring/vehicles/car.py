@@ -1,4 +1,4 @@
-"""A car from a specification: two shells (body, cabin), what is stamped into them, and what is bolted on."""
+"""A car from a specification: two shells (body and cabin), shapes that are cut into them, and parts that are added."""
 
 from __future__ import annotations
 
@@ -22,21 +22,22 @@ __all__ = ["CarSpec", "Points", "Stamp", "build_car", "side_lines"]
 Points = tuple[tuple[float, float], ...]
 
 _BESIDE_GLASS_M = 0.034
-"""How far from the side windows the doors' shut line runs."""
+"""Distance of the shut line of the doors from the side windows, metres."""
 
 
 @dataclass(frozen=True)
 class Stamp:
-    """Something drawn on the body's front or rear.
+    """A shape that is cut into the front, the rear or the side of the body.
 
     Attributes:
-        at: "front" or "rear": distance along the outline from that end's middle, and z; or "side": x and z.
-        corners: of the polygon, counter-clockwise, metres.
-        radius: of its corners.
+        at: where the shape is: on "front" and "rear" its coordinates are the distance along the outline from the middle
+            of that end, and z; on "side" they are x and z.
+        corners: corners of the polygon, counter-clockwise, metres.
+        radius: radius of rounded corners, metres.
         part: "trim" or "lights".
-        cell: its texture.
-        sink: how deep it lies, metres.
-        rim: width of a dark (trim) frame round it, metres.
+        cell: cell of the texture.
+        sink: depth below the surface of the body, metres.
+        rim: width of a dark frame (trim) around the shape, metres.
     """
 
     at: str
@@ -50,29 +51,29 @@ class Stamp:
 
 @dataclass(frozen=True)
 class CarSpec:
-    """What makes one car different from another; metres, x forward from the middle of its length.
+    """The specification of a car; lengths are metres, and x points forwards from the middle of the car.
 
     Attributes:
-        name, kind, palette: the file's stem, its `actor.kind`, a key of `finish.PALETTES`.
-        shown: which colour of the palette the file itself has.
-        plan, foot, rim, crown, levels, reach: of the body's shell, as `make_shell` takes them.
-        cabin_plan, cabin_foot, cabin_rim, cabin_crown, cabin_levels, cabin_reach: of the greenhouse's.
-        rise: length of the cabin's slope; window heights below are shares of it.
-        axles, wheel, track: x of each axle, the wheels, distance between their middles.
-        arch, flare, cladding: gap round a tyre, how far the wing swells there, width of the black lip about it.
-        sill_z: below it the body is black plastic.
-        stamps: lamps, grilles, liveries.
-        pillar: half the windscreen pillars' width.
+        name, kind, palette: name of the file, its `actor.kind`, and a key of `finish.PALETTES`.
+        shown: number of the palette's colour in the file itself.
+        plan, foot, rim, crown, levels, reach: shell of the body, as the arguments of `make_shell`.
+        cabin_plan, cabin_foot, cabin_rim, cabin_crown, cabin_levels, cabin_reach: shell of the cabin.
+        rise: length of the slope of the cabin; the heights of windows below are shares of it.
+        axles, wheel, track: x of each axle, the wheels, and the distance between the middles of left and right wheels.
+        arch, flare, cladding: gap around a tyre, bulge of the body there, and width of the black lip around it.
+        sill_z: height below which the body is black plastic.
+        stamps: lamps, grilles and liveries.
+        pillar: half the width of a pillar of the windscreen.
         screen_v, side_v: lower and upper edge of windscreen and side windows.
         side_glass: gaps between the side windows and the cabin's front and rear corners.
         rear_glass: gap to the rear corner, lower and upper edge.
         glass_posts: (x, width) of dark posts across the side windows.
-        blind_sides: the stretch in x without windows.
-        lines_side, lines_top, lines_front, lines_rear: shut lines, as `PaintMap` takes them.
-        door_rear: x behind which no door has a window; None where side windows have no doors about them.
+        blind_sides: range of x without side windows.
+        lines_side, lines_top, lines_front, lines_rear: shut lines, as in `PaintMap`.
+        door_rear: x behind which no door has a window; None if the side windows have no doors around them.
         handles: (x, z) of door handles. rails: front x, rear x and y of roof rails.
-        mirror: size of a door mirror, if it has any.
-        plates, badges: z at front and rear; `plate_stand_off` is how far plates stand before the body.
+        mirror: size of a door mirror, if the car has any.
+        plates, badges: z at front and rear; `plate_stand_off` is the distance of plates from the body.
         bed: rear x, front x and half width of a pick-up's bed.
         paint_px: width and height of the paint's texture.
     """
@@ -128,7 +129,7 @@ def build_car(spec: CarSpec) -> tuple[Parts, Shell, Shell]:
     """Builds body, cabin, glass, stamped lamps and grilles, wheels and wheel wells.
 
     Returns:
-        The parts, and the body's and the cabin's shells for what is bolted on afterwards.
+        The parts, and the shells of body and cabin, on which further parts are placed.
     """
     hub_z = spec.wheel.radius
     arch = spec.wheel.radius + spec.arch
@@ -213,7 +214,7 @@ def _seen(shape: Shape) -> Field:
 
 
 def _on_sheet(body: Shell, stamp: Stamp, points: Floats, params: Floats) -> Floats:
-    """(N, 2) of the body's points, in the coordinates that a stamp is drawn in."""
+    """Returns points of the body, (N, 2), in the coordinates of a stamp."""
     if stamp.at == "side":
         return _side_view(points)
     run = body.along(params[:, 0])
@@ -221,7 +222,7 @@ def _on_sheet(body: Shell, stamp: Stamp, points: Floats, params: Floats) -> Floa
 
 
 def _stamp(body: Shell, stamp: Stamp) -> str:
-    """Cuts a stamp into the body and returns what its faces are called."""
+    """Cuts a stamp into the body, and returns the name of its faces."""
 
     def field_of(shape: Shape) -> Field:
         return lambda p, q: shape(_on_sheet(body, stamp, p, q))
@@ -277,7 +278,7 @@ def _glaze(spec: CarSpec, cabin: Shell) -> None:
 
 
 def side_lines(spec: CarSpec, cabin: Shell) -> tuple[Points, ...]:
-    """All shut lines that are drawn from the side: the car's own, and that of its doors about the side windows."""
+    """Returns all shut lines of the side view: those of the specification, and those of the doors around the windows."""
     if spec.door_rear is None:
         return spec.lines_side
     front, rear = cabin.along(np.array(cabin.corners))
@@ -296,7 +297,7 @@ def side_lines(spec: CarSpec, cabin: Shell) -> tuple[Points, ...]:
 
 
 def _band(sheet: Sheet, low_x: float, high_x: float, material: str, where: Field, on: tuple[str, ...]) -> None:
-    """Names everything between two x positions; both lines are cut first, as the band may be narrower than a face."""
+    """Names all faces between two x positions; both lines are cut first, because the band may be narrower than a face."""
     for x in (low_x, high_x):
         sheet.cut(_offset(0, x), where=where, on=on)
     middle, half = (low_x + high_x) / 2, (high_x - low_x) / 2
@@ -312,7 +313,7 @@ def _unrolled(cabin: Shell, shape: Shape, rise: float) -> Field:
 
 
 def _hide_under(cabin: Shell, body: Shell) -> None:
-    """Drops the part of the body's cap that the cabin stands on."""
+    """Removes the part of the upper surface of the body that lies below the cabin."""
     u = np.linspace(0, 1, 81)
     ring = cabin.side.patch.evaluate(np.column_stack([u, np.full_like(u, 0.0)]))[:, :2]
     inside = rounded(np.concatenate([ring, ring[::-1] * [1, -1]]), 0.0, -0.05)

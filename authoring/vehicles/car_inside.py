@@ -17,21 +17,21 @@ _SIZE = (128, 128)
 _SIDE, _SCREEN, _REAR = Pane(0, 0, 128, 64, _SIZE), Pane(0, 64, 64, 64, _SIZE), Pane(64, 64, 64, 64, _SIZE)
 _DARK, _LINING, _SEAT, _WHEEL = (19, 20, 22), (34, 35, 37), (30, 31, 34), (9, 9, 10)
 _LIGHT = 0.66
-"""Car panes are tinted and small: less of the street is seen through two of them than through a bus's."""
+"""Brightness of the street through two panes; panes of cars are tinted, so it is darker than in a bus."""
 
 
 def look_inside(parts: Parts, cabin: Shell) -> None:
-    """Puts the inside on the glass of a car that `build_car` has just made."""
+    """Puts pictures of the inside on the glass of a car that `build_car` made."""
     parts.meshes["glass"] = [_dressed(half, cabin.corners) for half in parts.meshes["glass"]]
 
 
 def write_car_inside(path: Path) -> None:
-    """Draws what is seen through the panes of all cars, vans and lorries."""
+    """Draws the inside that is visible through the panes of cars, vans and lorries."""
     write_panes(path, _DARK, [(_SIDE, _side()), (_SCREEN, _screen()), (_REAR, _rear())])
 
 
 def _dressed(mesh: Mesh, corners: tuple[float, float]) -> Mesh:
-    """The glass of one side, left or right, with the inside on it.
+    """Returns the glass of one side, left or right, with a picture of the inside.
 
     Args:
         mesh: the glass, with the belt's parameters for texture coordinates, as `Sheet.part` makes it.
@@ -50,7 +50,7 @@ def _dressed(mesh: Mesh, corners: tuple[float, float]) -> Mesh:
 
 
 def _side() -> Picture:
-    """The side, 2.2 m by 0.45 m, the front on the right."""
+    """Draws the side windows, 2.2 m by 0.45 m, the front on the right."""
     picture = Picture(_SIDE, _DARK, 4.5)
     picture.rect(-0.1, -0.1, 1.1, 0.1, _LINING)
     picture.street(0.04, 0.14, 0.36, 0.78, 0.8 * _LIGHT)
@@ -64,7 +64,7 @@ def _side() -> Picture:
 
 
 def _screen() -> Picture:
-    """The windscreen, 1.4 m by 0.55 m, as seen from before the car: the wheel is on the right."""
+    """Draws the windscreen, 1.4 m by 0.55 m, as seen from before the car: the wheel is on the right."""
     picture = Picture(_SCREEN, _DARK, 2.6)
     picture.rect(-0.1, -0.1, 1.1, 0.08, _LINING)
     picture.street(0.32, 0.24, 0.68, 0.58, 0.8 * _LIGHT)
@@ -79,7 +79,7 @@ def _screen() -> Picture:
 
 
 def _rear() -> Picture:
-    """The rear window, 1.2 m by 0.4 m: headrests before the windscreen's light."""
+    """Draws the rear window, 1.2 m by 0.4 m: headrests in front of the bright windscreen."""
     picture = Picture(_REAR, _DARK, 3.0)
     picture.rect(-0.1, -0.1, 1.1, 0.1, _LINING)
     picture.street(0.16, 0.22, 0.84, 0.66, 0.7 * _LIGHT)
@@ -94,6 +94,6 @@ def _rear() -> Picture:
 
 
 def _seat(picture: Picture, x: float, top: float, width: float) -> None:
-    """A headrest and the back below it."""
+    """Draws a headrest and the back of the seat below it."""
     picture.rect(x - 0.36 * width, top, x + 0.36 * width, top + 0.22, _SEAT, 0.3)
     picture.rect(x - width / 2, top + 0.25, x + width / 2, 1.3, _SEAT, 0.25)

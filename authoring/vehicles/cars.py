@@ -1,4 +1,4 @@
-"""Saloon, estate and sports car: their lines."""
+"""Specifications of the saloon, the estate car and the sports car."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def _mirror_part(spec: CarSpec) -> str:
 
 
 def _boxes(spec: CarSpec, bounds: Floats, cabin: Shell) -> tuple[Box, ...]:
-    """A box round the body and one round the cabin; mirrors stand out of them."""
+    """Returns a box around the body and a box around the cabin, without the mirrors."""
     half = max(y for _, y in spec.plan) + 0.02
     foot = cabin.side.points
     belt, low = float(foot[:, 2].min()) + 0.05, 0.12

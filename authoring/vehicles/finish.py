@@ -1,4 +1,4 @@
-"""From parts to files: paint maps with shut lines, OBJ meshes, and the vehicle's MJCF."""
+"""Writes the files of a vehicle: paint textures with shut lines, OBJ meshes, and MJCF."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ __all__ = ["PALETTES", "Box", "Finish", "PaintMap", "write_vehicle"]
 
 _DARK, _DARK_PX, _RAMP_PX = 56 / 255, 40, 3
 """How dark shut lines are at their bottoms, how large a square shows that (in mip levels it is to be dark, too), and
-how much of the texture lies between a lip and the bottom."""
+how much of the texture lies between a lip and the bottom.
+"""
 
 PALETTES = {
     # Linear albedo and weight; the weights follow what European registrations look like.
@@ -38,7 +39,7 @@ PALETTES = {
 
 @dataclass(frozen=True)
 class PaintMap:
-    """Where paint lies in its texture, and the lines cut into it.
+    """The layout of the paint texture, and the shut lines that are cut into the paint.
 
     The map has a side view (x, z) at the bottom, a top view (x, |y|) above it, then front and rear views (|y|, z) side
     by side: both sides of a vehicle share their texels.
@@ -46,7 +47,7 @@ class PaintMap:
     Attributes:
         low, high: (3,) bounds of the painted parts, metres.
         size: (width, height) of the texture in pixels.
-        side, top, front, rear: polylines of shut lines in metres, as `carve` takes them.
+        side, top, front, rear: polylines of shut lines in metres, as in `carve`.
     """
 
     low: Floats
@@ -78,7 +79,7 @@ class PaintMap:
         return np.stack([right, up], axis=-1)
 
     def unwrap(self, mesh: Mesh) -> Mesh:
-        """Gives every face the view it looks at; vertices between views are doubled."""
+        """Assigns each face to the view in its direction; vertices between two views are doubled."""
         corners = mesh.vertices[mesh.faces]
         normal = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
         facing = normal.argmax(axis=1)
@@ -134,14 +135,14 @@ class Finish:
     """How a vehicle is written.
 
     Attributes:
-        name: the file's stem.
-        kind: `actor.kind`: car, van, truck or bus; also the class prefix.
+        name: name of the file without its ending.
+        kind: `actor.kind`: car, van, truck or bus; also the prefix of the classes.
         palette: a key of `PALETTES`.
         boxes: collision boxes.
-        metallic, roughness: of the paint.
-        comment: what the file says about itself.
-        shown: which colour of the palette the file itself has.
-        own_inside: whether its glass shows `<name>/inside.png` rather than `common/inside.png`.
+        metallic, roughness: material of the paint.
+        comment: comment at the start of the file.
+        shown: number of the palette's colour in the file itself.
+        own_inside: whether the glass shows `<name>/inside.png` rather than `common/inside.png`.
     """
 
     name: str
@@ -176,7 +177,7 @@ def write_vehicle(
         out: the folder of vehicles.
         finish: names, colours and boxes.
         meshes: by material: paint, glass, trim, lights, tyre, rim, chrome, body, plate.
-        paint_map: of the paint.
+        paint_map: layout of the paint texture.
         face: for a patchable truck, its extra asset, geom and site lines.
     """
     folder = out / finish.name
@@ -239,7 +240,7 @@ def write_vehicle(
 
 
 def _plates(name: str, mesh: Mesh) -> list[str]:
-    """Number plates with one text each: instances wear them by turns."""
+    """Returns number plates with one text each, which the instances have in turn."""
     vertices = "  ".join(" ".join(f"{v:.4g}" for v in row) for row in mesh.vertices)
     faces = "  ".join(" ".join(str(v) for v in row) for row in mesh.faces)
     lines = []

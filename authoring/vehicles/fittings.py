@@ -1,4 +1,4 @@
-"""What is bolted onto a body: mirrors, handles, number plates, wipers, rails, signs, exhausts."""
+"""Parts that are added to a body: mirrors, handles, number plates, wipers, rails, signs, exhausts."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ WHOLE = Cell(0.0, 0.0, 1.0, 1.0, (0.0, 0.0))
 
 
 def panel(width: float, height: float, at: tuple[float, float, float], yaw_deg: float, cell: Cell) -> Mesh:
-    """An upright rectangle with a texture cell, facing +x when `yaw_deg` is 0; its middle is at `at`."""
+    """Returns an upright rectangle with a cell of the texture; it faces +x if `yaw_deg` is 0, and its middle is at
+    `at`.
+    """
     half_w, half_h = width / 2, height / 2
     sheet = Mesh.of(
         [[0, -half_w, -half_h], [0, half_w, -half_h], [0, half_w, half_h], [0, -half_w, half_h]],
@@ -46,7 +48,7 @@ def add_mirrors(
     parts: Parts, cabin: Shell, x: float, z: float, *, size: tuple[float, float, float] = (0.11, 0.20, 0.14),
     paint: str = "paint",
 ) -> None:  # fmt: skip
-    """Door mirrors on short arms, beside the point (x, z) of the cabin."""
+    """Adds door mirrors on short arms, beside the point (x, z) of the cabin."""
     point, _ = surface_point(cabin.side, x, z)
     y = point[1] + 0.06 + size[1] / 2
     bevel = min(size) * 0.3
@@ -67,7 +69,7 @@ def add_mirrors(
 
 
 def add_handles(parts: Parts, body: Shell, places: tuple[tuple[float, float], ...], material: str = "paint") -> None:
-    """Pull handles along the flanks at (x, z)."""
+    """Adds door handles on both sides at positions (x, z)."""
     section = [(-0.016, -0.006), (0.016, -0.006), (0.016, 0.004), (0.008, 0.011), (-0.008, 0.011), (-0.016, 0.004)]
     upright = extrude(section, 0.17).translated(z=-0.085)
     grip = Mesh(upright.vertices[:, [2, 1, 0]], upright.faces[:, ::-1], upright.uvs)
@@ -82,7 +84,7 @@ def add_handles(parts: Parts, body: Shell, places: tuple[tuple[float, float], ..
 
 
 def add_plate(parts: Parts, body: Shell, z: float, front: bool, *, stand_off: float = 0.012) -> None:
-    """A number plate, which shows the whole of its picture, in its holder, in the middle of the front or the rear."""
+    """Adds a number plate in its holder, in the middle of the front or the rear."""
     v = np.linspace(0, 1, 201)
     line = body.side.patch.evaluate(np.column_stack([np.full_like(v, 0.0 if front else 1.0), v]))
     nearest = int(np.abs(line[:, 2] - z).argmin())
@@ -93,7 +95,7 @@ def add_plate(parts: Parts, body: Shell, z: float, front: bool, *, stand_off: fl
 
 
 def add_wipers(parts: Parts, cabin: Shell, *, rise: float = 0.1) -> None:
-    """Two blades parked along the foot of the windscreen."""
+    """Adds two wiper blades along the foot of the windscreen."""
     right = cabin.corners[0] * 0.92
     u_all = np.linspace(0, right, 200)
     for start, end in ((0.02, 0.62), (-0.62, -0.05)):
@@ -117,7 +119,7 @@ def _roof_z(sheet: Sheet, x: float, y: float) -> float:
 
 
 def add_rails(parts: Parts, cabin: Shell, x0: float, x1: float, y: float) -> None:
-    """Roof rails along both sides from x0 (front) to x1."""
+    """Adds roof rails along both sides from x0 (front) to x1."""
     x = np.linspace(x0, x1, 9)
     lift = 0.045 * np.minimum(1, 6 * np.minimum(np.linspace(0, 1, 9), np.linspace(1, 0, 9)))
     z = np.array([_roof_z(cabin.top, float(at), y) for at in x])
@@ -131,7 +133,7 @@ def add_rails(parts: Parts, cabin: Shell, x0: float, x1: float, y: float) -> Non
 
 
 def add_antenna(parts: Parts, cabin: Shell, x: float) -> None:
-    """A shark fin on the roof."""
+    """Adds an aerial in the shape of a fin on the roof."""
     z = _roof_z(cabin.top, x, 0.0) - 0.01
     outline = np.array([[0.09, 0.0], [0.0, 0.02], [-0.09, 0.016], [-0.09, -0.016], [0.0, -0.02]])
     top = np.array([[-0.055, 0.0], [-0.07, 0.006], [-0.095, 0.005], [-0.095, -0.005], [-0.07, -0.006]])
@@ -141,7 +143,7 @@ def add_antenna(parts: Parts, cabin: Shell, x: float) -> None:
 
 
 def add_roof_sign(parts: Parts, cabin: Shell, x: float, text_cell: str = "taxi") -> None:
-    """A taxi sign across the roof."""
+    """Adds a taxi sign across the roof."""
     z = _roof_z(cabin.top, x, 0.0)
     block = bevelled_box((0.15, 0.56, 0.15), 0.03, 1, (x, 0, z + 0.075))
     v = block.vertices.copy()
@@ -155,7 +157,7 @@ def add_roof_sign(parts: Parts, cabin: Shell, x: float, text_cell: str = "taxi")
 
 
 def add_light_bar(parts: Parts, cabin: Shell, x: float, width: float = 1.1) -> None:
-    """A flat bar of blue lamps across the roof."""
+    """Adds a flat bar of blue lamps across the roof."""
     z = _roof_z(cabin.top, x, 0.0)
     foot = bevelled_box((0.2, width * 0.8, 0.05), 0.015, 1, (x, 0, z + 0.015))
     parts.add("trim", flat(foot, DETAILS["plastic"]))
@@ -166,7 +168,7 @@ def add_light_bar(parts: Parts, cabin: Shell, x: float, width: float = 1.1) -> N
 
 
 def add_badge(parts: Parts, body: Shell, z: float, front: bool, radius: float = 0.045) -> None:
-    """A maker's badge, of no maker: a silver disc with a dark middle."""
+    """Adds the badge of an invented maker: a silver disc with a dark middle."""
     v = np.linspace(0, 1, 201)
     line = body.side.patch.evaluate(np.column_stack([np.full_like(v, 0.0 if front else 1.0), v]))
     nearest = int(np.abs(line[:, 2] - z).argmin())
@@ -181,7 +183,7 @@ def add_badge(parts: Parts, body: Shell, z: float, front: bool, radius: float = 
 
 
 def add_exhaust(parts: Parts, x: float, y: float, z: float, radius: float = 0.035, both: bool = False) -> None:
-    """A tail pipe looking backwards."""
+    """Adds an exhaust pipe that points backwards."""
     profile = [(radius, -0.14), (radius, 0.0), (radius * 0.85, 0.0), (radius * 0.85, -0.10)]
     pipe = revolve(profile, 12, "x").scaled(-1, 1, 1)
     parts.add("rim", pipe.translated(x, y, z), both_sides=both)

@@ -29,7 +29,7 @@ _LEAN = np.radians(58)
 _MARGIN_M = 1.5 * HALF_WIDTH_M + 0.001
 _SHORTEST_M = 0.03
 _SMALLEST_M2 = 0.12
-"""Smaller pieces, mirrors and handles, are bolted on before the lines and have none."""
+"""Smallest area of connected faces that get grooves, square metres; mirrors and handles are smaller and get none."""
 _FACING = 0.28
 _GRID_M, _HAIRLINE_M = 1e-7, 0.002
 _SLIVER_M2 = 1e-9
@@ -40,9 +40,9 @@ class _View:
     """A projection.
 
     Attributes:
-        axes: the two that it shows.
-        along: the axis that it looks along.
-        sign: +1 where it sees what faces along that axis, -1 for the opposite.
+        axes: numbers of the two axes in the plane of the projection.
+        along: number of the axis of the projection.
+        sign: +1 if it shows the faces whose normals point along that axis, -1 for the opposite direction.
     """
 
     axes: list[int]
@@ -61,11 +61,11 @@ _VIEWS = (
 
 @dataclass(frozen=True)
 class _Panel:
-    """Connected faces that a projection sees, as a plane figure.
+    """Connected faces that are visible in a projection, as triangles in its plane.
 
     Attributes:
         faces: (K,) indices into the mesh.
-        corners: (K, 3, 2) in the projection, metres.
+        corners: (K, 3, 2) corners in the projection, metres.
         triangles: (K,) polygons.
     """
 
@@ -76,12 +76,12 @@ class _Panel:
 
 @dataclass(frozen=True)
 class _Cut:
-    """What comes in place of a face.
+    """The pieces that replace a face.
 
     Attributes:
-        face: its index in the mesh.
-        pieces: of it, those of the groove sunk.
-        is_groove: (M,) which pieces these are.
+        face: index of the face in the mesh.
+        pieces: the pieces; those of the groove lie below the surface.
+        is_groove: (M,) whether each piece belongs to the groove.
     """
 
     face: int
@@ -93,7 +93,7 @@ def carve(mesh: Mesh, lines: Mapping[str, Sequence[Line]], shade: Floats) -> Mes
     """Cuts grooves into a skin.
 
     Args:
-        mesh: with normals and texture coordinates.
+        mesh: the skin, with normals and texture coordinates.
         lines: by projection, `side` (x, z), `top` (x, |y|), `front` and `rear` (|y|, z): polylines in metres.
         shade: (2, 2) texture coordinates of a groove's lips and of its bottom: its walls show what lies between.
     """
@@ -117,7 +117,7 @@ def carve(mesh: Mesh, lines: Mapping[str, Sequence[Line]], shade: Floats) -> Mes
 
 
 def _panels(mesh: Mesh, view: _View, is_groove: npt.NDArray[np.bool_]) -> list[_Panel]:
-    """What is seen, in pieces that hang together; grooves are left out."""
+    """Returns the connected faces that are visible in a projection, without grooves."""
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
@@ -148,7 +148,7 @@ def _shares(points: Floats, corners: Floats) -> Floats:
 
 
 def _cuts(mesh: Mesh, panel: _Panel, view: _View, drawn: shapely.Geometry, shade: Floats) -> list[_Cut]:
-    """The faces of a panel that grooves run over, cut."""
+    """Cuts the faces of a panel at its grooves."""
     # Where sheets meet vertex by vertex but for a few, hairlines stay between them: they are no edges of a panel.
     whole = shapely.union_all(panel.triangles, grid_size=_GRID_M).buffer(_HAIRLINE_M, join_style="mitre")
     inner = whole.buffer(-_HAIRLINE_M - _MARGIN_M, join_style="mitre")
@@ -164,7 +164,9 @@ def _cuts(mesh: Mesh, panel: _Panel, view: _View, drawn: shapely.Geometry, shade
 
 
 def _end_walls(bottom: shapely.Geometry) -> list[shapely.Geometry]:
-    """From where a bottom ends to the corners of the band about it: the edges of the slope up to its end."""
+    """Returns the edges from the end of a bottom to the corners of the band around it, which bound the slope at the
+    end.
+    """
     lines = [shapely.get_coordinates(line) for line in shapely.get_parts(bottom)]
     ends = [(line[0], line[1]) for line in lines] + [(line[-1], line[-2]) for line in lines]
     walls = []

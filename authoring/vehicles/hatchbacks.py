@@ -1,4 +1,4 @@
-"""Hatchback, city car and SUV: their lines."""
+"""Specifications of the hatchback, the city car and the SUV."""
 
 from __future__ import annotations
 

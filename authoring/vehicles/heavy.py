@@ -1,4 +1,4 @@
-"""The bus, and the cab of the lorries."""
+"""Specifications of the bus and of the cab of the lorries."""
 
 from __future__ import annotations
 

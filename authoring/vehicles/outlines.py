@@ -9,7 +9,7 @@ __all__ = ["body_levels", "body_plan", "cabin_levels", "cabin_plan", "flap"]
 
 
 def body_plan(front: float, rear: float, half: float, nose: float = 1.0, tail: float = 1.0) -> Points:
-    """A car's widest outline as a control polygon; `nose` and `tail` scale how rounded its ends are."""
+    """Returns the widest outline of a car as a control polygon; `nose` and `tail` scale how rounded its ends are."""
     return (
         (front, 0.0), (front, 0.42 * half), (front - 0.05 * nose, 0.72 * half), (front - 0.17 * nose, 0.95 * half),
         (front - 0.46 * nose, half), (front - 0.95, half), (0.55, half), (-0.35, half), (rear + 0.95, half),
@@ -19,7 +19,9 @@ def body_plan(front: float, rear: float, half: float, nose: float = 1.0, tail: f
 
 
 def cabin_plan(front: float, rear: float, half: float, bow: float = 0.22, tail: float = 0.16) -> Points:
-    """A greenhouse's foot; `bow` and `tail` are how far the screens' middles stand out of their corners."""
+    """Returns the outline of the foot of a cabin; `bow` and `tail` are the bulges of windscreen and rear window,
+    metres.
+    """
     span = front - rear
     return (
         (front, 0.0), (front, 0.35 * half), (front - 0.35 * bow, 0.74 * half), (front - 0.95 * bow, 0.97 * half),
@@ -30,13 +32,15 @@ def cabin_plan(front: float, rear: float, half: float, bow: float = 0.22, tail: 
 
 
 def flap(x: float, z: float, half: float = 0.075) -> Points:
-    """The shut line of a fuel flap."""
+    """Returns the shut line of a fuel flap around (x, z)."""
     low, high, left, right = z - half, z + half, x - half, x + half
     return ((left, low), (right, low), (right, high), (left, high), (left, low))
 
 
 def body_levels(nose: float = 0.24, tail: float = 0.09, shoulder: float = 0.095) -> tuple[Level, ...]:
-    """A body's cross-section: sill, flank with a crease, shoulder; drawn in at the top by so much in each direction."""
+    """Returns the cross-section of a body: sill, side with a crease, shoulder; the arguments are how far it narrows
+    towards the top in each direction, metres.
+    """
     return (
         Level(0.0, 0.10, 0.12, 0.12),
         Level(0.02, 0.035, 0.03, 0.03),
@@ -51,7 +55,9 @@ def body_levels(nose: float = 0.24, tail: float = 0.09, shoulder: float = 0.095)
 
 
 def cabin_levels(front: float, rear: float, side: float = 0.27) -> tuple[Level, ...]:
-    """A greenhouse's cross-section: how far its roof is drawn in from its foot in each direction."""
+    """Returns the cross-section of a cabin; the arguments are the distances of its roof from its foot in each
+    direction, metres.
+    """
     return (
         Level(0.0, 0.0, 0.0, 0.0),
         Level(0.30, 0.11 * side, 0.29 * front, 0.29 * rear),

@@ -23,7 +23,7 @@ Deform = Callable[[Floats], Floats]
 
 @dataclass(frozen=True)
 class Patch:
-    """A surface.
+    """A parametric surface.
 
     Attributes:
         evaluate: maps (N, 2) parameters to (N, 3) points.

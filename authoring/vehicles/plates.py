@@ -1,4 +1,4 @@
-"""Number plates: what is written on each vehicle's, and how a plate is drawn. No authority issues this series."""
+"""Number plates: the text of each vehicle, and the drawing of a plate. No authority issues this series."""
 
 from __future__ import annotations
 
@@ -24,19 +24,20 @@ PLATES = {
     "van_ambulance": "RA 12 EK",
     "van_panel": "NW 87 JL",
 }
-"""The text by the vehicle's file; front and rear plate of one vehicle agree. motorcycles bring their own."""
+"""Texts by the name of the vehicle's file; front and rear plate are equal. Motorcycles have texts of their own."""
 
 SHARED_PLATES = (
     "GR 68 LP", "KE 15 BD", "TO 92 VA", "HA 27 SC", "LO 44 EX", "GR 39 MU", "NW 51 TF", "DU 73 RK", "KE 86 OL",
     "SZ 20 HW", "TO 57 NY", "PV 64 GB", "LF 31 CE", "GR 90 DA", "HA 78 UR", "RA 45 JT", "LO 13 WN", "KE 29 PH",
 )  # fmt: skip
-"""What is written on the plates of those that are not the first of their kind in a town."""
+"""Texts of the plates of all further instances of a vehicle in a town."""
 
 _EDGE, _WHITE, _BLUE, _INK = (20, 20, 20), (232, 232, 226), (28, 58, 150), (16, 16, 18)
 
 
 def draw_plate(text: str, width: int, height: int) -> Image.Image:
-    """A plate that fills a picture of `width` by `height` pixels: dark edge, blue band at the left, one line of text.
+    """Draws a plate that fills a picture of `width` by `height` pixels: dark edge, blue band at the left, one line of
+    text.
 
     A plate less than twice as wide as high, such as a motorcycle's, has two lines and no band.
     """

@@ -1,4 +1,4 @@
-"""Signed distances in a plane (negative inside), to be stamped into sheets: window outlines, lamps, arches."""
+"""Signed distances in a plane (negative inside), for shapes that are cut into sheets: windows, lamps, arches."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Shape = Callable[[Floats], Floats]
 
 
 def disc(x: float, y: float, radius: float) -> Shape:
-    """A full circle."""
+    """Returns the signed distance of a circle."""
     return lambda p: np.hypot(p[:, 0] - x, p[:, 1] - y) - radius
 
 
 def rounded(corners: ArrayLike, radius: float = 0.0, grow: float = 0.0) -> Shape:
-    """A (C, 2) polygon with corners of a radius, all of it grown by `grow` metres.
+    """Returns the signed distance of a (C, 2) polygon with rounded corners, enlarged by `grow` metres.
 
-    A polygon too small for its radius raises ValueError: the caller's drawing is wrong.
+    A polygon that is too small for the radius raises a ValueError.
     """
     shrunk = Polygon(np.asarray(corners, dtype=np.float64)).buffer(-radius, join_style="mitre")
     if shrunk.is_empty or shrunk.geom_type != "Polygon":

@@ -1,4 +1,4 @@
-"""A triangulated patch that can be stamped: outlines are cut exactly into it and what lies inside gets a material."""
+"""A triangulated patch into which outlines are cut exactly; the faces inside an outline get a material."""
 
 from __future__ import annotations
 

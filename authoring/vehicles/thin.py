@@ -1,4 +1,4 @@
-"""Fewer triangles where a stamped sheet is flat: vertices that its shape does not need are taken out again."""
+"""Removes vertices of a sheet that its shape does not need, so that flat parts have fewer triangles."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ __all__ = ["thin"]
 
 _ROUNDS = 12
 _LEAST_HEIGHT = 0.06
-"""Of a triangle, as a share of its longest side, unless it replaces worse ones."""
+"""Smallest height of a new triangle as a share of its longest side, unless it replaces thinner triangles."""
 
 
 class _Trial:
-    """Tells how well faces would lie on a patch, each asked for once."""
+    """Computes how well faces would lie on a patch, and keeps the results."""
 
     def __init__(self, sheet: Sheet, miss_m: float, least_cos: float) -> None:
         """Takes the sheet as it is; its vertices keep their numbers meanwhile."""

@@ -1,4 +1,4 @@
-"""Taxi, police car, pick-up and vans: cars by other measures."""
+"""Specifications of the taxi, the police car, the pick-up and the vans."""
 
 from __future__ import annotations
 

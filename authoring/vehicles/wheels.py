@@ -13,16 +13,16 @@ __all__ = ["Wheel", "WheelSpec", "make_wheel"]
 
 @dataclass(frozen=True)
 class WheelSpec:
-    """A wheel's measures, metres.
+    """The dimensions of a wheel, metres.
 
     Attributes:
         radius: hub to ground.
-        width: of the tyre.
+        width: width of the tyre.
         rim: radius of the rim's edge.
-        spokes: how many; 0 makes a plain dished disc as vans and lorries have.
-        spoke_width: at the hub.
-        dish: how far the middle stands behind the rim's edge.
-        segments: round the tyre.
+        spokes: number of spokes; 0 makes a plain dished disc, as vans and lorries have.
+        spoke_width: width of a spoke at the hub.
+        dish: distance of the middle behind the edge of the rim.
+        segments: number of segments around the tyre.
     """
 
     radius: float = 0.33
