@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import time
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from gear.values.errors import TownError
@@ -19,6 +20,13 @@ ASSET_SUFFIXES = (".xml", ".obj", ".msh", ".stl", ".png")
 
 _KEY_POINT_LINE = re.compile(rb"""\s*<numeric\s+name=["']key_point\.[^<>]*/>""")
 """An element that names a key point, with the white space before it."""
+
+_SETTLED_NS = 2_000_000_000
+"""Age of a file's last change from which its hashes are remembered, nanoseconds; file systems count in steps of up to
+two seconds.
+"""
+
+_HASHES: dict[Path, tuple[tuple[int, ...], tuple[str, str]]] = {}
 
 
 def asset_files(library: AssetLibrary) -> dict[str, Path]:
@@ -36,22 +44,36 @@ def asset_files(library: AssetLibrary) -> dict[str, Path]:
     if any(root.is_relative_to(own) for root in roots):
         roots.append(own / "textures")
     files: dict[str, Path] = {}
+    others = []  # gear's own files refer to no other files, and there are many of them
     for root in roots:
-        for path in root.rglob("*") if root.is_dir() else [root]:
-            if (path.suffix.lower() in ASSET_SUFFIXES or path == library.town) and path.is_file():
-                files[f"{root.name}/{path.relative_to(root).as_posix()}"] = path
-    # gear's own files refer to no other files. There are many, and resolving their paths would take most of the time.
-    others = [
-        path
-        for path in files.values()
-        if (path.suffix.lower() == ".xml" or path == library.town) and not path.is_relative_to(own)
-    ]
+        found = dict(_assets_in(root, library.town))
+        files.update(found)
+        if not root.is_relative_to(own):
+            others += [path for path in found.values() if path.suffix.lower() == ".xml" or path == library.town]
     known = {path.resolve() for path in files.values()} if others else set()
     for path in others:
         for name, referred in _referred(path):
             if referred.resolve() not in known:
                 files.setdefault(f"referred/{path.name}/{name}", referred)
     return files
+
+
+def _assets_in(root: Path, town: Path) -> Iterator[tuple[str, Path]]:
+    """The assets in a folder, or the file `root` itself: each one's name and path.
+
+    `os.walk` takes less time than `Path.rglob`.
+    """
+    if not root.is_dir():
+        if root.is_file() and (root.suffix.lower() in ASSET_SUFFIXES or root == town):
+            yield f"{root.name}/.", root
+        return
+    for name, _, files in os.walk(root):
+        folder = Path(name)
+        inner = folder.relative_to(root).as_posix()
+        prefix = f"{root.name}/" if inner == "." else f"{root.name}/{inner}/"
+        for path in map(folder.joinpath, files):
+            if (path.suffix.lower() in ASSET_SUFFIXES or path == town) and path.is_file():
+                yield f"{prefix}{path.name}", path
 
 
 def _referred(path: Path) -> Iterator[tuple[str, Path]]:
@@ -108,7 +130,7 @@ def assets_digest(library: AssetLibrary) -> str:
     Args:
         library: the asset library of the town.
     """
-    return _digest_of(asset_files(library), without_key_points)
+    return _digest_of({name: _hashes_of(path)[0] for name, path in asset_files(library).items()})
 
 
 def without_key_points(mjcf: bytes) -> bytes:
@@ -122,21 +144,35 @@ def key_points_digest(library: AssetLibrary) -> str:
     Args:
         library: the asset library of the town.
     """
-    files = {
-        name: path
-        for name, path in asset_files(library).items()
-        if path.suffix.lower() == ".xml" and _KEY_POINT_LINE.search(path.read_bytes())
-    }
-    return _digest_of(files, lambda content: b"".join(_KEY_POINT_LINE.findall(content))) if files else ""
+    hashes = {name: _hashes_of(path)[1] for name, path in asset_files(library).items()}
+    with_points = {name: digest for name, digest in hashes.items() if digest}
+    return _digest_of(with_points) if with_points else ""
 
 
-def _digest_of(files: dict[str, Path], part: Callable[[bytes], bytes]) -> str:
-    """The SHA-256 hash (hex) of the names of files and of the parts of their contents that count; MJCF files have such
-    parts, and of all others the whole content counts.
+def _hashes_of(path: Path) -> tuple[str, str]:
+    """The SHA-256 hashes (hex) of a file: of the part that pictures can show, and of its key points ("" for none).
+
+    They are computed once for a state of the file: every change sets the time `st_ctime_ns`. A file that has just been
+    changed is not remembered, because a second change in the same tick of the clock would leave the time as it is.
     """
+    status = path.stat()
+    state = (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+    known = _HASHES.get(path)
+    if known is not None and known[0] == state:
+        return known[1]
+    content, key_points = path.read_bytes(), b""
+    if path.suffix.lower() == ".xml":
+        key_points = b"".join(_KEY_POINT_LINE.findall(content))
+        content = without_key_points(content)
+    hashes = hashlib.sha256(content).hexdigest(), hashlib.sha256(key_points).hexdigest() if key_points else ""
+    if time.time_ns() - status.st_ctime_ns > _SETTLED_NS:
+        _HASHES[path] = state, hashes
+    return hashes
+
+
+def _digest_of(hashes: dict[str, str]) -> str:
+    """The SHA-256 hash (hex) of the names of files and of the hashes of their contents."""
     digest = hashlib.sha256()
-    for name in sorted(files):
-        content = files[name].read_bytes()
-        counted = part(content) if files[name].suffix.lower() == ".xml" else content
-        digest.update(f"{name}\0{hashlib.sha256(counted).hexdigest()}\n".encode())
+    for name in sorted(hashes):
+        digest.update(f"{name}\0{hashes[name]}\n".encode())
     return digest.hexdigest()

@@ -1,13 +1,16 @@
 from __future__ import annotations
 
+import os
 import re
 import shutil
+import time
 from pathlib import Path
 
 import pytest
 
 from gear.testing.tiny_town import CLEAR, TINY_TOWN, tiny_scenes
 from gear.values.errors import TownError, UnknownNameError
+from gear.world.assets import asset_hash
 from gear.world.assets.asset_hash import _referred, asset_files, assets_digest, key_points_digest
 from gear.world.assets.library import AssetLibrary, read_actor_facts
 from gear.world.assets.scene_assets import read_scene_assets
@@ -306,3 +309,22 @@ def test_a_vehicle_must_keep_the_conventions(tmp_path: Path, old: str, new: str,
     town.write_text(TINY_TOWN.read_text())
     with pytest.raises(TownError, match=told):
         World.build(town=town, scene_name="board", scene=tiny_scenes().scenes["board"], weather=CLEAR)
+
+
+@pytest.mark.parametrize("settled_ns", [0, 1 << 62])
+def test_every_change_of_a_file_is_noticed(settled_ns: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hashes of files that have not changed are remembered; size and time of change may stay as they are."""
+    monkeypatch.setattr(asset_hash, "_SETTLED_NS", settled_ns)
+    shutil.copytree(TINY_TOWN.parents[1], tmp_path / "mjcf")
+    library = AssetLibrary(tmp_path / "mjcf/towns/tiny.xml")
+    person = tmp_path / "mjcf/pedestrians/adult_stand.xml"
+    times = person.stat()
+    digests = {assets_digest(library)}
+    for position in ("0.12 0 1.67", "0.12 0 1.68"):
+        digests.add(key_points_digest(library))
+        time.sleep(0.02)  # a tick of the clock
+        person.write_text(person.read_text().replace("0.12 0 1.66", position).replace("0.12 0 1.67", position))
+        os.utime(person, ns=(times.st_atime_ns, times.st_mtime_ns))
+        digests.add(key_points_digest(library))
+    assert len(digests) == 4
+    assert bool(settled_ns) != any(path.is_relative_to(tmp_path) for path in asset_hash._HASHES)
