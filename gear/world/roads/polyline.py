@@ -65,6 +65,18 @@ class Polyline:
         point[:2] += np.array([-step[1], step[0]]) * (lateral_m / length_m)
         return point, math.atan2(step[1], step[0])
 
+    def points_at(self, s_m: Array) -> Array:
+        """The points on the line at several arc lengths: (N, 3), bit for bit those of `at`.
+
+        Args:
+            s_m: (N,) arc lengths in metres; beyond its ends the line continues straight.
+        """
+        index = np.clip(np.searchsorted(self.s_m, s_m, side="right") - 1, 0, len(self.s_m) - 2)
+        steps = np.diff(self.points_m, axis=0)
+        # NumPy's own hypot may differ from Python's in the last bit.
+        lengths_m = np.array([math.hypot(x, y) for x, y in steps[:, :2].tolist()])
+        return np.asarray(self.points_m[index] + steps[index] * ((s_m - self.s_m[index]) / lengths_m[index])[:, None])
+
     def heading(self, s_m: float, reach_m: float) -> float:
         """The mean heading of the line around an arc length, which changes steadily around a corner, unlike the
         heading of a segment.

@@ -84,16 +84,15 @@ class LineTable:
             lines: tuples (name, line, weight) of the lanes or walks; the weight is the relative probability per metre.
         """
         names: list[str] = []
-        rows: list[tuple[float, float, float, float, float, float]] = []
+        parts = [np.zeros((0, 6))]
         for name, line, weight in lines:
             pieces = max(1, round(line.length_m / TABLE_STEP_M))
             step_m = line.length_m / pieces
-            for piece in range(pieces):
-                s_m = (piece + 0.5) * step_m
-                x, y, z = line.at(s_m)[0]
-                names.append(name)
-                rows.append((s_m, step_m, float(x), float(y), float(z), weight))
-        table = np.array(rows, dtype=np.float64).reshape(-1, 6)
+            s_m = (np.arange(pieces, dtype=np.float64) + 0.5) * step_m
+            names += [name] * pieces
+            ones = np.ones(pieces)
+            parts.append(np.column_stack([s_m, step_m * ones, line.points_at(s_m), weight * ones]))
+        table = np.concatenate(parts)
         return LineTable(tuple(names), table[:, 0], table[:, 1], table[:, 2:5], table[:, 5])
 
     def inside(self, region: Region) -> npt.NDArray[np.intp]:

@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from gear.values.frames import UInt8Image
+from gear.values.geometry import frozen
 from gear.values.scene import Weather
 from gear.world.weather.sky import Sky
 
@@ -188,8 +190,12 @@ def _looks(sky: Sky) -> float:
     return float(NIGHT_SKY_SHARE**sky.night)
 
 
+@lru_cache(maxsize=8)
 def _exposure(sky: Sky) -> tuple[float, Floats]:
-    """The exposure in units of the frame per kcd/m², and the (3,) illuminance in klx of a roof by the sky."""
+    """The exposure in units of the frame per kcd/m², and the (3,) illuminance in klx of a roof by the sky, read-only.
+
+    All lights of a weather need it, so it is remembered for the `Sky` objects that `Sky.of` remembers.
+    """
     coarse = face_directions(_INTEGRATION_PX)
     radiance, solid_angle = sky.radiance(coarse, with_disc=False), _solid_angles(_INTEGRATION_PX)
     flat_sun = np.array([*sky.towards_sun[:2], 0.0])
@@ -200,7 +206,7 @@ def _exposure(sky: Sky) -> tuple[float, Floats]:
         for klx, normal in zip(from_sky, walls, strict=True)
     )
     bright_sky = float(np.quantile(radiance[coarse[..., 2] > 0].max(axis=-1), 0.9))
-    return min(WHITE_LEVEL / (WHITE_ALBEDO / math.pi * brightest), SKY_LEVEL / bright_sky), from_sky[1]
+    return min(WHITE_LEVEL / (WHITE_ALBEDO / math.pi * brightest), SKY_LEVEL / bright_sky), frozen(from_sky[1])
 
 
 def face_directions(size: int) -> Floats:

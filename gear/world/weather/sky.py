@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from gear.camera.fractal import TILE_PX, periodic_noise, sampled
+from gear.values.geometry import frozen
 from gear.values.rng import derive_rng
 from gear.values.scene import Weather
 
@@ -82,8 +83,9 @@ class Sky:
     night: float
 
     @staticmethod
+    @lru_cache(maxsize=8)
     def of(weather: Weather) -> Sky:
-        """Makes the sky for a weather, which has CARLA's parameters.
+        """Makes the sky for a weather, which has CARLA's parameters; the same object for equal weathers.
 
         Args:
             weather: the weather.
@@ -104,8 +106,8 @@ class Sky:
         daylight = float(_smooth_step(math.radians(-8), math.radians(3), np.array(altitude)))
         through_clouds = 1 - 0.97 * float(_smooth_step(0.15, 0.95, np.array(cover)))
         return Sky(
-            towards_sun=towards_sun,
-            sun_klx=_beam_klx(shown_altitude, turbidity) * through_clouds * max(daylight, 0.01),
+            towards_sun=frozen(towards_sun),
+            sun_klx=frozen(_beam_klx(shown_altitude, turbidity) * through_clouds * max(daylight, 0.01)),
             cloud_cover=cover,
             turbidity=turbidity,
             blueness=float(np.clip(weather.rayleigh_scattering_scale / 0.0331, 0.0, 1.5)),

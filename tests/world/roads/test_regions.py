@@ -52,3 +52,20 @@ def test_only_pieces_inside_are_found() -> None:
     inside = table.inside(Region(radius_m=(0.0, 5.0), centre_m=(20.0, 0.0)))
     assert table.s_m[inside].min() == pytest.approx(15.5) and table.s_m[inside].max() == pytest.approx(24.5)
     assert not len(LineTable.of([]).inside(Region()))
+
+
+def test_pieces_lie_where_the_line_has_their_middles() -> None:
+    """Bit for bit: the places of road users depend on them."""
+    rng = np.random.default_rng(3)
+    lines = [
+        Polyline.through(np.cumsum(rng.normal(size=(count, 3)) * rng.uniform(0.2, 20), axis=0))
+        for count in (2, 3, 9, 40, 40)
+    ]
+    table = LineTable.of((str(number), each, 0.5 + number) for number, each in enumerate(lines))
+    assert len(table.names) > 100 and set(table.names) == {"0", "1", "2", "3", "4"}
+    for name, s_m, point_m, weight in zip(table.names, table.s_m, table.points_m, table.weight, strict=True):
+        expected_m, _ = lines[int(name)].at(float(s_m))
+        assert point_m.tobytes() == expected_m.tobytes() and weight == 0.5 + int(name)
+    for number, each in enumerate(lines):
+        lengths_m = table.length_m[np.array(table.names) == str(number)]
+        assert lengths_m.sum() == pytest.approx(each.length_m) and np.ptp(lengths_m) == 0
