@@ -136,7 +136,9 @@ class Facade:
                 start = max(start, right)
 
     def reveal(self, material: str, opening: Opening, depth_m: float, *, skip: str = "") -> None:
-        """Adds the four cheeks of a recess behind an opening; `skip` leaves out some: l(eft), r(ight), u(pper), s(ill)."""
+        """Adds the four cheeks of a recess behind an opening; `skip` leaves out some: l(eft), r(ight), u(pper),
+        s(ill).
+        """
         o, d = opening, -depth_m
         at = self.at
         cheeks = {

@@ -75,7 +75,9 @@ SHIN: list[Station] = [
 def sized(
     stations: Sequence[Station], build: Build, *, girth: float = 1.0, ease: float = 0.0, length: float = 1.0
 ) -> list[Station]:
-    """Returns the stations of a build: scaled by its height, in girth also by a factor, and enlarged by `ease` metres."""
+    """Returns the stations of a build: scaled by its height, in girth also by a factor, and enlarged by `ease`
+    metres.
+    """
     s = build.scale
     wide = s * girth
     return [(z * s * length, x * wide, y * wide, d * wide + ease, w * wide + ease) for z, x, y, d, w in stations]

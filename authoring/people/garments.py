@@ -1,4 +1,6 @@
-"""Clothes: each function returns the pieces of a garment for a posed skeleton; `functools.partial` sets its parameters."""
+"""Clothes: each function returns the pieces of a garment for a posed skeleton; `functools.partial` sets its
+parameters.
+"""
 
 from __future__ import annotations
 

@@ -137,7 +137,9 @@ def leg_lengths(build: Build) -> tuple[float, float]:
 
 
 def pose_skeleton(build: Build, pose: Pose) -> Skeleton:
-    """Places every bone; the centre of the pelvis is at the origin, and the figure is moved onto the ground afterwards."""
+    """Places every bone; the centre of the pelvis is at the origin, and the figure is moved onto the ground
+    afterwards.
+    """
     s = build.scale
     frames: dict[str, Frame] = {"pelvis": Frame(np.zeros(3), turn_y(pose.pelvis))}
     pelvis = frames["pelvis"]

@@ -83,7 +83,9 @@ def band(base: Field, frame: Frame, z: float, *, half_m: float, thick_m: float) 
 
 
 def sheet(frame: Frame, base: Field, rows: Sequence[tuple[float, float, float]], *, thick_m: float) -> Field:
-    """Returns cloth that lies on the front of `base`: rows of (z, distance from the middle, half-width), on both sides."""
+    """Returns cloth that lies on the front of `base`: rows of (z, distance from the middle, half-width), on
+    both sides.
+    """
     table = np.array(sorted(rows))
 
     def distance(points: Array) -> Array:

@@ -27,7 +27,9 @@ _DARKEST = 0.25
 
 
 def _ramp(width: int) -> Array:
-    """Returns the brightness along a swatch; it is constant at both ends, so that neighbouring swatches never mix in."""
+    """Returns the brightness along a swatch; it is constant at both ends, so that neighbouring swatches never
+    mix in.
+    """
     margin = width // 8
     return np.clip((np.arange(width) + 0.5 - margin) / (width - 2 * margin), 0.0, 1.0) * (1.0 - _DARKEST) + _DARKEST
 

@@ -75,7 +75,9 @@ def _door(pane: Pane, rng: np.random.Generator, kind: int) -> Picture:
 
 
 def _screen(rng: np.random.Generator) -> Picture:
-    """Draws the windscreen, 2.5 m by 1.55 m, as seen from before the bus: the driver sits on the right of the picture."""
+    """Draws the windscreen, 2.5 m by 1.55 m, as seen from before the bus: the driver sits on the right of the
+    picture.
+    """
     picture = Picture(SCREEN, _DARK, 2.45 / 1.55)
     _aisle(picture, 0.46, 0.44)
     for k, x in enumerate((0.30, 0.60)):

@@ -278,7 +278,9 @@ def _glaze(spec: CarSpec, cabin: Shell) -> None:
 
 
 def side_lines(spec: CarSpec, cabin: Shell) -> tuple[Points, ...]:
-    """Returns all shut lines of the side view: those of the specification, and those of the doors around the windows."""
+    """Returns all shut lines of the side view: those of the specification, and those of the doors around the
+    windows.
+    """
     if spec.door_rear is None:
         return spec.lines_side
     front, rear = cabin.along(np.array(cabin.corners))
@@ -297,7 +299,9 @@ def side_lines(spec: CarSpec, cabin: Shell) -> tuple[Points, ...]:
 
 
 def _band(sheet: Sheet, low_x: float, high_x: float, material: str, where: Field, on: tuple[str, ...]) -> None:
-    """Names all faces between two x positions; both lines are cut first, because the band may be narrower than a face."""
+    """Names all faces between two x positions; both lines are cut first, because the band may be narrower than
+    a face.
+    """
     for x in (low_x, high_x):
         sheet.cut(_offset(0, x), where=where, on=on)
     middle, half = (low_x + high_x) / 2, (high_x - low_x) / 2

@@ -88,10 +88,10 @@ def axis_matrices(patch_px: int, face_px: int, halving: Halving = "middles") -> 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reads:
-    """Where each texel along one axis of a mip level is read: a weighted sum of k stored texels along this axis.
+    """Positions and weights by which the texels along one axis of a mip level are weighted sums of k stored texels.
 
-    If the level is stored, k is 1. If it is not, because it is finer than the patch, the patch's pixels are read
-    instead.
+    For a stored level, k is 1. A level that is finer than the patch is not stored; its texels are weighted sums of the
+    patch's pixels.
 
     Attributes:
         index: (texels, k) int64 positions along the axis, in the level or in the patch.

@@ -95,9 +95,9 @@ class Visibility:
     """Option of a task: a preset of visibility limits, and limits that replace those of the preset.
 
     Attributes:
-        preset: `kitti` labels objects from 24 px of height with a tenth of them visible, `coco` objects with 100
-            visible pixels, `carla_gear` the objects of the CARLA-GeAR paper: within 200 m, with a visible box of 900
-            px², a tenth of them and 100 pixels visible.
+        preset: which objects get labels. `kitti`: at least 24 px high and at least a tenth visible. `coco`: at least
+            100 visible pixels. `carla_gear`, as in the CARLA-GeAR paper: at most 200 m away, with a visible box of at
+            least 900 px², at least a tenth and at least 100 pixels visible.
         max_distance_m: largest distance from the camera to the middle of the object's 3D box.
         min_height_px: smallest height of the box that the format writes.
         min_box_area_px2: smallest area of the tight box of the visible pixels.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 from scipy import sparse
 
 from gear.compositor.pyramid import pyramid_of
@@ -64,3 +65,32 @@ def test_the_middle_of_a_pixel_of_the_patch_reads_this_pixel_only() -> None:
     found = matrix(0.0, u=(2 + 0.5) / 4, v=(1 + 0.5) / 4)
     assert found.indices.tolist() == [1 * 4 + 2]
     assert found.data == pytest.approx([1])
+
+
+@pytest.mark.parametrize("level", [0, 1, 2, 3, 4])
+def test_samples_are_bilinear_in_the_repeating_texture_of_their_level(level: int) -> None:
+    """A patch of 75 x 150 pixels: the texture repeats each pixel 8 x 8 times, level 3 is the patch, level 4 is stored.
+
+    The texel (row, column) of a level of h x w texels has its centre at u = (column + 0.5) / w, v = (row + 0.5) / h.
+    """
+    rng = np.random.default_rng(level)
+    patch = rng.random((3, 75, 150))
+    texture = patch.repeat(8 >> level, axis=1).repeat(8 >> level, axis=2) if level < 4 else None
+    pyramid = pyramid_of(75, 150)
+    texels = pyramid.spread(torch.from_numpy(patch)).numpy()
+    if texture is None:
+        height, width = pyramid.shape(level)
+        texture = texels[pyramid.starts[level] :][: height * width].T.reshape(3, height, width)
+    height, width = texture.shape[1:]
+    u, v = rng.random((2, 200))
+    ones = np.ones((200, 1))
+    found = warp_matrix(
+        Samples(u=u[:, None], v=v[:, None], level=level * ones, weight=ones, coverage=np.ones(200)), pyramid
+    )
+    x, y = u * width - 0.5, v * height - 0.5
+    left, top = np.floor(x), np.floor(y)
+    expected = np.zeros((200, 3))
+    for row, column in ((top, left), (top, left + 1), (top + 1, left), (top + 1, left + 1)):
+        share = (1 - abs(x - column)) * (1 - abs(y - row))
+        expected += share[:, None] * texture[:, row.astype(int) % height, column.astype(int) % width].T
+    assert found @ texels == pytest.approx(expected, abs=1e-5)

@@ -1,4 +1,4 @@
-"""Jobs of any kind on an engine, such as attacks, evaluations and steps of a benchmark: what their callers share.
+"""Runs jobs, such as attacks, evaluations and steps of a benchmark, on an engine (local processes, Ray or Slurm).
 
 A job that ends with an error that the user can correct has failed for good. A job that ends with any other error, or
 whose worker was lost, is tried again twice; if it still fails, its error and traceback are written to a file.

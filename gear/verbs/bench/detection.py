@@ -33,7 +33,7 @@ def rate_title(allowed: float) -> str:
 class DetectionRate:
     """The detections at one allowed share of false alarms.
 
-    The intervals take the thresholds as given.
+    The intervals do not include the uncertainty of the thresholds.
 
     Attributes:
         allowed: share of the other scenes' clean pictures that may raise an alarm.

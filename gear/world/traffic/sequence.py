@@ -235,7 +235,7 @@ def standing_discs(spawn: Spawn) -> list[tuple[float, float, float, float]]:
 
 
 def moved(spawn: Spawn, point_m: Array, yaw_rad: float, speed_mps: float) -> Spawn:
-    """The same road user at another place: (3,) point on the ground, heading in radians and speed.
+    """Returns a copy of a road user with another position, heading and speed.
 
     Args:
         spawn: the road user.

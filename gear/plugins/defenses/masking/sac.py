@@ -109,7 +109,8 @@ class Sac(MaskAndFill):
         return replace(state, report=FitReport(values=values, problems=overlap_problems("sac", own.value)))
 
     def locate(self, picture: UInt8Image, state: SacState) -> Located:
-        """Returns the (H, W) bool mask of the segmenter, completed to rectangles.
+        """Returns the (H, W) bool mask of the segmenter; each region is completed to a rectangle of a known patch size
+        if the option `completes_shape` is set.
 
         Args:
             picture: (H, W, 3) uint8 sRGB.

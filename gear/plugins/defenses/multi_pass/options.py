@@ -14,8 +14,8 @@ class ObjectSeekerConfig:
     Attributes:
         lines: number of lines that split the picture in each direction; the detector is called 4 times for each.
         masked_confidence: score that a box of a masked picture must exceed.
-        base_confidence: score above which a box of the whole picture explains boxes of masked pictures.
-        prune_share: a box of a masked picture is explained if this share of it lies in a box of the whole picture.
+        base_confidence: score above which a box of the whole picture prunes boxes of masked pictures that lie in it.
+        prune_share: share of a box of a masked picture that must lie in such a box, so that it is pruned.
     """
 
     lines: int = 30
