@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from gear.contracts.tasks import NO_PATCH, RANDOM_PATCH
 from gear.dataset.json_text import load_json
+from gear.formats.jpeg_markers import START
 from gear.formats.picture_size import check_size
 from gear.formats.quiet_decoder import decode_quietly
 from gear.formats.whole_picture import check_whole
@@ -118,7 +119,8 @@ def random_patch(seed: int, index: int) -> UInt8Image:
 
 
 def read_patch(path: Path) -> UInt8Image:
-    """Reads a patch picture as (H, W, 3) uint8 sRGB; grey is converted to RGB, and 16 bits are rounded to 8.
+    """Reads a patch picture as (H, W, 3) uint8 sRGB; grey is converted to RGB, 16 bits are rounded to 8, and a JPEG is
+    turned as its EXIF orientation says.
 
     Args:
         path: the picture.
@@ -136,7 +138,8 @@ def read_patch(path: Path) -> UInt8Image:
     try:
         check_size(data, least_px=SIDE_PX[0], most_px=SIDE_PX[1])
         check_whole(data)
-        picture = decode_quietly(data)
+        # Photographs are often stored on their side, with a note how to turn them; PNG files never are.
+        picture = decode_quietly(data, cv2.IMREAD_COLOR if data.startswith(START) else cv2.IMREAD_UNCHANGED)
     except ValueError as error:
         raise PatchError(path, str(error) if " px; sides of " in str(error) else no_picture) from error
     if picture is None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 import threading
 from typing import Any
 
@@ -41,17 +40,26 @@ def decode_quietly(data: bytes, flags: int = cv2.IMREAD_UNCHANGED) -> npt.NDArra
         return None
     with _LOCK:
         sys.stderr.flush()
-        with tempfile.TemporaryFile() as said:
-            kept = os.dup(2)
-            try:
-                os.dup2(said.fileno(), 2)
-                picture = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-            except cv2.error:
-                return None
-            finally:
-                os.dup2(kept, 2)
-                os.close(kept)
-            said.seek(0)
-            text = said.read(READ_BYTES)
+        kept, (heard, said) = os.dup(2), os.pipe()
+        try:
+            os.set_blocking(heard, False)
+            os.set_blocking(said, False)  # what does not fit into the pipe is dropped
+            os.dup2(said, 2)
+            picture = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+            text = _read(heard)
+        except cv2.error:
+            return None
+        finally:
+            os.dup2(kept, 2)
+            for descriptor in (kept, heard, said):
+                os.close(descriptor)
     is_damaged = any(message in text for message in DAMAGE)
     return None if picture is None or is_damaged else np.asarray(picture)
+
+
+def _read(pipe: int) -> bytes:
+    """What a pipe that does not block holds."""
+    try:
+        return os.read(pipe, READ_BYTES)
+    except BlockingIOError:  # nothing
+        return b""

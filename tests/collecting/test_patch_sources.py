@@ -3,6 +3,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import struct
 from pathlib import Path
 
 import cv2
@@ -205,3 +206,18 @@ def test_sixteen_bits_become_the_nearest_of_eight(tmp_path: Path) -> None:
     deep = np.random.default_rng(3).integers(0, 65536, (7, 9, 3), dtype=np.uint16)
     found = read_patch(save(tmp_path / "deep.png", deep))
     assert np.array_equal(found, np.rint(deep[..., ::-1] / 257).astype(np.uint8))
+
+
+@pytest.mark.parametrize(("orientation", "turned"), [(1, 0), (3, 2), (6, 3), (8, 1)])
+def test_a_photograph_is_turned_as_viewers_turn_it(orientation: int, turned: int, tmp_path: Path) -> None:
+    """EXIF 2.32, tag 0x0112: 3 is upside down, 6 has its top on the right, 8 on the left."""
+    halves = np.zeros((32, 64, 3), np.uint8)
+    halves[:, 32:] = (255, 128, 0)
+    data = cv2.imencode(".jpg", halves, [cv2.IMWRITE_JPEG_QUALITY, 100])[1].tobytes()
+    tag = b"MM\0*" + struct.pack(">I", 8) + struct.pack(">HHHIHHI", 1, 0x112, 3, 1, orientation, 0, 0)
+    exif = b"Exif\0\0" + tag
+    path = tmp_path / "photo.jpg"
+    path.write_bytes(data[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + data[2:])
+    expected = np.rot90(halves[..., ::-1], turned)
+    found = read_patch(path)
+    assert found.shape == expected.shape and np.abs(found.astype(int) - expected).mean() < 8

@@ -31,7 +31,10 @@ MARK = b'"gear-leaderboard"'
 """The format's name in `board.json`."""
 
 MOST_PAGE_BYTES = 64 << 20
-"""Largest size of a record's page, and of `board.json`."""
+"""Largest size of a record's page."""
+
+MOST_BOARD_BYTES = 1 << 30
+"""Largest size of a `board.json` that is recognised."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -106,7 +109,7 @@ def build_leaderboard(
 
 def _is_board(path: Path) -> bool:
     """Whether a file is a `board.json` that gear wrote."""
-    return MARK in limited(path, MOST_PAGE_BYTES)
+    return MARK in limited(path, MOST_BOARD_BYTES)
 
 
 def _verdicts(folder: Path, refused: list[str]) -> dict[str, Verdict]:
