@@ -13,7 +13,7 @@ from types import FrameType
 from gear.cli.closed_output import discard_output
 from gear.cli.machine_limits import limit_reached
 from gear.cli.parser import Parser
-from gear.cli.streams import prepare_streams
+from gear.cli.streams import complain, prepare_streams
 from gear.reporting.advice import fitted
 from gear.reporting.messages import one_line
 from gear.values.errors import GearError, UnknownNameError
@@ -109,31 +109,29 @@ def main(argv: Sequence[str]) -> int:
     except (KeyboardInterrupt, Exception) as error:
         interrupt = _interrupt_behind(error)
         if interrupt is not None:
-            print("gear: stopped; run the same command again to go on", file=sys.stderr)
+            complain("gear: stopped; run the same command again to go on")
             return 143 if isinstance(interrupt, Terminated) else 130
         if (
             isinstance(error, OSError)
             and error.filename
             and (error.errno in CIRCUMSTANCES or isinstance(error, NotAFileError))
         ):
-            print(f"gear: {one_line(error.filename)}: {error.strerror}", file=sys.stderr)
+            complain(f"gear: {one_line(error.filename)}: {error.strerror}")
             return 2
         if isinstance(error, OSError) and error.errno in FULL:  # a stream without a name, such as stdout in `> file`
-            print(f"gear: {error.strerror}", file=sys.stderr)
+            complain(f"gear: {error.strerror}")
             discard_output()
             return 2
         if isinstance(error, FileNotFoundError) and str(error.strerror).startswith(NO_TEMPORARY):
-            print(
-                f"gear: {error.strerror}; make room there, or set TMPDIR to a folder on another disk", file=sys.stderr
-            )
+            complain(f"gear: {error.strerror}; make room there, or set TMPDIR to a folder on another disk")
             return 2
         limit = limit_reached(error)
         if limit is not None:
-            print(f"gear: {limit}", file=sys.stderr)
+            complain(f"gear: {limit}")
             return 2
         if not isinstance(error, GearError):
             raise
-        print(f"gear: {fitted(_command_of(argv) or '', one_line(error))}", file=sys.stderr)
+        complain(f"gear: {fitted(_command_of(argv) or '', one_line(error))}")
         return 2
     return code
 

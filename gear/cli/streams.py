@@ -2,22 +2,56 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+import os
 import shutil
 import sys
 import textwrap
 
 from gear.measuring.text_table import WIDTH
 
+STANDARD = {"stdin": 0, "stdout": 1, "stderr": 2}
+"""Numbers of the standard streams, by their names in `sys`."""
+
+LAST_STANDARD = max(STANDARD.values())
+
 
 def prepare_streams() -> None:
     r"""Makes stdout and stderr accept every character; unsupported ones become `\xe4` or `\u2026`.
 
     Otherwise a terminal in ASCII or Latin-1 would end a command with a UnicodeEncodeError after its work is finished.
+    Streams that the caller has closed, as in `gear ... >&-`, are replaced by ones that read and keep nothing.
     """
+    _open_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+
+
+def _open_closed_streams() -> None:
+    """Opens the null device in place of closed standard streams.
+
+    Python sets a closed stream to None. The next file that is opened, such as a picture, would get its number, and with
+    it all messages of native libraries.
+    """
+    with contextlib.suppress(OSError):  # no descriptor is left, so that none of the first three is
+        while (descriptor := os.open(os.devnull, os.O_RDWR)) <= LAST_STANDARD:
+            os.set_inheritable(descriptor, True)
+        os.close(descriptor)
+    for name, number in STANDARD.items():
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, "r" if number == 0 else "w", encoding="utf-8", closefd=False))  # noqa: SIM115
+
+
+def complain(line: str) -> None:
+    """Prints a line on stderr; nothing is printed where stderr cannot be written, such as on a full disk.
+
+    Args:
+        line: text without a newline.
+    """
+    with contextlib.suppress(OSError):
+        print(line, file=sys.stderr, flush=True)
 
 
 def line_width() -> int:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -17,6 +19,30 @@ def test_characters_that_the_encoding_lacks_are_escaped(monkeypatch: pytest.Monk
     print("dätä … \udc80")
     sys.stdout.flush()
     assert raw.getvalue() == rb"d\xe4t\xe4 \u2026 \udc80" + b"\n"
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&-", "<&- >&- 2>&-"])
+def test_closed_streams_read_and_keep_nothing(closed: str, tmp_path: Path) -> None:
+    """A file that is opened later does not get the number of a standard stream, in this process or in its children."""
+    code = (
+        "import subprocess, sys; from gear.cli.streams import prepare_streams; prepare_streams(); print('out'); "
+        "print('err', file=sys.stderr); sys.stdin.read(); "
+        f"file = open({str(tmp_path / 'data')!r}, 'w'); file.write(f'{{file.fileno() > 2}} '); file.flush(); "
+        "subprocess.run([sys.executable, '-c', 'import os; [os.fstat(n) for n in range(3)]'], check=True); "
+        "file.write('done')"
+    )
+    command = ["sh", "-c", f'exec "$0" -c "$1" {closed}', sys.executable, code]
+    done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, check=False)
+    assert done.returncode == 0 and (tmp_path / "data").read_text() == "True done", done.stderr
+    assert done.stdout == (b"" if " >&-" in f" {closed}" else b"out\n")
+    assert done.stderr == (b"" if "2>&-" in closed else b"err\n")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full device")
+def test_an_error_keeps_its_exit_code_where_it_cannot_be_printed() -> None:
+    code = "import sys; from gear.cli.main import main; sys.exit(main(['verify', 'nowhere']))"
+    done = subprocess.run(["sh", "-c", 'exec "$0" -c "$1" 2>/dev/full', sys.executable, code], check=False)
+    assert done.returncode == 2
 
 
 @pytest.mark.parametrize(("columns", "expected"), [("", 100), ("0", 100), ("30", 60), ("80", 80), ("200", 200)])
