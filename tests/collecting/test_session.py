@@ -28,7 +28,7 @@ def closed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setattr(module, "build", lambda *_: SimpleNamespace(rig=lambda: None))
     monkeypatch.setattr(module, "blamed", lambda *_: _Nothing())
     monkeypatch.setattr(
-        module, "load_or_compile", lambda **_: SimpleNamespace(model=None, town_name="town10", shapes=None)
+        module, "load_or_compile", lambda **_: SimpleNamespace(model=None, town_name="town10", shapes=None, shelf=None)
     )
     monkeypatch.setattr(module, "open_renderer", lambda *_, **__: renderer)
     return closed
