@@ -85,6 +85,19 @@ def test_every_section_of_results_says_whether_it_is_current() -> None:
     assert made["INDEX"].read_text(encoding="utf-8") == made["index"](), "run: python docs/stale_results.py"
 
 
+def test_the_comparison_with_the_paper_is_that_of_its_numbers() -> None:
+    made = runpy.run_path(str(DOCS / "paper_comparison.py"))
+    assert made["PAGE"].read_text(encoding="utf-8") == made["page"](), "run: python docs/paper_comparison.py"
+
+
+def test_several_tests_are_corrected_as_by_holm() -> None:
+    holm = runpy.run_path(str(DOCS / "paper_comparison.py"))["holm"]
+    # The smallest p times 4, the next times 3, and so on; never less than the one before.
+    assert holm({"a": 0.03, "b": 0.01, "c": None, "d": 0.04, "e": 0.005}) == pytest.approx(
+        {"a": 0.06, "b": 0.03, "c": None, "d": 0.06, "e": 0.02}
+    )
+
+
 def test_figures_are_stale_when_a_file_that_they_depend_on_changes(tmp_path: Path) -> None:
     digest = runpy.run_path(str(DOCS / "stale_results.py"))["digest"]
     (tmp_path / "town").mkdir()

@@ -27,7 +27,7 @@ NETWORKS = {
 }
 """Each has a patch in every scene with a surface."""
 
-ALSO = {"stereo_centre_lite0": "town10"}
+ALSO = {"stereo_centre_lite0": "town10", "adabins_lite0": "town10", "glpn_b0": "town10"}
 """Further networks, with the town in whose scenes each has a patch."""
 
 FELT = 0.005

@@ -75,13 +75,15 @@ class PaperTable:
 
 
 def paper_tables(report: BenchReport) -> list[PaperTable]:
-    """Returns the tables of the CARLA-GeAR paper for a benchmark: Table 1, Table 2, and Table 2 for adaptive patches;
-    and, in the same layout, the collision rates of the drives. Tables without any number are left out.
+    """Returns the tables of the CARLA-GeAR paper for a benchmark: Table 1, Table 2, and Table 2 for adaptive patches if
+    there are any; and, in the same layout, the collision rates of the drives. Tables without any number are left out.
 
     Args:
         report: results of the benchmark.
     """
-    found = [_detection(report), _defense(report, PATCH, "table2"), _defense(report, ADAPTIVE, "table2-adaptive")]
+    found = [_detection(report), _defense(report, PATCH, "table2")]
+    pools = (pool for task in report.tasks for one in task.results for pool in one.evaluation.pools)
+    found += [_defense(report, ADAPTIVE, "table2-adaptive")] if any(pool.name == ADAPTIVE for pool in pools) else []
     found += [] if report.drives is None else [_collisions(report.drives)]
     return [table for table in found if any(cell.text for line in table.lines for cell in line.cells)]
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from gear.verbs.bench.paper.tables import Cell, paper_tables
+from gear.verbs.bench.plan import ADAPTIVE
 from tests.verbs.bench.synthetic import report
 
 
@@ -26,3 +29,16 @@ def test_table_2_is_relative_to_the_undefended_clean_network() -> None:
     assert cleaner == (Cell(text="-2.00", tone="worse"), Cell(text="-10.00", tone="better", is_grey=True))
     assert other == (Cell(text="+0.00", tone="same"), Cell(text="-20.00", tone="same", is_grey=True))
     assert adaptive.lines[1].cells[1] == Cell(text="-25.00", tone="worse", is_grey=True)
+
+
+def test_there_is_no_table_of_adaptive_patches_without_any() -> None:
+    full = report()
+    tasks = [
+        replace(task, results=tuple(
+            replace(one, evaluation=replace(
+                one.evaluation, pools=tuple(pool for pool in one.evaluation.pools if pool.name != ADAPTIVE)))
+            for one in task.results))
+        for task in full.tasks
+    ]  # fmt: skip
+    assert [table.name for table in paper_tables(full)] == ["table1", "table2", "table2-adaptive"]
+    assert [table.name for table in paper_tables(replace(full, tasks=tuple(tasks)))] == ["table1", "table2"]
