@@ -15,6 +15,7 @@ from gear.leaderboard.reading import Filed, limited, read_records
 from gear.leaderboard.record import canonical
 from gear.leaderboard.verdict import Verdict, read_verdict
 from gear.plugins.text import printable
+from gear.values.counted import counted
 from gear.values.errors import DatasetError, GearError
 from gear.values.serial import Json
 from gear.verbs.leaderboard.drive_page import drive_tables, drives_json
@@ -61,7 +62,8 @@ class BoardReport:
         """Returns the result as text: counts, and one line per refused file."""
         rows = [row for table in self.tables for row in table.rows]
         ranked = sum(row.is_ranked for row in rows)
-        lines = [f"{self.out}: {len(rows)} rows, {ranked} of them ranked, in {len(self.tables)} tables"]
+        shown = f"{counted(len(rows), 'row')}, {ranked} of them ranked, in {counted(len(self.tables), 'table')}"
+        lines = [f"{self.out}: {shown}"]
         return "\n".join([*lines, *(f"refused: {line}" for line in self.refused)]) + "\n"
 
 

@@ -62,7 +62,7 @@ def test_pages_of_records(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     words = ["leaderboard", "build", str(tmp_path / "records"), "--out", str(tmp_path / "site")]
     assert main([*words, "--checks", str(tmp_path / "checks"), "--commitment", sha("secret")]) == 0
     out = capsys.readouterr().out
-    assert "3 rows, 3 of them ranked, in 1 tables" in out
+    assert "3 rows, 3 of them ranked, in 1 table" in out
     assert "e.json: is no gear-record" in out and "is the verdict of another record" in out
     index = Tags((tmp_path / "site/index.html").read_text())
     assert "script" not in index.tags and sha("secret") in index.text
@@ -174,3 +174,13 @@ def test_what_somebody_adds_to_finished_pages_stays(tmp_path: Path) -> None:
         (site / name).unlink()
     build_leaderboard(tmp_path / "records", out=site)
     assert (site / "index.html").exists()
+
+
+def test_the_board_of_gears_own_records(tmp_path: Path) -> None:
+    board = Path(__file__).parents[3] / "docs/results/board"
+    build_leaderboard(board / "records", checks=board / "checks", out=tmp_path / "site")
+    made = json.loads((tmp_path / "site/board.json").read_text())
+    (table,) = made["tables"]
+    assert made["refused"] == [] and all(row["is_ranked"] for row in table["rows"])
+    states = {row["defense"]: row["state"] for row in table["rows"]}
+    assert states == dict.fromkeys(("-", "zmask", "hyperneuron", "fpda"), "claimed") | {"lgs": "reproduced"}
