@@ -134,7 +134,7 @@ def read_patch(path: Path) -> UInt8Image:
         raise PatchError(path, f"cannot be read: {error.strerror}") from error
     if len(data) > MAX_BYTES:
         raise PatchError(path, f"is larger than {MAX_BYTES >> 20} MiB")
-    no_picture = "is not a picture, or a damaged one; use an 8-bit RGB PNG"
+    no_picture = "is not a picture that can be read, or a damaged one; use an 8-bit RGB PNG"
     try:
         check_size(data, least_px=SIDE_PX[0], most_px=SIDE_PX[1])
         check_whole(data)

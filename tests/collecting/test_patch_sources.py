@@ -120,9 +120,9 @@ def test_what_is_no_patch_is_refused_in_one_line(tmp_path: Path, picture: np.nda
     for name, message in (
         ("text.png", "not a picture"),
         ("empty.png", "not a picture"),
-        ("cut.jpg", "not a picture, or a damaged one"),
-        ("zeros.jpg", "not a picture, or a damaged one"),
-        ("grey.jpg", "not a picture, or a damaged one"),
+        ("cut.jpg", "not a picture that can be read, or a damaged one"),
+        ("zeros.jpg", "not a picture that can be read, or a damaged one"),
+        ("grey.jpg", "not a picture that can be read, or a damaged one"),
         ("dot.png", "is 1 x 1 px; sides of 2 to 8192"),
         ("clear.png", "transparent"),
         ("none.png", "is not there"),
