@@ -11,7 +11,6 @@ DRAWN = "it needs a graphics context; tests/render compare the pictures of the r
 WITHOUT = {
     "gear.camera.effects.effect": "the base class of effects; tests/camera/effects test every effect through it",
     "gear.render.filament": DRAWN,
-    "gear.render.raster.gl": DRAWN,
     "gear.render.raster.scene": DRAWN,
     "gear.render.raster.sun_shadows": DRAWN,
     "gear.render.raster.textures": DRAWN,

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gear.dataset.checks.exported_files import LISTED
 from gear.networks.torchvision_import import prepare
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import ConfigError
@@ -38,7 +39,12 @@ def test_torchvision_reads_it(tmp_path: Path, settings: tuple[str, ...], year: s
             assert np.array_equal(np.asarray(picture), sample.images["left"])
             assert [one["category_id"] for one in found] == [thing.category_id for thing in sample.objects]
             assert [one["area"] for one in found] == [thing.area_px for thing in sample.objects] != []
-    assert {path.name for path in (tmp_path / "coco").iterdir()} == {f"train{year}", f"val{year}", "annotations"}
+    assert {path.name for path in (tmp_path / "coco").iterdir()} == {
+        f"train{year}",
+        f"val{year}",
+        "annotations",
+        LISTED,
+    }
 
 
 def test_options_are_read_like_all_others(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gear.dataset.checks.exported_files import LISTED
 from gear.plugins.datasets import open_dataset
 from gear.verbs.export import export
 from tests.dataset.splits import tree
@@ -54,4 +55,4 @@ def test_the_tree_is_a_card_and_data(tmp_path: Path) -> None:
     for name in ("a", "b"):
         export(data, layout="hf", out=tmp_path / name)
     assert tree(tmp_path / "a") == tree(tmp_path / "b")
-    assert sorted(tree(tmp_path / "a")) == ["README.md", "data/train-000000.parquet", "data/val-000000.parquet"]
+    assert sorted(tree(tmp_path / "a")) == [LISTED, "README.md", "data/train-000000.parquet", "data/val-000000.parquet"]

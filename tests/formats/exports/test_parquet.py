@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from gear.dataset.checks.exported_files import LISTED
 from gear.formats.exports.layout import ExportSplit
 from gear.formats.parquet_files import ParquetOptions, parquet_files
 from gear.plugins.datasets import open_dataset
@@ -20,7 +21,7 @@ def test_a_row_is_a_sample_with_the_bytes_of_its_files(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     data = dataset(tmp_path / "data", "stereo3d", ("val", "test"))
     assert export(data, layout="parquet", out=tmp_path / "a") == 4
-    assert sorted(tree(tmp_path / "a")) == ["test-000000.parquet", "val-000000.parquet"]
+    assert sorted(tree(tmp_path / "a")) == [LISTED, "test-000000.parquet", "val-000000.parquet"]
     table = parquet.read_table(tmp_path / "a/val-000000.parquet")
     columns = ["index", "sequence", "frame", "calib", "image_2", "image_3", "label_2", "record", "surfaces", "facts"]
     assert table.column_names == columns
@@ -51,7 +52,7 @@ def test_the_same_dataset_gives_the_same_files_of_limited_size(tmp_path: Path) -
     for name in ("a", "b"):
         export(data, layout="parquet", out=tmp_path / name, settings=["shard_mb=0.01"])
     assert tree(tmp_path / "a") == tree(tmp_path / "b")
-    assert sorted(tree(tmp_path / "a")) == ["val-000000.parquet", "val-000001.parquet"]
+    assert sorted(tree(tmp_path / "a")) == [LISTED, "val-000000.parquet", "val-000001.parquet"]
 
 
 @pytest.mark.parametrize("layout", ["parquet", "hf"])

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from gear.dataset.checks.exported_files import LISTED
 from gear.dataset.files import sha256
 from gear.plugins.datasets import open_dataset
 from gear.values.errors import ConfigError
@@ -52,7 +53,7 @@ def test_the_same_dataset_gives_the_same_tars_without_time_and_owner(tmp_path: P
         path.touch()
     export(data, layout="webdataset", out=tmp_path / "b")
     assert tree(tmp_path / "a") == tree(tmp_path / "b")
-    assert sorted(tree(tmp_path / "a")) == ["train-000000.tar", "train.json", "val-000000.tar", "val.json"]
+    assert sorted(tree(tmp_path / "a")) == [LISTED, "train-000000.tar", "train.json", "val-000000.tar", "val.json"]
     data = (tmp_path / "a/val-000000.tar").read_bytes()
     assert data[257:263] == b"ustar\0"
     with tarfile.open(fileobj=io.BytesIO(data)) as archive:
