@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gear.dataset.disk_errors import explained
-from gear.dataset.guarded_paths import inside, owned
+from gear.dataset.guarded_paths import owned
 from gear.dataset.layout import GEAR
 from gear.values.errors import DatasetError
 
@@ -35,7 +35,7 @@ def check_own(root: Path, marker: str, is_ours: Callable[[Path], bool], what: st
         there = sorted(path.name for path in root.iterdir() if path.name != GEAR and not path.name.startswith("."))
         if not there:
             return
-        path = inside(root, marker)
+        path = owned(root, marker)
         if path.is_file() and is_ours(path):
             return
         for name in there:
