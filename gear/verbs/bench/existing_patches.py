@@ -36,7 +36,7 @@ class ExistingPatches:
                 f"{source}: holds no patches of a benchmark; name the --out folder of a benchmark, or say {SHIPPED}"
             )
 
-    def find(self, task_plugins: TaskPlugins, model: Candidate, defense: Candidate | None, scene: Scene) -> Path | None:
+    def find(self, task_plugins: TaskPlugins, model: Candidate, name: str, scene: Scene) -> Path | None:
         """Returns the folder of a network's patches in a scene; None if the source does not have one for every surface.
 
         Shipped patches were made against shipped weights, so networks with other weights have none.
@@ -44,13 +44,12 @@ class ExistingPatches:
         Args:
             task_plugins: networks and defenses of the task.
             model: the attacked network.
-            defense: the defense that guards the network; None for the network alone.
+            name: name of the network with its defense, or of the network alone, as `Plan.name` returns it.
             scene: the scene.
         """
         if self._folder is not None:
-            name = model.label if defense is None else f"{model.label}+{defense.label}"
             folder: Path | None = self._folder / task_plugins.folder / name / scene.label
-        elif defense is None and _has_shipped_weights(model):
+        elif name == model.label and _has_shipped_weights(model):
             folder = self._shipped.get(f"{model.plugin}-{scene.label}")
         else:
             folder = None

@@ -132,14 +132,14 @@ class Plan:
         for one in self.plugins_of_tasks:
             for model, scene in itertools.product(one.models, scenes):
                 for defense in self.adaptive_defenses(one) if scene in self.scenes else (None,):
-                    folder = source.find(one, model, defense, scene)
+                    name = self.name(model, defense)
+                    folder = source.find(one, model, name, scene)
                     if folder is not None:
-                        own = self.root / PATCHES / one.folder / self.name(model, defense) / scene.label
-                        self.existing[own] = folder
+                        self.existing[self._made_patch(one, scene, name)] = folder
 
     def _is_attacked(self, task_plugins: TaskPlugins, scene: Scene, name: str) -> bool:
         """Whether the patches against a network, alone or with a defense, do not exist yet."""
-        return self.root / PATCHES / task_plugins.folder / name / scene.label not in self.existing
+        return self._made_patch(task_plugins, scene, name) not in self.existing
 
     def steps(self) -> Iterator[Step]:
         """Yields all steps in an order in which each step comes after the steps that it depends on."""
@@ -205,8 +205,12 @@ class Plan:
             scene: the scene.
             name: name of the attacked network, or of a network with a defense, as `Plan.name` returns it.
         """
-        own = self.root / PATCHES / task_plugins.folder / name / scene.label
-        return self.existing.get(own, own)
+        made = self._made_patch(task_plugins, scene, name)
+        return self.existing.get(made, made)
+
+    def _made_patch(self, task_plugins: TaskPlugins, scene: Scene, name: str) -> Path:
+        """The folder into which an attack of this benchmark writes its patches."""
+        return self.root / PATCHES / task_plugins.folder / name / scene.label
 
     def adaptive_defenses(self, task_plugins: TaskPlugins) -> tuple[Candidate | None, ...]:
         """Returns the defenses that attacks on a network take into account; None stands for the attack on the network
